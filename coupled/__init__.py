@@ -1,0 +1,9 @@
+"""Fly a JSBSim aircraft through a compliant control loader.
+
+`coupled.rig` is the loader, `coupled.flight` couples it to an aircraft,
+`coupled.authority` compares what each correction gives back.
+"""
+
+from importlib.metadata import version
+
+__version__ = version("coupled")

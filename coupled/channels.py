@@ -1,0 +1,72 @@
+"""The names of a record's channels; each ends in its unit.
+
+Those of a control come from the rig, those of the motion from the airframe. A bench
+record has of the motion only the dynamic pressure that the host was told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coupled.rig.parameters import unit_of
+
+TIME = "time_s"
+
+# In the order in which the frame kernel writes them; d is m, or rad for a wheel.
+_CONTROL = (
+    "force_N",
+    "computed_{d}",
+    "deflection_{d}",
+    "estimate_{d}",
+    "gradient_N_per_{d}",
+    "modifying_force_N",
+    "force_step_N",  # the jump of F_mod at this frame, which the hand feels
+    "stop",  # the stop met over the frame before: −1, 0 or +1
+)
+_NOISY = (0, 1, 2, 5)
+
+BENCH_MOTION = ("dynamic_pressure_Pa", "load_factor")
+MOTION = (
+    "dynamic_pressure_Pa",
+    "load_factor",
+    "elevator_rad",
+    "pitch_rate_rad_per_s",
+    "alpha_rad",
+    "pitch_rad",
+    "true_airspeed_m_per_s",
+    "altitude_m",
+    "aileron_rad",
+    "rudder_rad",
+    "roll_rate_rad_per_s",
+    "yaw_rate_rad_per_s",
+    "sideslip_rad",
+    "roll_rad",
+    "heading_rad",
+)
+
+
+def control_channels(control: str) -> tuple[str, ...]:
+    """Return the channels of one control, in the kernel's order."""
+    return tuple(f"{control}_{name.format(d=unit_of(control))}" for name in _CONTROL)
+
+
+def channel(control: str, quantity: str) -> str:
+    """Return the channel of a control's quantity, as `channel("wheel", "computed")`."""
+    for name, plain in zip(control_channels(control), _CONTROL, strict=True):
+        if plain.split("_{d}")[0].split("_N")[0] == quantity:
+            return name
+    raise KeyError(quantity)
+
+
+def record_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:
+    """Return all channels of a flight, or of a bench, in the kernel's order."""
+    names = [TIME]
+    for control in controls:
+        names += control_channels(control)
+    return (*names, *(MOTION if flown else BENCH_MOTION))
+
+
+def noisy_channels(controls: Sequence[str], flown: bool) -> list[str]:
+    """Return the channels that a sensor reads, and that noise may be given for."""
+    names = [control_channels(control)[i] for control in controls for i in _NOISY]
+    return names + list(MOTION if flown else BENCH_MOTION[:1])

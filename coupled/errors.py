@@ -1,0 +1,26 @@
+"""What a user did, or a flight met, that ends the work: one line each."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """Input that cannot be used. Its text is the one line that a user sees.
+
+    Parameters: `file` where the fault stands, `key` within it (dotted; may be
+    empty), and `problem`, which also says what would be right.
+    """
+
+    def __init__(self, file: object, key: str, problem: str) -> None:
+        self.file, self.key, self.problem = str(file), key, problem
+        where = f"{file}: {key}: " if key else f"{file}: "
+        super().__init__(where + " ".join(problem.split()))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return a hint that names the known word most like `word`, or lists them all."""
+    known = list(known)
+    match = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"did you mean {match[0]}?" if match else "known: " + ", ".join(sorted(known))

@@ -1,0 +1,1 @@
+"""The rig coupled to an aircraft: airframe, pilots, scenario, and the frame loop."""

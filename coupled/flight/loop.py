@@ -1,0 +1,163 @@
+"""The frame loop: rig and aircraft, coupled.
+
+Each frame the airframe gives q̄, load factor and motion; the rig's compiled frame step
+does the rest; the airframe takes the surface commands for one step. A flight that
+meets the ground, loses a finite state or is interrupted keeps its record so far.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import TIME, control_channels, record_channels
+from coupled.files import sha256
+from coupled.flight.airframe import Airframe, Bench, JSBSimAirframe, check_direct_controls
+from coupled.flight.pilot import Action
+from coupled.flight.scenario import Scenario
+from coupled.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.control import at_rest
+from coupled.rig.frame import step_frame
+from coupled.rig.packing import pack
+from coupled.rig.parameters import Control
+
+Progress = Callable[[int, int], None]
+Floats = NDArray[np.float64]
+
+
+def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
+    """Fly a scenario and return its record, SI, one row a frame.
+
+    `progress` is called now and then with frames done and frames in all. The manifest says
+    what went in, and under `ended_early` why and when a flight ended before its time.
+    """
+    run, rig = scenario.run, scenario.rig
+    airframe = make_airframe(scenario)
+    frames, substeps = scenario.frames, rig.substeps
+    h = 1.0 / (rig.frame_rate * substeps)
+    pressure_Pa = airframe.motion()[0]
+    actions = {
+        name: pilot.act(
+            rig.controls[name],
+            gradient_at(rig.controls[name], pressure_Pa),
+            name,
+            scenario.file.parent,
+        )
+        for name, pilot in scenario.pilots.items()
+    }
+    names = list(rig.controls)
+    channels = record_channels(names, rig.flight is not None)
+    controls = pack(rig, {name: action.hand for name, action in actions.items()})
+    states = at_rest(len(names))
+    script = _script(names, actions, frames * substeps + 1, h)
+    noise = _noise(channels, rig.noise, frames, run.seed)
+    data = np.zeros((frames, len(channels)))
+    looks = [(states[names.index(n)], a.look) for n, a in actions.items() if a.look]
+    extra: list[tuple[float, ...]] = []
+
+    ended: dict[str, Any] | None = None
+    done = 0
+    try:
+        for k in range(frames):
+            trouble = airframe.trouble()
+            if trouble:
+                ended = {"reason": trouble, "time_s": k / rig.frame_rate}
+                break
+            motion = airframe.motion()
+            for state, look in looks:
+                state["hand"]["command"] = look(k / rig.frame_rate, motion)
+            commands = step_frame(controls, states, script, noise, data, k, substeps, h, motion)
+            if run.record_properties:
+                extra.append(airframe.extra())
+            airframe.step(commands)
+            done = k + 1
+            if progress is not None and done % 64 == 0:
+                progress(done, frames)
+    except KeyboardInterrupt:
+        ended = {"reason": "interrupted", "time_s": done / rig.frame_rate}
+    data = data[:done]
+    data[:, 0] = np.arange(done) / rig.frame_rate
+    if run.record_properties:
+        channels = (*channels, *run.record_properties)
+        data = np.column_stack((data, np.reshape(extra[:done], (done, -1))))
+    return Record(channels, data, _manifest(scenario, channels, data, ended))
+
+
+def make_airframe(scenario: Scenario) -> Airframe:
+    """Return the scenario's aircraft, trimmed and checked, or its bench."""
+    rig, run = scenario.rig, scenario.run
+    if rig.flight is None:
+        assert run.bench is not None
+        points = list(zip(run.bench.time, run.bench.dynamic_pressure, strict=True))
+        return Bench(1.0 / rig.frame_rate, points)
+    where = {"models": [aircraft_folder()], "file": scenario.rig_file}
+    check_direct_controls(rig.flight, 1.0 / rig.frame_rate, list(rig.controls), **where)
+    return JSBSimAirframe(
+        rig.flight,
+        1.0 / rig.frame_rate,
+        list(rig.controls),
+        record=run.record_properties,
+        record_file=scenario.file,
+        **where,
+    )
+
+
+def gradient_at(control: Control, pressure_Pa: float) -> float:
+    """Return the specified gradient of a control below its break, N/d."""
+    table = control.schedule
+    return float(np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient))
+
+
+def _script(names: list[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
+    """Return the hands' script on all nodes, shape (controls, 2, nodes): N and d."""
+    times = np.arange(nodes) * h
+    script = np.zeros((len(names), 2, nodes))
+    for name, action in actions.items():
+        script[names.index(name)] = action.force(times), action.held(times)
+    return script
+
+
+def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, seed: int) -> Floats:
+    """Return white noise for every channel, or one row of zeros where there is none."""
+    sigma = np.array([levels.get(channel, 0.0) for channel in channels])
+    if not sigma.any():
+        return np.zeros((1, len(channels)))
+    return np.random.default_rng(seed).standard_normal((frames, len(channels))) * sigma
+
+
+def _manifest(
+    scenario: Scenario, channels: tuple[str, ...], data: Floats, ended: dict[str, Any] | None
+) -> dict[str, Any]:
+    inputs = {scenario.file.name: scenario.file, scenario.rig_file.name: scenario.rig_file}
+    for pilot in scenario.pilots.values():
+        name = getattr(pilot, "file", None)
+        if name is not None:
+            inputs[name] = scenario.file.parent / name
+    stops = {}
+    for control in scenario.rig.controls:
+        met = np.flatnonzero(data[:, channels.index(control_channels(control)[-1])])
+        if met.size:
+            stops[control] = float(data[met[0], channels.index(TIME)])
+    libraries = ("jsbsim", "numpy", "numba", "scipy")
+    return {
+        "run": scenario.run.name,
+        "case": scenario.label,
+        "rig": scenario.rig.model_dump(),
+        "seed": scenario.run.seed,
+        "channels": list(channels),
+        "rows": len(data),
+        "ended_early": ended,
+        "stop_first_met_s": stops,
+        "inputs_sha256": {name: sha256(path) for name, path in inputs.items()},
+        "versions": {
+            "coupled": version("coupled"),
+            "python": platform.python_version(),
+            **{name: version(name) for name in libraries},
+        },
+    }

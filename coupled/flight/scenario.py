@@ -1,0 +1,208 @@
+"""A run file: which rig, what the pilot does, for how long, and what is measured.
+
+A run may have several cases: the same run with a few values of rig or pilot changed,
+each named by a dotted key. Every case and pilot is checked before anything flies.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from coupled.errors import InputError, nearest
+from coupled.flight.pilot import PILOTS, Pilot, Table, read_force_table
+from coupled.channels import channel
+from coupled.resources import find, shipped_rigs, shipped_runs
+from coupled.rig.parameters import CONTROL_NAMES, ControlName, Rig, unit_of
+from coupled.rig.rigfile import change, read_rig
+from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
+
+Configuration = Literal["rigid", "uncompensated", "deflection only", "gradient only", "compensated"]
+CONFIGURATIONS: tuple[Configuration, ...] = (
+    "rigid",
+    "uncompensated",
+    "deflection only",
+    "gradient only",
+    "compensated",
+)
+
+
+class Measure(Section):
+    """What a comparison looks at: the control, and the change of attitude that is timed."""
+
+    control: ControlName | None = None
+    attitude_change: float = quantity("rad", 0.1, gt=0)
+
+
+class Bench(Section):
+    """On a rig without aircraft: the dynamic pressure that the host is told, over time."""
+
+    time: list[float] = quantity("s", min_length=1)
+    dynamic_pressure: list[float] = quantity("Pa", min_length=1)
+
+
+class Case(Section):
+    """A variant of the run: dotted keys of rig and pilot, with their values here."""
+
+    label: str = quantity("", min_length=1)
+    rig: dict[str, Any] = {}
+    pilot: dict[str, Any] = {}
+
+
+class RunFile(Section):
+    """The tables of a run file, its pilots apart."""
+
+    name: str = quantity("", min_length=1)
+    card: str = quantity("", min_length=1)
+    rig: str = quantity("", min_length=1)
+    duration: float = quantity("s", gt=0, le=7200)
+    seed: int = quantity("", 0, ge=0)
+    record_properties: list[str] = []
+    configurations: list[Configuration] = quantity("", list(CONFIGURATIONS), min_length=1)
+    measure: Measure = Measure()
+    bench: Bench | None = None
+    case: list[Case] = []
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One case of a run, ready to fly: a rig, and a pilot on some of its controls."""
+
+    run: RunFile
+    file: Path
+    rig: Rig
+    rig_file: Path
+    pilots: Mapping[ControlName, Pilot]
+    label: str
+
+    @property
+    def frames(self) -> int:
+        """Rows of the record."""
+        return max(1, round(self.run.duration * self.rig.frame_rate))
+
+    @property
+    def control(self) -> ControlName:
+        """The control that a comparison looks at."""
+        return self.run.measure.control or next(iter(self.pilots))
+
+    def configured(self, configuration: Configuration) -> Scenario:
+        """Return this scenario with the rig in one of the five configurations."""
+        changed = copy.copy(self.__dict__)
+        changed["rig"] = configure(self.rig, configuration)
+        return Scenario(**changed)
+
+
+def configure(rig: Rig, configuration: Configuration) -> Rig:
+    """Return the rig with its structure rigid, or bending with the named corrections on.
+
+    Rigid: K = 0 and the host believes so. Otherwise the rig's own K and K̂.
+    """
+    controls = {}
+    for name, control in rig.controls.items():
+        loader, host = control.loader, control.compensation
+        if configuration == "rigid":
+            loader = loader.model_copy(update={"bend": 0.0})
+            host = host.model_copy(update={"bend": 0.0})
+        corrections = {
+            "deflection": configuration in ("deflection only", "compensated"),
+            "gradient": configuration in ("gradient only", "compensated"),
+        }
+        host = host.model_copy(update=corrections)
+        controls[name] = control.model_copy(update={"loader": loader, "compensation": host})
+    return rig.model_copy(update={"controls": controls})
+
+
+def read_run(name: str) -> list[Scenario]:
+    """Return the cases of a run file, given by path or by the name of a shipped one."""
+    file = find(name, shipped_runs(), "run")
+    table = load_toml(file)
+    pilots = table.pop("pilot", None)
+    keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
+    known_keys(table, keys, file, "")
+    subsections = {"bench": Bench, "measure": Measure}
+    for key, section in subsections.items():
+        if key in table:
+            table[key] = build(section, table[key], file, key)
+    cases = table.pop("case", [])
+    if not isinstance(cases, list):
+        raise InputError(file, "case", "cases are written [[case]]")
+    table["case"] = [build(Case, case, file, f"case[{i}]") for i, case in enumerate(cases)]
+    run = build(RunFile, table, file, "")
+    if run.bench is not None:
+        _check_bench(run.bench, file)
+    variants = run.case or [Case(label=run.name)]
+    return [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
+
+
+def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> Scenario:
+    rig_file = find(run.rig, shipped_rigs(), "rig", beside=file.parent)
+    try:
+        rig = read_rig(rig_file, case.rig)
+    except InputError as error:
+        if case.rig and any(error.key.endswith(key.split(".")[-1]) for key in case.rig):
+            key = f"case[{index}].rig.{error.key}"
+            raise InputError(file, key, error.problem) from None
+        raise
+    if rig.flight is None and run.bench is None:
+        raise InputError(file, "bench", f"is missing: {rig_file.name} has no aircraft, so say q̄")
+    if rig.flight is not None and run.bench is not None:
+        raise InputError(file, "bench", f"{rig_file.name} has an aircraft, which gives q̄ itself")
+    if rig.flight is None and run.record_properties:
+        raise InputError(file, "record_properties", f"{rig_file.name} has no aircraft to ask")
+    pilots = copy.deepcopy(pilots)
+    for key, value in case.pilot.items():
+        place = f"case[{index}].pilot.{key}"
+        if not isinstance(pilots, dict) or key.split(".")[0] not in pilots or "." not in key:
+            raise InputError(file, place, "no such pilot; write CONTROL.KEY of one in this run")
+        change(pilots, key, value)
+    ready = _pilots(pilots, rig, file)
+    if run.measure.control is not None and run.measure.control not in rig.controls:
+        raise InputError(file, "measure.control", f"{rig_file.name} has no {run.measure.control}")
+    return Scenario(run, file, rig, rig_file, ready, case.label)
+
+
+def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
+    if not isinstance(tables, dict) or not tables:
+        raise InputError(file, "pilot", f"needs at least one of {', '.join(rig.controls)}")
+    known_keys(tables, dict.fromkeys(CONTROL_NAMES), file, "pilot")
+    pilots: dict[ControlName, Pilot] = {}
+    for name, table in tables.items():
+        path = f"pilot.{name}"
+        if name not in rig.controls:
+            raise InputError(file, path, f"the rig has no {name}; {nearest(name, rig.controls)}")
+        kind = table.get("kind") if isinstance(table, dict) else None
+        if kind not in PILOTS:
+            raise InputError(file, f"{path}.kind", f"is {kind!r}; {nearest(str(kind), PILOTS)}")
+        pilot = build(PILOTS[kind], table, file, path, unit_of(name))
+        if kind == "attitude" and (name != "column" or rig.flight is None):
+            raise InputError(
+                file, path, "only the column of a rig that flies holds a pitch attitude"
+            )
+        if isinstance(pilot, Table):
+            read_force_table(file.parent / pilot.file, channel(name, "force"))
+        _check_deflection(pilot, rig, name, file)
+        pilots[cast(ControlName, name)] = pilot
+    return pilots
+
+
+def _check_deflection(pilot: Pilot, rig: Rig, name: str, file: Path) -> None:
+    held = getattr(pilot, "deflection", 0.0)
+    travel = rig.controls[cast(ControlName, name)].travel
+    if abs(held) > travel:
+        raise InputError(
+            file,
+            f"pilot.{name}.deflection_{unit_of(name)}",
+            f"{held:g} is beyond the control's travel of ±{travel:g}",
+        )
+
+
+def _check_bench(bench: Bench, file: Path) -> None:
+    if len(bench.time) != len(bench.dynamic_pressure):
+        raise InputError(file, "bench.dynamic_pressure_Pa", "needs as many values as time_s")
+    if any(b <= a for a, b in zip(bench.time, bench.time[1:], strict=False)):
+        raise InputError(file, "bench.time_s", "must rise from value to value")
+    if min(bench.dynamic_pressure) < 0.0:
+        raise InputError(file, "bench.dynamic_pressure_Pa", "cannot be negative")

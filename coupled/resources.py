@@ -1,0 +1,50 @@
+"""Where the shipped aircraft and runs lie: in the repo, or inside the installed package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from coupled.errors import InputError, nearest
+
+DEFAULT_RUN = "worst-case"
+
+
+def _shipped(kind: str) -> Path:
+    package = Path(__file__).parent
+    installed = package / "shipped" / kind
+    return installed if installed.is_dir() else package.parent / kind
+
+
+def aircraft_folder() -> Path:
+    """Return the folder of shipped aircraft, one folder each, with its rig file."""
+    return _shipped("aircraft")
+
+
+def runs_folder() -> Path:
+    """Return the folder of shipped run files."""
+    return _shipped("runs")
+
+
+def shipped_rigs() -> dict[str, Path]:
+    """Return the shipped rig files by name."""
+    return {p.stem: p for p in sorted(aircraft_folder().glob("*/*.toml"))}
+
+
+def shipped_runs() -> dict[str, Path]:
+    """Return the shipped run files by name."""
+    return {p.stem: p for p in sorted(runs_folder().glob("*.toml"))}
+
+
+def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = None) -> Path:
+    """Return the file that a user's word means: a path, or the name of a shipped one.
+
+    A relative path is sought beside the file that names it, then where the user stands.
+    """
+    if "/" not in name and not name.endswith(".toml"):
+        if name in shipped:
+            return shipped[name]
+        raise InputError(name, "", f"is no shipped {kind}; {nearest(name, shipped)}")
+    for folder in ([beside] if beside else []) + [Path()]:
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(name, "", f"there is no such {kind} file")

@@ -1,0 +1,25 @@
+"""Compensation: the host's estimate of the true deflection, for the surface.
+
+δ̂ = δc + K̂·F      eq. (1) solved for δ, with the host's own K̂
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from coupled.rig.compiled import layout, stage
+
+
+class CompensationParameters(Protocol):
+    """What the host believes of the bend."""
+
+    bend: float  # K̂, d/N; 0 where the deflection correction is off
+
+
+COMPENSATION_PARAMETERS = layout(CompensationParameters)
+
+
+@stage
+def estimate(p: CompensationParameters, computed: float, force: float) -> float:
+    """Return δ̂ in d from δc in d and F in N as read."""
+    return computed + p.bend * force

@@ -1,0 +1,66 @@
+"""How the stages are compiled.
+
+Two decorators: `stage` for a function that other kernels call, `entry` for one
+that Python calls and whose machine code is kept on disk. numba looks only at an
+entry's own file to tell whether its cache is stale, which would fly old physics
+after an edit of a stage; so the cache lies in a folder named by a hash of all
+sources in `coupled/rig`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+import numba
+import numpy as np
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def stage(function: F) -> F:
+    """Compile a function that is inlined into the entries."""
+    compiled: F = numba.njit(function)
+    return compiled
+
+
+def entry(function: F) -> F:
+    """Compile a function that Python calls, and keep the result on disk."""
+    chosen = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _cache_folder(chosen)
+    try:
+        compiled: F = numba.njit(cache=True)(function)
+    finally:
+        numba.config.CACHE_DIR = chosen
+    return compiled
+
+
+def _cache_folder(chosen: str) -> str:
+    """Folder for this version of the physics, or numba's own choice if ours is read-only."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted(here.glob("*.py")):
+        digest.update(source.read_bytes())
+    folder = Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return chosen
+    return str(folder) if os.access(folder, os.W_OK) else chosen
+
+
+def layout(declaration: type, **shapes: tuple[int, ...]) -> np.dtype[np.void]:
+    """Return the memory layout of a class of annotated numbers.
+
+    A `float` becomes a double, an `int` a 64-bit integer; `shapes` names the
+    fields that are arrays of doubles.
+    """
+    return np.dtype(
+        [
+            (name, np.float64 if kind is not int else np.int64, shapes.get(name, ()))
+            for name, kind in get_type_hints(declaration).items()
+        ]
+    )

@@ -1,0 +1,69 @@
+"""One control of the rig as the kernels hold it: the stages' layouts side by side."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig import compensation, friction, hand, linkage, loader, modification, schedule
+from coupled.rig import sensing, surface
+
+
+class ControlParameters(Protocol):
+    """Parameters of every stage, in the order of the signal chain."""
+
+    hand: hand.HandParameters
+    schedule: schedule.ScheduleParameters
+    modification: modification.ModificationParameters
+    loader: loader.LoaderParameters
+    friction: friction.FrictionParameters
+    linkage: linkage.LinkageParameters
+    sensing: sensing.SensingParameters
+    compensation: compensation.CompensationParameters
+    surface: surface.SurfaceParameters
+
+
+class ControlState(Protocol):
+    """State of every stage that has one."""
+
+    hand: hand.HandState
+    schedule: schedule.ScheduleState
+    modification: modification.ModificationState
+    loader: loader.LoaderState
+    linkage: linkage.LinkageState
+    surface: surface.SurfaceState
+
+
+CONTROL_PARAMETERS = np.dtype(
+    [
+        ("hand", hand.HAND_PARAMETERS),
+        ("schedule", schedule.SCHEDULE_PARAMETERS),
+        ("modification", modification.MODIFICATION_PARAMETERS),
+        ("loader", loader.LOADER_PARAMETERS),
+        ("friction", friction.FRICTION_PARAMETERS),
+        ("linkage", linkage.LINKAGE_PARAMETERS),
+        ("sensing", sensing.SENSING_PARAMETERS),
+        ("compensation", compensation.COMPENSATION_PARAMETERS),
+        ("surface", surface.SURFACE_PARAMETERS),
+    ]
+)
+CONTROL_STATE = np.dtype(
+    [
+        ("hand", hand.HAND_STATE),
+        ("schedule", schedule.SCHEDULE_STATE),
+        ("modification", modification.MODIFICATION_STATE),
+        ("loader", loader.LOADER_STATE),
+        ("linkage", linkage.LINKAGE_STATE),
+        ("surface", surface.SURFACE_STATE),
+    ]
+)
+
+# Arrays of the two layouts, one element a control; a kernel sees an element as the class above.
+ControlArray = NDArray[np.void]
+
+
+def at_rest(controls: int) -> ControlArray:
+    """Return the states of so many controls at rest in trim, shape (controls,)."""
+    return np.zeros(controls, CONTROL_STATE)

@@ -1,0 +1,107 @@
+"""Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
+
+    servo      x'' = ω²·(δc − x) − 2ζω·x',    |x'| ≤ rate limit
+    backlash   the grip's side follows x once it has taken up the play
+    bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit)
+    arc        the transducer reads L·sin(δ/L)  eqs. (15) to (17)
+
+The servo is stepped exactly for a δc that runs straight over the substep, so it is
+stable at any frequency and second-order in δc.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from coupled.rig.compiled import layout, stage
+
+
+class LinkageParameters(Protocol):
+    """Servo, play, structure and grip."""
+
+    position: NDArray[np.float64]  # weights of (x, x', δc before, δc after) in the next x
+    speed: NDArray[np.float64]  # and in the next x'
+    rate_limit: float  # d/s; 0 for none
+    play: float  # full width of the backlash, d
+    bend: float  # K of the structure, d/N
+    bend_limit: float  # where the bend saturates, d; 0 for never
+    arc_length: float  # L of the grip's arc, d; 0 where the transducer reads δ itself
+
+
+class LinkageState(Protocol):
+    """The servo, and the grip's side of the play."""
+
+    position: float  # x, d
+    rate: float  # x', d/s
+    grip: float  # behind the play, before the bend, d
+
+
+LINKAGE_PARAMETERS = layout(LinkageParameters, position=(4,), speed=(4,))
+LINKAGE_STATE = layout(LinkageState)
+
+
+def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDArray[np.float64]:
+    """Return the servo's exact one-substep map, shape (2, 4).
+
+    Rows give (x, x') after h seconds from (x, x', δc before, δc after), δc running
+    straight between. From the exponential of the servo augmented by its input's ramp.
+    """
+    w, z = omega_rad_per_s, damping_ratio
+    a = np.zeros((4, 4))
+    a[0, 1] = 1.0
+    a[1] = (-w * w, -2.0 * z * w, w * w, 0.0)
+    a[2, 3] = 1.0 / h
+    e = expm(a * h)[:2]
+    return np.column_stack((e[:, 0], e[:, 1], e[:, 2] - e[:, 3], e[:, 3]))
+
+
+@stage
+def move_linkage(
+    p: LinkageParameters, s: LinkageState, computed_before: float, computed: float, h: float
+) -> None:
+    """Advance servo and play over a substep of h seconds in which δc moves as given, d."""
+    a, b = p.position, p.speed
+    x, v = s.position, s.rate
+    s.position = a[0] * x + a[1] * v + a[2] * computed_before + a[3] * computed
+    s.rate = b[0] * x + b[1] * v + b[2] * computed_before + b[3] * computed
+    if p.rate_limit > 0.0:
+        s.rate = min(max(s.rate, -p.rate_limit), p.rate_limit)
+        step = p.rate_limit * h
+        s.position = min(max(s.position, x - step), x + step)
+    half = 0.5 * p.play
+    s.grip = min(max(s.grip, s.position - half), s.position + half)
+
+
+@stage
+def bend(p: LinkageParameters, force: float) -> float:
+    """Return the structure's bend in d under a force in N."""
+    if p.bend_limit > 0.0:
+        return p.bend_limit * math.tanh(p.bend * force / p.bend_limit)
+    return p.bend * force
+
+
+@stage
+def bend_slope(p: LinkageParameters, force: float) -> float:
+    """Return the bend's derivative by force, d/N."""
+    if p.bend_limit > 0.0:
+        return p.bend / math.cosh(p.bend * force / p.bend_limit) ** 2
+    return p.bend
+
+
+@stage
+def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
+    """Return the true deflection δ at the grip in d under a force in N."""
+    return s.grip + bend(p, force)
+
+
+@stage
+def transducer(p: LinkageParameters, true: float) -> float:
+    """Return what the transducer at the grip reads of a true deflection, d."""
+    if p.arc_length > 0.0:
+        return p.arc_length * math.sin(true / p.arc_length)
+    return true

@@ -1,0 +1,133 @@
+"""What a control-loading rig is: the data of a rig file, checked and frozen.
+
+Each section below is a table of the file; a field's key there is its name and its
+unit, d being m for column and pedals and rad for a wheel (`schema`). A neutral value
+(0, or 1 for a factor) leaves an effect out. Signs: pull, clockwise and right foot
+forward are positive.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from coupled.schema import Section, quantity
+
+ControlName = Literal["column", "wheel", "pedals"]
+CONTROL_NAMES: tuple[ControlName, ...] = ("column", "wheel", "pedals")
+SURFACES = {"column": "elevator", "wheel": "aileron", "pedals": "rudder"}
+
+
+def unit_of(control: str) -> str:
+    """Return the unit of a control's deflection."""
+    return "rad" if control == "wheel" else "m"
+
+
+class Loader(Section):
+    """Electronics, servo and structure: the hardware, as it really is."""
+
+    mass: float = quantity("kg", gt=0)
+    damping: float = quantity("N_s_per_{d}", ge=0)
+    basic_gradient: float = quantity("N_per_{d}", ge=0)
+    breakout: float = quantity("N", 0.0, ge=0)
+    friction: float = quantity("N", 0.0, ge=0)
+    breakaway: float = quantity("N", 0.0, ge=0)
+    stribeck_rate: float = quantity("{d}_per_s", 0.002, gt=0)
+    bob_weight: float = quantity("N_per_g", 0.0)
+    offset: float = quantity("N", 0.0)
+    cubic: float = quantity("N_per_{d}3", 0.0, ge=0)
+    delay: float = quantity("s", 0.0, ge=0, le=0.2)
+    multiplier: Literal["hybrid", "digital"] = "hybrid"
+    servo_frequency: float = quantity("Hz", gt=0)
+    servo_damping_ratio: float = quantity("", gt=0)
+    servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)
+    bend: float = quantity("{d}_per_N", 0.0, ge=0)
+    bend_limit: float = quantity("{d}", 0.0, ge=0)
+    play: float = quantity("{d}", 0.0, ge=0)
+    arc_geometry: bool = False
+
+
+class Schedule(Section):
+    """Gradient against dynamic pressure, and what may be wrong with its use."""
+
+    dynamic_pressure: list[float] = quantity("Pa", min_length=2)
+    total_gradient: list[float] = quantity("N_per_{d}")
+    second_gradient: list[float] | None = quantity("N_per_{d}", None)
+    break_deflection: float = quantity("{d}", 0.0, ge=0)
+    pressure_scale: float = quantity("", 1.0, gt=0)
+    pressure_lag: float = quantity("s", 0.0, ge=0)
+    slope: float = quantity("", 1.0)
+
+
+class Compensation(Section):
+    """Which corrections the host makes, and what it believes of the hardware."""
+
+    deflection: bool
+    gradient: bool
+    bend: float = quantity("{d}_per_N", 0.0, ge=0)
+    basic_gradient: float | None = quantity("N_per_{d}", None, ge=0)
+    breakout: float | None = quantity("N", None, ge=0)
+    breakout_term: Literal["exact", "printed"] = "exact"
+
+
+class Sensing(Section):
+    """Scales and converters between loader and host (figure 3); 0 bits is no converter."""
+
+    deflection_scale: float = quantity("", 1.0, gt=0)
+    word_length: int = quantity("bits", 0, ge=0, le=24)
+    full_scale: float = quantity("V", 100.0, gt=0)
+    s1: float = quantity("V_per_{d}", 0.0, ge=0)
+    s2: float = quantity("V_per_N", 0.0, ge=0)
+    s3: float = quantity("V_per_N", 0.0, ge=0)
+
+
+class Rigging(Section):
+    """The run from the host's command to the surface."""
+
+    stretch_loss: float = quantity("per_Pa", 0.0, ge=0)
+    lag: float = quantity("s", 0.0, ge=0)
+    rate_limit: float = quantity("norm_per_s", 0.0, ge=0)
+    play: float = quantity("norm", 0.0, ge=0)
+    offset: float = quantity("norm", 0.0, ge=-1, le=1)
+
+
+class Control(Section):
+    """One control of the rig."""
+
+    surface: Literal["elevator", "aileron", "rudder"]
+    travel: float = quantity("{d}", gt=0)
+    length: float = quantity("m", 0.0, ge=0)
+    loader: Loader
+    schedule: Schedule
+    compensation: Compensation
+    sensing: Sensing = Sensing()
+    rigging: Rigging = Rigging()
+
+
+class Flight(Section):
+    """The JSBSim model, and where it is trimmed."""
+
+    model: str = quantity("", min_length=1)
+    altitude: float = quantity("m")
+    calibrated_airspeed: float = quantity("m_per_s", gt=0)
+    steps_per_frame: int = quantity("", 1, ge=1, le=100)
+    properties: dict[str, float] = {}
+
+
+class Rig(Section):
+    """A control-loading rig, and the aircraft that it is coupled to.
+
+    Without `flight` it is a bench: q̄ is told, and there is no aircraft. `noise` gives
+    the standard deviation of a channel's white noise by the channel's name.
+    """
+
+    name: str = quantity("", min_length=1)
+    frame_rate: float = quantity("Hz", ge=1, le=2000)
+    loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
+    controls: dict[ControlName, Control]
+    flight: Flight | None = None
+    noise: dict[str, float] = {}
+
+    @property
+    def substeps(self) -> int:
+        """Loader steps in a frame: enough for the loader's rate."""
+        return max(1, -int(-self.loader_rate // self.frame_rate))

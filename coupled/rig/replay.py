@@ -1,0 +1,164 @@
+"""Each stage alone, driven by its measured input: the same stage functions that fly.
+
+The chain is cut at every measured signal, so that a fault upstream is inherited by
+nobody. Signals are given at the frames; between them what is continuous in the rig
+(force, δc) runs along the cubic spline through its samples.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from coupled.rig.compensation import estimate
+from coupled.rig.compiled import entry
+from coupled.rig.control import at_rest
+from coupled.rig.linkage import deflection, move_linkage, transducer
+from coupled.rig.loader import move_loader, set_external, start_delay
+from coupled.rig.modification import modifying_force, set_gradients
+from coupled.rig.packing import pack
+from coupled.rig.parameters import Rig
+from coupled.rig.schedule import gradients, read_pressure
+from coupled.rig.sensing import converted
+from coupled.rig.surface import command_surface
+
+Floats = NDArray[np.float64]
+
+
+def replay_schedule(rig: Rig, control: str, pressure_Pa: Floats) -> Floats:
+    """Return G_T in N/d for the dynamic pressure that the host had at each frame."""
+    p, s = _one(rig, control)
+    return _schedule(p, s, pressure_Pa, np.empty_like(pressure_Pa))
+
+
+def replay_loader(
+    rig: Rig,
+    control: str,
+    force_N: Floats,
+    gradient: Floats,
+    computed: Floats,
+    load_factor: Floats | None = None,
+    second: Floats | None = None,
+) -> tuple[Floats, Floats]:
+    """Return δc in d and F_mod in N at each frame.
+
+    `gradient` is G_T in N/d as the schedule gave it (`second` that beyond the break, where
+    there is one), `computed` the measured δc, from which a digital multiplier makes its
+    product. The loader starts at rest at neutral.
+    """
+    p, s = _one(rig, control)
+    nodes, h = _on_nodes(rig, force_N)
+    level = np.ones_like(force_N) if load_factor is None else load_factor
+    out = np.empty((2, len(force_N)))
+    both = np.stack((gradient, gradient if second is None else second))
+    _loader(p, s, nodes, both, computed, level, rig.substeps, h, out)
+    return out[0], out[1]
+
+
+def replay_linkage(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
+    """Return what the transducer at the grip reads, d, for δc in d and F in N."""
+    p, s = _one(rig, control)
+    nodes, h = _on_nodes(rig, computed)
+    s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = computed[0]
+    return _linkage(p, s, nodes, force_N, rig.substeps, h, np.empty_like(force_N))
+
+
+def replay_compensation(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
+    """Return δ̂ in d for δc in d and F in N as the host read them."""
+    p, _ = _one(rig, control)
+    return _compensation(p, computed, force_N, np.empty_like(force_N))
+
+
+def replay_surface(rig: Rig, control: str, believed: Floats, pressure_Pa: Floats) -> Floats:
+    """Return the command about trim, in ±1, over each frame, for δ̂ in d and q̄ in Pa."""
+    p, s = _one(rig, control)
+    return _surface(p, s, believed, pressure_Pa, np.empty_like(believed))
+
+
+def _one(rig: Rig, control: str) -> tuple[Any, Any]:
+    """Return parameters and state of one control, each of shape (1,)."""
+    i = list(rig.controls).index(control)
+    return pack(rig)[i : i + 1], at_rest(1)
+
+
+def _on_nodes(rig: Rig, samples: Floats) -> tuple[Floats, float]:
+    """Return a signal on the loader's nodes, and the substep in s."""
+    substeps = rig.substeps
+    frames = np.arange(len(samples))
+    nodes = np.arange((len(samples) - 1) * substeps + 1) / substeps
+    return CubicSpline(frames, samples)(nodes), 1.0 / (rig.frame_rate * substeps)
+
+
+@entry
+def _schedule(p: Any, s: Any, pressure: Floats, out: Floats) -> Floats:
+    for k in range(len(out)):
+        read = read_pressure(p[0].schedule, s[0].schedule, pressure[k])
+        out[k] = gradients(p[0].schedule, read)[0]
+    return out
+
+
+@entry
+def _loader(
+    parameters: Any,
+    states: Any,
+    force: Floats,
+    gradient: Floats,
+    computed: Floats,
+    level: Floats,
+    substeps: int,
+    h: float,
+    out: Floats,
+) -> None:
+    p, s = parameters[0], states[0]
+    start_delay(p.loader, s.loader, force[0])
+    frames = len(computed)
+    for k in range(frames):
+        m = s.modification
+        set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
+        if p.modification.digital:
+            product = modifying_force(m, computed[k])
+            m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
+            product = m.held
+        else:
+            product = modifying_force(m, s.loader.computed)
+        out[0, k], out[1, k] = s.loader.computed, product
+        set_external(p.loader, s.loader, level[k])
+        if k + 1 < frames:
+            for node in range(k * substeps + 1, (k + 1) * substeps + 1):
+                move_loader(p.loader, p.friction, m, s.loader, force[node], h)
+
+
+@entry
+def _linkage(
+    parameters: Any,
+    states: Any,
+    computed: Floats,
+    force: Floats,
+    substeps: int,
+    h: float,
+    out: Floats,
+) -> Floats:
+    p, s = parameters[0].linkage, states[0].linkage
+    for k in range(len(force)):
+        out[k] = transducer(p, deflection(p, s, force[k]))
+        if k + 1 < len(force):
+            for node in range(k * substeps, (k + 1) * substeps):
+                move_linkage(p, s, computed[node], computed[node + 1], h)
+    return out
+
+
+@entry
+def _compensation(p: Any, computed: Floats, force: Floats, out: Floats) -> Floats:
+    for k in range(len(out)):
+        out[k] = estimate(p[0].compensation, computed[k], force[k])
+    return out
+
+
+@entry
+def _surface(p: Any, s: Any, believed: Floats, pressure: Floats, out: Floats) -> Floats:
+    for k in range(len(out)):
+        out[k] = command_surface(p[0].surface, s[0].surface, believed[k], pressure[k])
+    return out

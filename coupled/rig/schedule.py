@@ -1,0 +1,80 @@
+"""Schedule: from dynamic pressure to the gradient that the pilot is to feel.
+
+G_T(q̄) is interpolated linearly in the rig's table and held at its ends. A second
+table gives the gradient beyond a break in deflection (appendix C of the report).
+What may be wrong with its use: the pressure that it gets lags or is off by a
+factor, or the table's rise above its value at q̄ = 0 is.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import layout, stage
+
+MAX_ROWS = 32
+Table = NDArray[np.float64]
+
+
+class ScheduleParameters(Protocol):
+    """The table, and what may be wrong with the way it is used."""
+
+    rows: int
+    dynamic_pressure: Table  # Pa, rising
+    total_gradient: Table  # G_T, N/d
+    second_gradient: Table  # slope beyond the break, N/d; as the first where there is none
+    pressure_scale: float  # q̄ that the schedule gets over the real one
+    pressure_lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
+    slope: float  # factor on the rise above the value at q̄ = 0
+
+
+class ScheduleState(Protocol):
+    """The lagged pressure."""
+
+    started: int
+    pressure: float  # Pa
+
+
+_SHAPES = dict.fromkeys(("dynamic_pressure", "total_gradient", "second_gradient"), (MAX_ROWS,))
+SCHEDULE_PARAMETERS = layout(ScheduleParameters, **_SHAPES)
+SCHEDULE_STATE = layout(ScheduleState)
+
+
+@stage
+def read_pressure(p: ScheduleParameters, s: ScheduleState, dynamic_pressure: float) -> float:
+    """Return the pressure that the schedule gets at this frame, Pa."""
+    scaled = p.pressure_scale * dynamic_pressure
+    if s.started == 0:
+        s.started = 1
+        s.pressure = scaled
+    s.pressure += p.pressure_lag_gain * (scaled - s.pressure)
+    return s.pressure
+
+
+@stage
+def gradients(p: ScheduleParameters, pressure: float) -> tuple[float, float]:
+    """Return G_T below and beyond the break, N/d, at the schedule's pressure in Pa."""
+    first = _interpolate(p, p.total_gradient, pressure)
+    second = _interpolate(p, p.second_gradient, pressure)
+    return first, second
+
+
+@stage
+def _interpolate(p: ScheduleParameters, table: Table, pressure: float) -> float:
+    at_rest = _look_up(p, table, 0.0)
+    return at_rest + p.slope * (_look_up(p, table, pressure) - at_rest)
+
+
+@stage
+def _look_up(p: ScheduleParameters, table: Table, pressure: float) -> float:
+    q = p.dynamic_pressure
+    if pressure <= q[0]:
+        return table[0]
+    for row in range(1, p.rows):
+        if pressure < q[row]:
+            share = (pressure - q[row - 1]) / (q[row] - q[row - 1])
+            return table[row - 1] + share * (table[row] - table[row - 1])
+    return table[p.rows - 1]

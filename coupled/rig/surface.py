@@ -1,0 +1,57 @@
+"""Surface: from the deflection that the host believes to a command for the model.
+
+    u = sign·δ̂/travel, clipped to ±1            the linkage of the aircraft
+    cable stretch   u/(1 + loss·q̄)              it yields to air load
+    lag             τ·y' = u − y
+    rate limit      |y'| ≤ rate
+    free play       the surface follows once the play is taken up
+    rigging         a constant added
+
+The result is added to the trim. All in command units: 1 is the whole travel.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from coupled.rig.compiled import layout, stage
+
+
+class SurfaceParameters(Protocol):
+    """The run from the column to the surface."""
+
+    gain: float  # sign/travel, 1/d
+    stretch: float  # loss, 1/Pa
+    lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
+    rate_step: float  # most that it moves in a frame; 0 for no limit
+    play: float  # full width
+    offset: float
+
+
+class SurfaceState(Protocol):
+    """What the surface remembers."""
+
+    lagged: float
+    moved: float
+    position: float
+
+
+SURFACE_PARAMETERS = layout(SurfaceParameters)
+SURFACE_STATE = layout(SurfaceState)
+
+
+@stage
+def command_surface(
+    p: SurfaceParameters, s: SurfaceState, estimate: float, dynamic_pressure: float
+) -> float:
+    """Return the command over this frame, in ±1, for δ̂ in d and q̄ in Pa."""
+    asked = min(max(p.gain * estimate, -1.0), 1.0)
+    asked /= 1.0 + p.stretch * dynamic_pressure
+    s.lagged += p.lag_gain * (asked - s.lagged)
+    if p.rate_step > 0.0:
+        s.moved += min(max(s.lagged - s.moved, -p.rate_step), p.rate_step)
+    else:
+        s.moved = s.lagged
+    half = 0.5 * p.play
+    s.position = min(max(s.position, s.moved - half), s.moved + half)
+    return s.position + p.offset

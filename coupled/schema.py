@@ -1,0 +1,130 @@
+"""Tables of a TOML file as frozen, checked data; every fault is one line with its key.
+
+A field's key in a file is its name and its unit: `travel` with unit `{d}` is
+`travel_m`, or `travel_rad` on a wheel. The data inside carry no unit in their name,
+so that one physics serves all controls.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from coupled.errors import InputError, nearest
+
+
+class Section(BaseModel):
+    """A table of a file, frozen."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+
+S = TypeVar("S", bound=Section)
+
+
+def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
+    """Declare a field with a unit; `{d}` stands for the control's unit of deflection."""
+    return Field(default, json_schema_extra={"unit": unit}, **bounds)
+
+
+def file_keys(section: type[Section], d: str) -> dict[str, str]:
+    """Return {key in a file: field} of a section, for deflections in unit `d`."""
+    keys = {}
+    for name, info in section.model_fields.items():
+        extra = info.json_schema_extra
+        unit = str(extra["unit"]).format(d=d) if isinstance(extra, dict) and "unit" in extra else ""
+        keys[f"{name}_{unit}" if unit else name] = name
+    return keys
+
+
+def load_toml(path: Path) -> dict[str, Any]:
+    """Return a TOML file's tables."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(text)
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "", "is not text in UTF-8; a TOML file is wanted") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(path, "", f"is not valid TOML: {error}") from None
+
+
+def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) -> dict[str, Any]:
+    """Return the table, once it is one and has only known keys."""
+    if not isinstance(table, dict):
+        raise InputError(file, path, f"should be a table, is {_shown(table)}")
+    for key in table:
+        if key in keys:
+            continue
+        dotted = f"{path}.{key}" if path else key
+        meant = _other_unit(key, keys)
+        if meant:
+            raise InputError(file, dotted, f"wrong unit: give {meant} instead")
+        raise InputError(file, dotted, f"unknown key; {nearest(key, keys)}")
+    return table
+
+
+def _other_unit(key: str, keys: Mapping[str, object]) -> str:
+    """Return the known key that has this key's name with another unit, or nothing."""
+    for known in sorted(keys, key=len, reverse=True):
+        parts = known.split("_")
+        for cut in range(len(parts) - 1, 0, -1):
+            stem = "_".join(parts[:cut])
+            unit = parts[cut]
+            looks_like_unit = unit.lower() != unit or unit in _UNITS
+            if looks_like_unit and (key == stem or key.startswith(stem + "_")):
+                rest = key[len(stem) + 1 :].split("_")[0]
+                if rest == "" or rest in _UNITS or rest.lower() != rest:
+                    return known
+    return ""
+
+
+_UNITS = frozenset(
+    "m mm cm in inch ft rad deg degrees kg g lb lbs lbf slug n kn kt kts knots s ms hz pa psf psi"
+    " per norm v volt volts bits".split()
+)
+
+
+def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -> S:
+    """Return a section made from its table, subsections made by their own classes.
+
+    `path` is the dotted place of the table in `file`; `d` the unit of deflection.
+    """
+    keys = file_keys(section, d)
+    table = known_keys(table, keys, file, path)
+    values = {}
+    for key, value in table.items():
+        kind = section.model_fields[keys[key]].annotation
+        dotted = f"{path}.{key}" if path else key
+        inner = isinstance(kind, type) and issubclass(kind, Section)
+        values[keys[key]] = build(kind, value, file, dotted, d) if inner else value
+    try:
+        return section(**values)
+    except ValidationError as error:
+        raise _first_fault(error, keys, file, path) from None
+
+
+def _first_fault(
+    error: ValidationError, keys: Mapping[str, str], file: object, path: str
+) -> InputError:
+    fault = error.errors()[0]
+    by_field = {field: key for key, field in keys.items()}
+    place = [str(part) for part in fault["loc"]]
+    if place:
+        place[0] = by_field.get(place[0], place[0])
+    dotted = ".".join(([path] if path else []) + place)
+    if fault["type"] == "missing":
+        return InputError(file, dotted, "is missing")
+    message = fault["msg"]
+    message = message[0].lower() + message[1:]
+    return InputError(file, dotted, f"{message}, is {_shown(fault['input'])}")
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
