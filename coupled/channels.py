@@ -21,6 +21,7 @@ _CONTROL = (
     "gradient_N_per_{d}",
     "modifying_force_N",
     "force_step_N",  # the jump of F_mod at this frame, which the hand feels
+    "surface_norm",  # command about trim over the frame to come, JSBSim's sign
     "stop",  # the stop met over the frame before: −1, 0 or +1
 )
 _NOISY = (0, 1, 2, 5)

@@ -78,15 +78,18 @@ def _other_unit(key: str, keys: Mapping[str, object]) -> str:
             unit = parts[cut]
             looks_like_unit = unit.lower() != unit or unit in _UNITS
             if looks_like_unit and (key == stem or key.startswith(stem + "_")):
-                rest = key[len(stem) + 1 :].split("_")[0]
+                rest = key[len(stem) + 1 :].split("_", maxsplit=1)[0]
                 if rest == "" or rest in _UNITS or rest.lower() != rest:
                     return known
     return ""
 
 
 _UNITS = frozenset(
-    "m mm cm in inch ft rad deg degrees kg g lb lbs lbf slug n kn kt kts knots s ms hz pa psf psi"
-    " per norm v volt volts bits".split()
+    (
+        *("m", "mm", "cm", "in", "inch", "ft", "rad", "deg", "degrees"),
+        *("kg", "g", "lb", "lbs", "lbf", "slug", "n", "kn", "pa", "psf", "psi"),
+        *("s", "ms", "hz", "kt", "kts", "knots", "per", "norm", "v", "volt", "volts", "bits"),
+    )
 )
 
 
@@ -98,11 +101,13 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
     keys = file_keys(section, d)
     table = known_keys(table, keys, file, path)
     values = {}
-    for key, value in table.items():
+    for key, given in table.items():
+        value = given
         kind = section.model_fields[keys[key]].annotation
         dotted = f"{path}.{key}" if path else key
-        inner = isinstance(kind, type) and issubclass(kind, Section)
-        values[keys[key]] = build(kind, value, file, dotted, d) if inner else value
+        if isinstance(kind, type) and issubclass(kind, Section):
+            value = build(kind, value, file, dotted, d)
+        values[keys[key]] = value
     try:
         return section(**values)
     except ValidationError as error:

@@ -9,7 +9,8 @@ before they start, and JSBSim's log is kept to be quoted where something fails.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -84,6 +85,7 @@ class _Log(jsbsim.FGLogger):
 
 
 _log = _Log()
+_base: Callable[[], Any] = jsbsim.FGJSBBase  # its debug level is the library's
 
 
 def packaged_models() -> dict[str, Path]:
@@ -133,7 +135,7 @@ class JSBSimAirframe:
         return InputError(self._file, f"flight.{key}" if key else "flight", problem)
 
     def _load(self, models: Sequence[Path], frame_s: float) -> Any:
-        jsbsim.FGJSBBase().debug_lvl = 0
+        _base().debug_lvl = 0
         jsbsim.set_logger(_log)
         known = packaged_models()
         for folder in reversed(models):
@@ -234,7 +236,7 @@ class Bench:
         points = self._points
         if time <= points[0][0]:
             return (points[0][1], 1.0)
-        for (t0, q0), (t1, q1) in zip(points, points[1:], strict=False):
+        for (t0, q0), (t1, q1) in pairwise(points):
             if time < t1:
                 return (q0 + (q1 - q0) * (time - t0) / (t1 - t0), 1.0)
         return (points[-1][1], 1.0)

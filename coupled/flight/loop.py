@@ -8,7 +8,7 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -96,7 +96,7 @@ def make_airframe(scenario: Scenario) -> Airframe:
         assert run.bench is not None
         points = list(zip(run.bench.time, run.bench.dynamic_pressure, strict=True))
         return Bench(1.0 / rig.frame_rate, points)
-    where = {"models": [aircraft_folder()], "file": scenario.rig_file}
+    where: dict[str, Any] = {"models": [aircraft_folder()], "file": scenario.rig_file}
     check_direct_controls(rig.flight, 1.0 / rig.frame_rate, list(rig.controls), **where)
     return JSBSimAirframe(
         rig.flight,
@@ -114,9 +114,9 @@ def gradient_at(control: Control, pressure_Pa: float) -> float:
     return float(np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient))
 
 
-def _script(names: list[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
+def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
     """Return the hands' script on all nodes, shape (controls, 2, nodes): N and d."""
-    times = np.arange(nodes) * h
+    times: Floats = np.arange(nodes, dtype=np.float64) * h
     script = np.zeros((len(names), 2, nodes))
     for name, action in actions.items():
         script[names.index(name)] = action.force(times), action.held(times)
@@ -128,7 +128,8 @@ def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, see
     sigma = np.array([levels.get(channel, 0.0) for channel in channels])
     if not sigma.any():
         return np.zeros((1, len(channels)))
-    return np.random.default_rng(seed).standard_normal((frames, len(channels))) * sigma
+    hiss = np.random.default_rng(seed).standard_normal((frames, len(channels)))
+    return np.asarray(hiss * sigma)
 
 
 def _manifest(

@@ -8,7 +8,7 @@ of scripted inputs are half cosines over `rise_s`, as a hand's are.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -37,7 +37,7 @@ class Action:
 
     force: Callable[[Floats], Floats] = np.zeros_like
     held: Callable[[Floats], Floats] = np.zeros_like
-    hand: Hand = Hand()
+    hand: Hand = field(default_factory=Hand)
     look: Look | None = None
 
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
+from coupled.channels import channel
 from coupled.errors import InputError, nearest
 from coupled.flight.pilot import PILOTS, Pilot, Table, read_force_table
-from coupled.channels import channel
 from coupled.resources import find, shipped_rigs, shipped_runs
 from coupled.rig.parameters import CONTROL_NAMES, ControlName, Rig, unit_of
 from coupled.rig.rigfile import change, read_rig
@@ -86,7 +87,8 @@ class Scenario:
     @property
     def control(self) -> ControlName:
         """The control that a comparison looks at."""
-        return self.run.measure.control or next(iter(self.pilots))
+        named = self.run.measure.control
+        return next(iter(self.pilots)) if named is None else named
 
     def configured(self, configuration: Configuration) -> Scenario:
         """Return this scenario with the rig in one of the five configurations."""
@@ -122,10 +124,8 @@ def read_run(name: str) -> list[Scenario]:
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
     known_keys(table, keys, file, "")
-    subsections = {"bench": Bench, "measure": Measure}
-    for key, section in subsections.items():
-        if key in table:
-            table[key] = build(section, table[key], file, key)
+    if "bench" in table:
+        table["bench"] = build(Bench, table["bench"], file, "bench")
     cases = table.pop("case", [])
     if not isinstance(cases, list):
         raise InputError(file, "case", "cases are written [[case]]")
@@ -202,7 +202,7 @@ def _check_deflection(pilot: Pilot, rig: Rig, name: str, file: Path) -> None:
 def _check_bench(bench: Bench, file: Path) -> None:
     if len(bench.time) != len(bench.dynamic_pressure):
         raise InputError(file, "bench.dynamic_pressure_Pa", "needs as many values as time_s")
-    if any(b <= a for a, b in zip(bench.time, bench.time[1:], strict=False)):
+    if any(b <= a for a, b in pairwise(bench.time)):
         raise InputError(file, "bench.time_s", "must rise from value to value")
     if min(bench.dynamic_pressure) < 0.0:
         raise InputError(file, "bench.dynamic_pressure_Pa", "cannot be negative")

@@ -13,29 +13,28 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numba
 import numpy as np
+from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def stage(function: F) -> F:
     """Compile a function that is inlined into the entries."""
-    compiled: F = numba.njit(function)
-    return compiled
+    return cast(F, numba.njit(function))
 
 
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep the result on disk."""
-    chosen = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _cache_folder(chosen)
+    chosen = config.CACHE_DIR
+    config.CACHE_DIR = _cache_folder(chosen)
     try:
-        compiled: F = numba.njit(cache=True)(function)
+        return cast(F, numba.njit(cache=True)(function))
     finally:
-        numba.config.CACHE_DIR = chosen
-    return compiled
+        config.CACHE_DIR = chosen
 
 
 def _cache_folder(chosen: str) -> str:

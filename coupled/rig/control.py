@@ -7,8 +7,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig import compensation, friction, hand, linkage, loader, modification, schedule
-from coupled.rig import sensing, surface
+from coupled.rig import (
+    compensation,
+    friction,
+    hand,
+    linkage,
+    loader,
+    modification,
+    schedule,
+    sensing,
+    surface,
+)
 
 
 class ControlParameters(Protocol):

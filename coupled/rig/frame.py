@@ -25,7 +25,7 @@ from coupled.rig.surface import command_surface
 Floats = NDArray[np.float64]
 
 # What the kernel records of each control, in this order; `record` names the channels.
-CHANNELS_PER_CONTROL = 8
+CHANNELS_PER_CONTROL = 9
 MAX_CONTROLS = 3
 
 
@@ -42,7 +42,8 @@ def host_frame(
     """Do what host and recorder do at t_k; return the surface command over the frame.
 
     `noise` and `out` have the channels of one control: F, δc, δ, δ̂, G_T, F_mod,
-    the step that F_mod makes here, and the stop met since the last frame.
+    the step that F_mod makes here, the surface command, and the stop met since the
+    last frame.
     """
     computed = s.loader.computed
     m = s.modification
@@ -70,8 +71,10 @@ def host_frame(
     out[4] = first
     out[5] = product + noise[5]
     out[6] = product - ended
-    out[7] = s.loader.stop
-    return command_surface(p.surface, s.surface, believed, pressure)
+    command = command_surface(p.surface, s.surface, believed, pressure)
+    out[7] = command
+    out[8] = s.loader.stop
+    return command
 
 
 @stage
@@ -119,7 +122,7 @@ def step_frame(
     controls, states  shape (n,), n ≤ 3
     script            shape (n, 2, frames·substeps + 1): force in N and held deflection
     noise             shape (1 or frames, channels), added to what is read
-    record            shape (frames, channels): t, 8 a control, then `motion`
+    record            shape (frames, channels): t, 9 a control, then `motion`
     motion            what the airframe gives: q̄ in Pa and load factor first
     The commands are in ±1, one a control, 0 for a control that is absent.
     """

@@ -29,6 +29,7 @@ from coupled.rig.modification import ModificationState, slope, smooth_force
 
 DELAY_SLOTS = 1024  # force history, in substeps; a power of two
 MAX_EVENTS = 16  # events in one substep before the control is taken to be at rest
+NOTHING, REST, STOP, NEUTRAL = 0, 1, 2, 3  # what may end a smooth stretch
 
 
 class LoaderParameters(Protocol):
@@ -120,6 +121,74 @@ def _crossing(x0: float, v0: float, acceleration: float, target: float, span: fl
 
 
 @stage
+def _release(
+    p: LoaderParameters, s: LoaderState, hold: float, start: float, end: float
+) -> tuple[float, float]:
+    """Return when a control at rest begins to slide, as a share of the way, and to which side.
+
+    `start` and `end` are the net force on it at either end, N, which runs straight between;
+    `hold` is what friction, and at neutral the breakout, can hold. Side 0: it stays.
+    """
+    if s.computed >= p.travel and start >= 0.0 and end >= 0.0:
+        s.stop = 1 if end > hold else s.stop
+        return 0.0, 0.0
+    if s.computed <= -p.travel and start <= 0.0 and end <= 0.0:
+        s.stop = -1 if end < -hold else s.stop
+        return 0.0, 0.0
+    if abs(start) > hold:
+        return 0.0, _sign(start)
+    if abs(end) <= hold:
+        return 0.0, 0.0
+    side = _sign(end)
+    return (side * hold - start) / (end - start), side
+
+
+@stage
+def _midpoint(
+    p: LoaderParameters,
+    friction: FrictionParameters,
+    m: ModificationState,
+    s: LoaderState,
+    push: float,
+    direction: float,
+    span: float,
+) -> float:
+    """Return δc' at the middle of a step of `span` seconds in which nothing happens, d/s.
+
+    `push` is the force that does not depend on the motion, N.
+    """
+    v = s.rate
+    middle = s.computed + 0.5 * span * v
+    inertia = 2.0 * p.mass / span + p.damping + 0.5 * span * _stiffness(p, m, middle)
+    push -= _elastic(p, m, middle) + p.damping * v
+    if friction.breakaway == 0.0:
+        return v + push / inertia
+    halfway = v + (push - running_friction(friction, v) * direction) / inertia
+    if friction.breakaway > friction.running:  # Stribeck: once more with the speed just found
+        halfway = v + (push - running_friction(friction, halfway) * direction) / inertia
+    return halfway
+
+
+@stage
+def _first_event(
+    p: LoaderParameters, s: LoaderState, dry: bool, breakout: float, halfway: float, span: float
+) -> tuple[float, int]:
+    """Return when a step of `span` seconds first meets an event, and which."""
+    x, v = s.computed, s.rate
+    acceleration = 2.0 * (halfway - v) / span
+    end, event = x + span * halfway, NOTHING
+    if dry and v != 0.0 and v * (v + span * acceleration) < 0.0:
+        span, event = -v / acceleration, REST
+        end = x + 0.5 * span * v
+    if abs(end) > p.travel:
+        end = p.travel if end > 0.0 else -p.travel
+        span, event = _crossing(x, v, acceleration, end, span), STOP
+    if breakout > 0.0 and x * end < 0.0:
+        span, event = _crossing(x, v, acceleration, 0.0, span), NEUTRAL
+    return span, event
+
+
+@stage
 def move_loader(
     p: LoaderParameters,
     friction: FrictionParameters,
@@ -136,68 +205,39 @@ def move_loader(
     dry = friction.breakaway > 0.0
     done = 0.0
     for _ in range(MAX_EVENTS):
-        left = h - done
         x, v = s.computed, s.rate
-        pull = before + (after - before) * (done + 0.5 * left) / h + s.external
-
-        side = _sign(x)
+        direction = _sign(v)
         if v == 0.0:
-            # At rest: friction, breakout (at neutral) and a stop hold what they can.
-            net = pull - _elastic(p, m, x) - breakout * side
-            hold = friction.breakaway + (breakout if side == 0.0 else 0.0)
-            if abs(net) <= hold or (abs(x) >= p.travel and net * x > 0.0):
-                s.stop = int(side) if abs(x) >= p.travel and net * x > 0.0 else s.stop
+            hold = friction.breakaway + (breakout if x == 0.0 else 0.0)
+            balance = s.external - breakout * _sign(x) - _elastic(p, m, x)
+            start = before + (after - before) * done / h + balance
+            share, direction = _release(p, s, hold, start, after + balance)
+            if direction == 0.0:
                 return
-            sliding = _sign(net)
-        else:
-            sliding = _sign(v)
-        if side == 0.0:
-            side = sliding
-
-        # One midpoint step over what is left, as if nothing happened on the way.
-        rest = pull - p.damping * v - breakout * side
-        middle = x + 0.5 * left * v
-        stiffness = _stiffness(p, m, middle)
-        inertia = 2.0 * p.mass / left + p.damping + 0.5 * left * stiffness
-        rest -= _elastic(p, m, middle)
-        change = rest / inertia
-        if dry:
-            drag = running_friction(friction, v + change)
-            change = (rest - drag * sliding) / inertia
-            if friction.breakaway > friction.running:
-                drag = running_friction(friction, v + change)
-                change = (rest - drag * sliding) / inertia
-        v1 = v + 2.0 * change
-        x1 = x + left * (v + change)
-        acceleration = 2.0 * change / left
-
-        # The first event on the way, if any.
-        span, event = left, 0
-        if dry and v != 0.0 and v1 * sliding < 0.0:
-            span, event = left * v / (v - v1), 1
-        end = x1 if event == 0 else x + 0.5 * span * v
-        if abs(end) > p.travel:
-            limit = p.travel if end > 0.0 else -p.travel
-            span, event = _crossing(x, v, acceleration, limit, span), 2
-            end = limit
-        if breakout > 0.0 and x * end < 0.0:
-            span, event = _crossing(x, v, acceleration, 0.0, span), 3
-
-        if event == 0:
-            s.computed, s.rate = x1, v1
+            done += share * (h - done)
+        left = h - done
+        if left <= 1e-12 * h:
+            return
+        pull = before + (after - before) * (done + 0.5 * left) / h + s.external
+        net = pull - breakout * _sign(x)
+        if x == 0.0:
+            net -= breakout * direction
+        halfway = _midpoint(p, friction, m, s, net, direction, left)
+        span, event = _first_event(p, s, dry, breakout, halfway, left)
+        acceleration = 2.0 * (halfway - v) / left
+        s.computed = x + span * (v + 0.5 * acceleration * span)
+        s.rate = v + acceleration * span
+        if event == NOTHING:
             return
         done += span
-        if event == 1:
-            s.computed, s.rate = x + 0.5 * span * v, 0.0
-        elif event == 2:
-            s.computed, s.rate = limit, 0.0
-            s.stop = 1 if limit > 0.0 else -1
-        else:
-            # At neutral: the preload stops a control too slow to leave it within the substep.
-            s.computed, s.rate = 0.0, v + acceleration * span
+        if event == REST:
+            s.rate = 0.0
+        elif event == STOP:
+            s.stop = 1 if s.computed > 0.0 else -1
+            s.computed, s.rate = s.stop * p.travel, 0.0
+        else:  # the preload stops a control too slow to leave neutral within the substep
+            s.computed = 0.0
             spare = friction.running + breakout - abs(pull - _elastic(p, m, 0.0))
             if p.mass * abs(s.rate) <= (h - done) * spare:
                 s.rate = 0.0
-        if h - done <= 1e-12 * h:
-            return
     s.rate = 0.0

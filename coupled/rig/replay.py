@@ -49,12 +49,29 @@ def replay_loader(
     there is one), `computed` the measured δc, from which a digital multiplier makes its
     product. The loader starts at rest at neutral.
     """
+    nodes, _ = _on_nodes(rig, force_N)
+    return drive_loader(rig, control, nodes, gradient, computed, load_factor, second)
+
+
+def drive_loader(
+    rig: Rig,
+    control: str,
+    nodes_N: Floats,
+    gradient: Floats,
+    computed: Floats,
+    load_factor: Floats | None = None,
+    second: Floats | None = None,
+) -> tuple[Floats, Floats]:
+    """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
+
+    `nodes_N` has `rig.substeps` values a frame and one more.
+    """
     p, s = _one(rig, control)
-    nodes, h = _on_nodes(rig, force_N)
-    level = np.ones_like(force_N) if load_factor is None else load_factor
-    out = np.empty((2, len(force_N)))
+    level = np.ones_like(computed) if load_factor is None else load_factor
     both = np.stack((gradient, gradient if second is None else second))
-    _loader(p, s, nodes, both, computed, level, rig.substeps, h, out)
+    out = np.empty((2, len(computed)))
+    h = 1.0 / (rig.frame_rate * rig.substeps)
+    _loader(p, s, nodes_N, both, computed, level, rig.substeps, h, out)
     return out[0], out[1]
 
 
@@ -80,7 +97,7 @@ def replay_surface(rig: Rig, control: str, believed: Floats, pressure_Pa: Floats
 
 def _one(rig: Rig, control: str) -> tuple[Any, Any]:
     """Return parameters and state of one control, each of shape (1,)."""
-    i = list(rig.controls).index(control)
+    i = [str(name) for name in rig.controls].index(control)
     return pack(rig)[i : i + 1], at_rest(1)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +104,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
     pressures = schedule.dynamic_pressure
     if len(pressures) > MAX_ROWS:
         raise InputError(file, f"{key}.dynamic_pressure_Pa", f"has more than {MAX_ROWS} rows")
-    if any(b <= a for a, b in zip(pressures, pressures[1:], strict=False)):
+    if any(b <= a for a, b in pairwise(pressures)):
         raise InputError(file, f"{key}.dynamic_pressure_Pa", "must rise from value to value")
     tables = {f"total_gradient_N_per_{d}": schedule.total_gradient}
     if schedule.second_gradient is not None:

@@ -72,9 +72,9 @@ def _interpolate(p: ScheduleParameters, table: Table, pressure: float) -> float:
 def _look_up(p: ScheduleParameters, table: Table, pressure: float) -> float:
     q = p.dynamic_pressure
     if pressure <= q[0]:
-        return table[0]
+        return float(table[0])
     for row in range(1, p.rows):
         if pressure < q[row]:
             share = (pressure - q[row - 1]) / (q[row] - q[row - 1])
-            return table[row - 1] + share * (table[row] - table[row - 1])
-    return table[p.rows - 1]
+            return float(table[row - 1] + share * (table[row] - table[row - 1]))
+    return float(table[p.rows - 1])

@@ -1,0 +1,221 @@
+"""The command line: parses, calls, prints.
+
+Exit code 0 when all went well, 1 when a flight ended before its time, 2 for input that
+cannot be used (one line says why, and nothing is written).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from coupled import __version__
+from coupled.errors import InputError
+from coupled.files import write_text
+from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
+
+if TYPE_CHECKING:
+    from coupled.authority import Flight
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Fly a JSBSim aircraft through a compliant control loader.",
+    epilog="[dim]First steps: coupled compare · coupled runs · coupled fly pull-up-t37[/]",
+)
+out = Console()
+err = Console(stderr=True)
+
+RunArgument = Annotated[
+    str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
+]
+JsonOption = Annotated[
+    str, typer.Option("--json", metavar="FILE", help="Write the table as JSON; - prints it.")
+]
+
+
+def main() -> None:
+    """Run the command line; every fault of input is one line and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        err.print(f"[red]error:[/] {escape(str(error))}", soft_wrap=True)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"coupled {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Fly a JSBSim aircraft through a compliant control loader."""
+
+
+@app.command(
+    epilog="[dim]Examples: coupled compare · coupled compare pull-up-737 --figure out/737.png"
+    " · coupled compare my-run.toml --json -[/]"
+)
+def compare(
+    run: RunArgument = DEFAULT_RUN,
+    figure: Annotated[
+        Path | None, typer.Option(help="The figure: PNG, PDF or SVG.  [default: out/RUN.png]")
+    ] = None,
+    json_file: JsonOption = "",
+    no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
+) -> None:
+    """Fly a run rigid, uncompensated, with each correction, and with both."""
+    from coupled.authority import compare as compare_flights
+    from coupled.flight.scenario import read_run
+    from coupled.tables import print_comparison
+
+    scenarios = read_run(run)
+    path = figure or Path("out") / f"{scenarios[0].run.name}.png"
+    if not no_figure:
+        from coupled.plots import check_format
+
+        check_format(path)
+    with _progress() as advance:
+        flights = compare_flights(scenarios, advance)
+    if json_file != "-":
+        print_comparison(out, flights)
+    if not no_figure:
+        from coupled.plots import draw_comparison, save
+
+        save(draw_comparison(flights), path)
+        if json_file != "-":
+            out.print(f"figure: {path}")
+    _give_json([flight.outcome.as_dict() for flight in flights], json_file)
+    _end(flights)
+
+
+@app.command(epilog="[dim]Example: coupled fly pull-up-t37 --output out/t37.parquet[/]")
+def fly(
+    run: RunArgument = DEFAULT_RUN,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Record, CSV or Parquet.  [default: out/RUN.csv]"),
+    ] = None,
+    case: Annotated[str, typer.Option(help="Case to fly, by its label; else the first.")] = "",
+    configuration: Annotated[
+        str,
+        typer.Option(help="One of compare's configurations; else the rig as it is."),
+    ] = "",
+    json_file: JsonOption = "",
+) -> None:
+    """Fly one run and write its record, and a manifest beside it."""
+    from coupled.authority import judge
+    from coupled.errors import nearest
+    from coupled.flight.loop import fly as fly_scenario
+    from coupled.flight.scenario import CONFIGURATIONS, read_run
+    from coupled.record import check_suffix, manifest_path, write_record
+
+    scenarios = {scenario.label: scenario for scenario in read_run(run)}
+    if case and case not in scenarios:
+        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, scenarios)}")
+    scenario = scenarios[case] if case else next(iter(scenarios.values()))
+    for known in CONFIGURATIONS:
+        if configuration == known:
+            scenario = scenario.configured(known)
+    if configuration and configuration not in CONFIGURATIONS:
+        hint = nearest(configuration, CONFIGURATIONS)
+        raise InputError(run, "--configuration", f"no {configuration!r}; {hint}")
+    path = output or Path("out") / f"{scenario.run.name}.csv"
+    check_suffix(path)
+    with _progress() as advance:
+        record = fly_scenario(scenario, lambda done, total: advance(scenario.label, done, total))
+    write_record(record, path)
+    outcome = judge(scenario, configuration or "as the rig file says", record)
+    if json_file != "-":
+        out.print(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
+        out.print(f"manifest: {manifest_path(path)}")
+        for control, when in record.manifest["stop_first_met_s"].items():
+            out.print(f"the {control} met its stop, first at {when:.2f} s")
+    _give_json(outcome.as_dict(), json_file)
+    if outcome.ended_early:
+        err.print(f"[yellow]ended early:[/] {outcome.ended_early}; the record so far is kept")
+        raise typer.Exit(1)
+
+
+@app.command(epilog="[dim]Example: coupled plot out/t37.csv --figure out/t37.pdf[/]")
+def plot(
+    record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
+    figure: Annotated[
+        Path | None, typer.Option(help="PNG, PDF or SVG.  [default: beside the record]")
+    ] = None,
+) -> None:
+    """Draw a record."""
+    from coupled.plots import check_format, draw_record, save
+    from coupled.record import read_record
+
+    path = figure or record.with_suffix(".png")
+    check_format(path)
+    save(draw_record(read_record(record), record.stem), path)
+    out.print(f"figure: {path}")
+
+
+@app.command()
+def runs(json_file: JsonOption = "") -> None:
+    """List the shipped run files, each with its card, and the shipped rigs."""
+    from coupled.schema import load_toml
+
+    cards = {name: load_toml(path) for name, path in shipped_runs().items()}
+    if json_file != "-":
+        table = Table("run", "rig", "what it shows", title="Shipped runs", show_lines=True)
+        for name, card in cards.items():
+            table.add_row(name, card["rig"], " ".join(card["card"].split()))
+        out.print(table)
+        out.print("rigs: " + ", ".join(shipped_rigs()))
+    rows = [
+        {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()
+    ]
+    _give_json(rows, json_file)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Show progress on the terminal while work goes on; nothing where there is none."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task("starting (the first start compiles the physics)", total=None)
+
+        def advance(label: str, done: int, total: int) -> None:
+            bar.update(task, description=escape(label), completed=done, total=total)
+
+        yield advance
+
+
+def _give_json(table: Any, target: str) -> None:
+    if not target:
+        return
+    text = json.dumps(table, indent=2, ensure_ascii=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    else:
+        write_text(Path(target), text)
+
+
+def _end(flights: list[Flight]) -> None:
+    if any(flight.outcome.ended_early for flight in flights):
+        raise typer.Exit(1)

@@ -1,0 +1,252 @@
+"""Figures: the only module that imports matplotlib. Angles are drawn in degrees."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from coupled.channels import channel, control_channels
+from coupled.errors import InputError
+from coupled.files import write_whole
+from coupled.record import Record
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import CONTROL_NAMES, unit_of
+from coupled.rig.statics import specified_force
+from coupled.units import DEGREE_rad
+
+if TYPE_CHECKING:
+    from coupled.authority import Flight
+
+FORMATS = (".png", ".pdf", ".svg")
+_STYLE = {
+    "rigid": ("black", (0, (1, 1)), 2.2),
+    "uncompensated": ("#d55e00", "solid", 1.6),
+    "deflection only": ("#0072b2", "dashed", 1.6),
+    "gradient only": ("#cc79a7", "dashed", 1.6),
+    "compensated": ("#009e73", "solid", 1.6),
+}
+_RATE = {"column": "pitch_rate", "wheel": "roll_rate", "pedals": "yaw_rate"}
+_SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.")
+
+
+def check_format(path: Path) -> None:
+    """Refuse a figure's path whose extension names no format."""
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(path, "", f"a figure ends in {', '.join(FORMATS)}")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure, whole; the same figure gives the same bytes."""
+    check_format(path)
+    FigureCanvasAgg(figure)
+    kind = path.suffix.lower()[1:]
+    no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
+    write_whole(path, lambda part: figure.savefig(part, dpi=130, format=kind, metadata=no_date))
+
+
+def draw_comparison(flights: Sequence[Flight]) -> Figure:
+    """Draw a comparison: a column a case; surface, motion, and force against deflection."""
+    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+    steps = all(len(case) == 1 for case in cases)
+    rows = [_draw_surface, _draw_motion, _draw_force] if not steps else [_draw_surface, _draw_steps]
+    if flights[0].scenario.rig.flight is None and not steps:
+        rows = [_draw_surface, _draw_force]
+    if not steps:
+        rows.append(_draw_loss)
+    figure = Figure(figsize=(1.2 + 3.9 * len(cases), 0.9 + 2.6 * len(rows)), layout="constrained")
+    grid = figure.subplots(len(rows), len(cases), squeeze=False)
+    for i, case in enumerate(cases):
+        for axes, draw in zip(grid[:, i], rows, strict=True):
+            draw(axes, case)
+            axes.grid(alpha=0.25)
+            if i:
+                axes.set_ylabel("")
+        grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
+    for row, draw in zip(grid, rows, strict=True):
+        if draw in (_draw_loss, _draw_steps):
+            _share_limits(row)
+    run = flights[0].scenario.run
+    figure.suptitle(f"{run.name}: {flights[0].scenario.rig.name}", fontsize=12)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    if not steps:
+        figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9)
+    return figure
+
+
+def _wrapped(text: str, width: int = 42) -> str:
+    return "\n".join(textwrap.wrap(text, width))
+
+
+def _share_limits(row: Sequence[Any]) -> None:
+    low = min(axes.get_ylim()[0] for axes in row)
+    high = max(axes.get_ylim()[1] for axes in row)
+    for axes in row:
+        axes.set_ylim(low, high)
+
+
+def _line(configuration: str) -> dict[str, Any]:
+    color, style, width = _STYLE[configuration]
+    return {"color": color, "linestyle": style, "linewidth": width, "label": configuration}
+
+
+def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
+    """Surface command about trim, against what the pilot's deflection asks for."""
+    control = case[0].scenario.control
+    data = case[0].scenario.rig.controls[control]
+    sign = COMMAND_SIGN[data.surface]
+    for flight in case:
+        record = flight.record
+        moved = 100.0 * sign * record[channel(control, "surface_norm")]
+        axes.plot(record.time_s, moved, **_line(flight.configuration))
+    record = case[-1].record
+    asked = 100.0 * np.clip(record[channel(control, "deflection")] / data.travel, -1.0, 1.0)
+    axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked")
+    axes.set_xlabel("time, s")
+    axes.set_ylabel(f"{data.surface} from trim, % of travel")
+
+
+def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
+    """Pitch, roll or yaw rate."""
+    name = _RATE[case[0].scenario.control]
+    for flight in case:
+        rate = flight.record[f"{name}_rad_per_s"] / DEGREE_rad
+        axes.plot(flight.record.time_s, rate, **_line(flight.configuration))
+    axes.set_xlabel("time, s")
+    axes.set_ylabel(f"{name.replace('_', ' ')}, °/s")
+
+
+def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
+    """Force against true deflection, with what was specified."""
+    control = case[0].scenario.control
+    scale, unit = (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
+    for flight in case:
+        deflection = flight.record[channel(control, "deflection")]
+        force = flight.record[channel(control, "force")]
+        axes.plot(scale * deflection, force, **_line(flight.configuration))
+    record = case[0].record
+    deflection = record[channel(control, "deflection")]
+    peak = int(np.argmax(np.abs(deflection)))
+    line = np.linspace(0.0, deflection[peak], 50)
+    pressure = float(record["dynamic_pressure_Pa"][peak])
+    wanted = specified_force(case[0].scenario.rig, control, pressure, line)
+    axes.plot(scale * line, wanted, color="0.65", linewidth=4.5, zorder=0)
+    axes.annotate(
+        "specified",
+        (scale * line[30], wanted[30]),
+        textcoords="offset points",
+        xytext=(8, -12),
+        fontsize=8,
+        color="0.4",
+    )
+    axes.set_xlabel(f"true deflection of the {control}, {unit}")
+    axes.set_ylabel("pilot's force, N")
+
+
+def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
+    """Draw authority lost and felt force missing in each configuration."""
+    outcomes = [flight.outcome for flight in case]
+    places = np.arange(len(outcomes))
+    lost = [100.0 * o.loss for o in outcomes]
+    soft = [100.0 * (1.0 - o.felt_ratio) for o in outcomes]
+    axes.bar(places - 0.2, lost, 0.38, color="#d55e00", label="authority lost")
+    axes.bar(places + 0.2, soft, 0.38, color="#56b4e9", label="force missing")
+    for place, value in [
+        *zip(places - 0.2, lost, strict=True),
+        *zip(places + 0.2, soft, strict=True),
+    ]:
+        if np.isfinite(value):
+            axes.annotate(
+                f"{abs(value) if abs(value) < 0.05 else value:.1f}",
+                (place, max(value, 0.0)),
+                textcoords="offset points",
+                xytext=(0, 2),
+                ha="center",
+                fontsize=7,
+            )
+    names = [_SHORT[list(_STYLE).index(o.configuration)] for o in outcomes]
+    axes.set_xticks(places, names, fontsize=8)
+    axes.margins(y=0.18)
+    axes.set_ylabel("%")
+    axes.legend(fontsize=7, loc="upper right")
+
+
+def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:
+    """Jumps of the modifying force from frame to frame, which the hand feels."""
+    flight = case[0]
+    step = flight.record[channel(flight.scenario.control, "force_step")]
+    axes.vlines(flight.record.time_s, 0.0, step, color="#d55e00", linewidth=0.8)
+    axes.annotate(
+        f"largest {flight.outcome.force_step_N:.2f} N",
+        (0.97, 0.95),
+        xycoords="axes fraction",
+        ha="right",
+        va="top",
+        fontsize=9,
+    )
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("step of the modifying force, N")
+
+
+_PANELS = (
+    ("force", ("force_N", "modifying_force_N")),
+    ("deflection", ("deflection_{d}", "estimate_{d}", "computed_{d}")),
+)
+
+
+def draw_record(record: Record, title: str) -> Figure:
+    """Draw a record: each control's force and deflections, its surface, and the motion."""
+    panels: list[tuple[str, list[tuple[str, str, float]]]] = []
+    for control in (c for c in CONTROL_NAMES if control_channels(c)[0] in record):
+        d = unit_of(control)
+        for what, names in _PANELS:
+            scale = (1.0 if what == "force" else 100.0) if d == "m" else 1.0
+            unit = "N" if what == "force" else "cm"
+            if d == "rad" and what != "force":
+                scale, unit = 1.0 / DEGREE_rad, "°"
+            lines = [(f"{control}_{n.format(d=d)}", n.split("_")[0], scale) for n in names]
+            panels.append((f"{control} {what}, {unit}", lines))
+    degree = 1.0 / DEGREE_rad
+    panels += [
+        ("surfaces, °", [(f"{s}_rad", s, degree) for s in ("elevator", "aileron", "rudder")]),
+        (
+            "rates, °/s",
+            [(f"{r}_rate_rad_per_s", r, degree) for r in ("pitch", "roll", "yaw")],
+        ),
+        (
+            "angles, °",
+            [(f"{a}_rad", a, degree) for a in ("pitch", "alpha", "roll", "sideslip")],
+        ),
+        ("load factor", [("load_factor", "load factor", 1.0)]),
+        ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "q̄", 1e-3)]),
+    ]
+    shown = []
+    for label, lines in panels:
+        present = [line for line in lines if line[0] in record]
+        if present:
+            shown.append((label, present))
+    half = (len(shown) + 1) // 2
+    figure = Figure(figsize=(11, 1.0 + 1.9 * half), layout="constrained")
+    grid = figure.subplots(half, 2, sharex=True, squeeze=False)
+    for axes, (label, lines) in zip(grid.T.flat, shown, strict=False):
+        for name, short, scale in lines:
+            axes.plot(record.time_s, scale * record[name], linewidth=1.1, label=short)
+        axes.set_ylabel(label, fontsize=9)
+        axes.grid(alpha=0.25)
+        if len(lines) > 1:
+            axes.legend(fontsize=7, loc="best", ncols=len(lines))
+    for axes in list(grid.T.flat)[len(shown) :]:
+        axes.set_visible(False)
+    for column in range(2):
+        visible = [axes for axes in grid[:, column] if axes.get_visible()]
+        if visible:
+            visible[-1].set_xlabel("time, s")
+            visible[-1].tick_params(labelbottom=True)
+    figure.suptitle(title, fontsize=12)
+    return figure
