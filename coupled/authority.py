@@ -164,8 +164,7 @@ def _felt_and_specified(
     loader = rig.controls[control].loader
     preload = np.sign(deflection) * loader.breakout
     weight = loader.bob_weight * (record["load_factor"][held] - 1.0)
-    pairs = zip(pressure, deflection, strict=True)
-    specified = [specified_force(rig, control, q, np.array([x]))[0] for q, x in pairs]
+    specified = specified_force(rig, control, pressure, deflection)
     felt = record[channel(control, "force")][held]
     return float(np.mean(felt - preload - weight)), float(np.mean(specified - preload))
 

@@ -26,8 +26,8 @@ _CONTROL = (
 )
 _NOISY = (0, 1, 2, 5)
 
-BENCH_MOTION = ("dynamic_pressure_Pa", "load_factor")
-MOTION = (
+BENCH_MOTION = ("dynamic_pressure_Pa",)
+LONGITUDINAL = (
     "dynamic_pressure_Pa",
     "load_factor",
     "elevator_rad",
@@ -36,6 +36,8 @@ MOTION = (
     "pitch_rad",
     "true_airspeed_m_per_s",
     "altitude_m",
+)
+LATERAL = (
     "aileron_rad",
     "rudder_rad",
     "roll_rate_rad_per_s",
@@ -44,6 +46,13 @@ MOTION = (
     "roll_rad",
     "heading_rad",
 )
+
+
+def motion_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:
+    """Return the motion's channels: on a rig with wheel or pedals, the lateral ones too."""
+    if not flown:
+        return BENCH_MOTION
+    return LONGITUDINAL + (LATERAL if set(controls) - {"column"} else ())
 
 
 def control_channels(control: str) -> tuple[str, ...]:
@@ -64,10 +73,10 @@ def record_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:
     names = [TIME]
     for control in controls:
         names += control_channels(control)
-    return (*names, *(MOTION if flown else BENCH_MOTION))
+    return (*names, *motion_channels(controls, flown))
 
 
 def noisy_channels(controls: Sequence[str], flown: bool) -> list[str]:
     """Return the channels that a sensor reads, and that noise may be given for."""
     names = [control_channels(control)[i] for control in controls for i in _NOISY]
-    return names + list(MOTION if flown else BENCH_MOTION[:1])
+    return names + list(motion_channels(controls, flown))

@@ -52,32 +52,59 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def draw_comparison(flights: Sequence[Flight]) -> Figure:
-    """Draw a comparison: a column a case; surface, motion, and force against deflection."""
+    """Draw a comparison: a column a case; surface, motion, force, and what is lost.
+
+    Where each case is flown in one configuration only, draw a panel a case, of the steps of
+    the modifying force.
+    """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    steps = all(len(case) == 1 for case in cases)
-    rows = [_draw_surface, _draw_motion, _draw_force] if not steps else [_draw_surface, _draw_steps]
-    if flights[0].scenario.rig.flight is None and not steps:
-        rows = [_draw_surface, _draw_force]
-    if not steps:
-        rows.append(_draw_loss)
-    figure = Figure(figsize=(1.2 + 3.9 * len(cases), 0.9 + 2.6 * len(rows)), layout="constrained")
-    grid = figure.subplots(len(rows), len(cases), squeeze=False)
+    if len(cases) > 1 and all(len(case) == 1 for case in cases):
+        return _draw_step_panels(cases)
+    flown = flights[0].scenario.rig.flight is not None
+    rows = [_draw_surface, *([_draw_motion] if flown else []), _draw_force, _draw_loss]
+    columns, height = (len(cases), len(rows)) if len(cases) > 1 else (2, 2)
+    figure = Figure(figsize=(1.2 + 3.9 * columns, 0.9 + 2.6 * height), layout="constrained")
+    grid = figure.subplots(height, columns, squeeze=False)
+    if len(cases) == 1:
+        for axes in list(grid.flat)[len(rows) :]:
+            axes.set_visible(False)
+        grid = np.reshape(list(grid.flat)[: len(rows)], (len(rows), 1))
     for i, case in enumerate(cases):
         for axes, draw in zip(grid[:, i], rows, strict=True):
             draw(axes, case)
             axes.grid(alpha=0.25)
             if i:
                 axes.set_ylabel("")
-        grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
-    for row, draw in zip(grid, rows, strict=True):
-        if draw in (_draw_loss, _draw_steps):
-            _share_limits(row)
-    run = flights[0].scenario.run
-    figure.suptitle(f"{run.name}: {flights[0].scenario.rig.name}", fontsize=12)
+        if len(cases) > 1:
+            grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
+    _share_limits(grid[-1])
+    figure.suptitle(_title(flights[0]), fontsize=12)
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    if not steps:
-        figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9)
     return figure
+
+
+def _draw_step_panels(cases: Sequence[Sequence[Flight]]) -> Figure:
+    columns = min(3, len(cases))
+    rows = -(-len(cases) // columns)
+    figure = Figure(figsize=(1.0 + 3.4 * columns, 0.7 + 2.7 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    for axes, case in zip(grid.flat, cases, strict=False):
+        _draw_steps(axes, case)
+        axes.grid(alpha=0.25)
+        axes.set_title(_wrapped(case[0].outcome.case), fontsize=10)
+        axes.label_outer()
+    for axes in list(grid.flat)[len(cases) :]:
+        axes.set_visible(False)
+    figure.supylabel("step of the modifying force at each frame, N", fontsize=10)
+    figure.suptitle(_title(cases[0][0]), fontsize=12)
+    return figure
+
+
+def _title(flight: Flight) -> str:
+    flown = flight.scenario.rig.flight
+    where = f"{flown.model} behind the {flight.scenario.rig.name} rig" if flown else "on the bench"
+    return f"{flight.scenario.run.name}: {where}"
 
 
 def _wrapped(text: str, width: int = 42) -> str:
@@ -107,7 +134,7 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
         axes.plot(record.time_s, moved, **_line(flight.configuration))
     record = case[-1].record
     asked = 100.0 * np.clip(record[channel(control, "deflection")] / data.travel, -1.0, 1.0)
-    axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked")
+    axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked, specified")
     axes.set_xlabel("time, s")
     axes.set_ylabel(f"{data.surface} from trim, % of travel")
 
@@ -137,14 +164,6 @@ def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].scenario.rig, control, pressure, line)
     axes.plot(scale * line, wanted, color="0.65", linewidth=4.5, zorder=0)
-    axes.annotate(
-        "specified",
-        (scale * line[30], wanted[30]),
-        textcoords="offset points",
-        xytext=(8, -12),
-        fontsize=8,
-        color="0.4",
-    )
     axes.set_xlabel(f"true deflection of the {control}, {unit}")
     axes.set_ylabel("pilot's force, N")
 
@@ -173,6 +192,7 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
     names = [_SHORT[list(_STYLE).index(o.configuration)] for o in outcomes]
     axes.set_xticks(places, names, fontsize=8)
     axes.margins(y=0.18)
+    axes.set_ylim(bottom=min(0.0, *lost, *soft))
     axes.set_ylabel("%")
     axes.legend(fontsize=7, loc="upper right")
 
@@ -191,7 +211,6 @@ def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:
         fontsize=9,
     )
     axes.set_xlabel("time, s")
-    axes.set_ylabel("step of the modifying force, N")
 
 
 _PANELS = (
@@ -225,6 +244,7 @@ def draw_record(record: Record, title: str) -> Figure:
         ),
         ("load factor", [("load_factor", "load factor", 1.0)]),
         ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "q̄", 1e-3)]),
+        ("true airspeed, m/s", [("true_airspeed_m_per_s", "speed", 1.0)]),
     ]
     shown = []
     for label, lines in panels:

@@ -51,7 +51,7 @@ def bench(changes: dict[str, Any] | None = None, table: dict[str, Any] = BENCH) 
 
 
 def push(rig: Rig, force: Any, seconds: float, gradient: float = 560.0) -> NDArray[np.float64]:
-    """Return δc at every node while `force` (of time, or constant) pushes, from rest; one frame is one substep."""
+    """Return δc at every node, from rest, while `force` pushes: a constant, or of time."""
     rate = rig.frame_rate * rig.substeps
     fine = rig.model_copy(update={"frame_rate": rate, "loader_rate": rate})
     times = np.arange(round(seconds * rate) + 1) / rate

@@ -16,45 +16,47 @@ from typing import Any, Protocol
 
 import jsbsim
 
-from coupled.channels import MOTION
+from coupled.channels import LATERAL, LONGITUDINAL, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.rig.parameters import SURFACES, Flight
 from coupled.units import FOOT_m, KNOT_m_per_s, PSF_Pa
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
 
-# Each motion channel: JSBSim's property, and the factor to SI.
-_MOTION = {
-    "dynamic_pressure_Pa": ("aero/qbar-psf", PSF_Pa),
-    "load_factor": ("accelerations/Nz", 1.0),
-    "elevator_rad": ("fcs/elevator-pos-rad", 1.0),
-    "pitch_rate_rad_per_s": ("velocities/q-rad_sec", 1.0),
-    "alpha_rad": ("aero/alpha-rad", 1.0),
-    "pitch_rad": ("attitude/theta-rad", 1.0),
-    "true_airspeed_m_per_s": ("velocities/vt-fps", FOOT_m),
-    "altitude_m": ("position/h-sl-ft", FOOT_m),
-    "aileron_rad": ("fcs/left-aileron-pos-rad", 1.0),
-    "rudder_rad": ("fcs/rudder-pos-rad", 1.0),
-    "roll_rate_rad_per_s": ("velocities/p-rad_sec", 1.0),
-    "yaw_rate_rad_per_s": ("velocities/r-rad_sec", 1.0),
-    "sideslip_rad": ("aero/beta-rad", 1.0),
-    "roll_rad": ("attitude/phi-rad", 1.0),
-    "heading_rad": ("attitude/psi-rad", 1.0),
-}
-_HEIGHT = "position/h-agl-ft"
+# JSBSim's property behind each motion channel, in the channels' order.
+_LONGITUDINAL = (
+    "aero/qbar-psf",
+    "accelerations/Nz",
+    "fcs/elevator-pos-rad",
+    "velocities/q-rad_sec",
+    "aero/alpha-rad",
+    "attitude/theta-rad",
+    "velocities/vt-fps",
+    "position/h-sl-ft",
+)
+_LATERAL = (
+    "fcs/left-aileron-pos-rad",
+    "fcs/rudder-pos-rad",
+    "velocities/p-rad_sec",
+    "velocities/r-rad_sec",
+    "aero/beta-rad",
+    "attitude/phi-rad",
+    "attitude/psi-rad",
+)
+assert len(_LONGITUDINAL) == len(LONGITUDINAL)
+assert len(_LATERAL) == len(LATERAL)
+_ALTITUDE = LONGITUDINAL.index("altitude_m")
+_HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
 class Airframe(Protocol):
     """What the frame loop flies: an aircraft, or a bench that only tells q̄."""
 
-    def motion(self) -> tuple[float, ...]:
-        """Return the motion's channels as they are now, q̄ in Pa and load factor first."""
+    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
+    step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
 
-    def step(self, commands: tuple[float, float, float]) -> None:
-        """Run one frame with these commands about trim, one a control of the rig."""
-
-    def trouble(self) -> str:
-        """Return why the flight cannot go on, or an empty string."""
+    def trouble(self, motion: tuple[float, ...]) -> str:
+        """Return why the flight cannot go on from this motion, or an empty string."""
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties that a run asked for."""
@@ -119,17 +121,24 @@ class JSBSimAirframe:
     ) -> None:
         self._file, self._record_file = file, record_file
         self._flight = flight
-        self._steps = flight.steps_per_frame
         self._fdm = self._load(models, frame_s)
         self._trim()
-        self._run = self._fdm.run
-        self._reads = [(self._node(name).get_double_value, k) for name, k in _MOTION.values()]
+        lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
+        self.motion = _motion_reader(
+            [self._node(name).get_double_value for name in _LONGITUDINAL],
+            [self._node(name).get_double_value for name in _LATERAL] if lateral else [],
+        )
         self._height = self._node(_HEIGHT).get_double_value
+        self._wheels = self._node(_WHEELS).get_double_value
         self._extra = [self._node(name, "record_properties").get_double_value for name in record]
-        self._writes = []
+        writes = []
         for control in controls:
             node = self._node(_COMMANDS[SURFACES[control]])
-            self._writes.append((node.set_double_value, node.get_double_value()))
+            writes.append((node.set_double_value, node.get_double_value()))
+        self.step = _stepper(self._fdm.run, writes, flight.steps_per_frame)
+        # Above this altitude no wheel is near the ground, and no height need be asked for.
+        ground_m = self.motion()[_ALTITUDE] - self._height() * FOOT_m
+        self._safe_m = ground_m + 100.0
 
     def _fault(self, key: str, problem: str) -> InputError:
         return InputError(self._file, f"flight.{key}" if key else "flight", problem)
@@ -154,7 +163,7 @@ class JSBSimAirframe:
             raise self._fault("model", f"{name} does not load: {_log.text.strip()[-200:]}")
         fdm.disable_input()
         fdm.disable_output()
-        fdm.set_dt(frame_s / self._steps)
+        fdm.set_dt(frame_s / self._flight.steps_per_frame)
         self._properties = fdm.get_property_manager()
         return fdm
 
@@ -199,27 +208,96 @@ class JSBSimAirframe:
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
-    def motion(self) -> tuple[float, ...]:
-        """Return the motion now, in the order of `channels.MOTION`, SI."""
-        return tuple([read() * factor for read, factor in self._reads])
-
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""
         return tuple([read() for read in self._extra])
 
-    def step(self, commands: tuple[float, float, float]) -> None:
-        """Run one frame with these commands about trim, one a control of the rig."""
-        for (write, trim), command in zip(self._writes, commands, strict=False):
-            write(trim + command)
-        for _ in range(self._steps):
-            self._run()
-
-    def trouble(self) -> str:
-        """Return why the flight cannot go on, or an empty string."""
+    def trouble(self, motion: tuple[float, ...]) -> str:
+        """Return why the flight cannot go on from this motion, or an empty string."""
+        if motion[_ALTITUDE] > self._safe_m:
+            return ""
         height = self._height()
-        if height > 0.0:
+        if height > 0.0 and not self._wheels():
             return ""
         return "the state is not finite" if math.isnan(height) else "the aircraft met the ground"
+
+
+def _motion_reader(
+    longitudinal: Sequence[Callable[[], float]], lateral: Sequence[Callable[[], float]]
+) -> Callable[[], tuple[float, ...]]:
+    """Return a function that reads the motion in SI; written out, since every frame calls it."""
+    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = longitudinal
+
+    def column() -> tuple[float, ...]:
+        return (
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            height() * FOOT_m,
+        )
+
+    if not lateral:
+        return column
+    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
+
+    def all_controls() -> tuple[float, ...]:
+        return (
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            height() * FOOT_m,
+            aileron(),
+            rudder(),
+            roll_rate(),
+            yaw_rate(),
+            beta(),
+            roll(),
+            heading(),
+        )
+
+    return all_controls
+
+
+def _stepper(
+    run: Callable[[], bool],
+    writes: Sequence[tuple[Callable[[float], object], float]],
+    steps: int,
+) -> Callable[[tuple[float, float, float]], None]:
+    """Return a function that runs a frame with commands about trim, one a control."""
+    (first, first_trim), *others = writes
+
+    def one(commands: tuple[float, float, float], /) -> None:
+        first(first_trim + commands[0])
+        run()
+
+    def several(commands: tuple[float, float, float], /) -> None:
+        for (write, trim), command in zip(writes, commands, strict=False):
+            write(trim + command)
+        for _ in range(steps):
+            run()
+
+    if steps > 1 or len(others) == 1:
+        return several
+    if not others:
+        return one
+    (second, second_trim), (third, third_trim) = others
+
+    def three(commands: tuple[float, float, float], /) -> None:
+        a, b, c = commands
+        first(first_trim + a)
+        second(second_trim + b)
+        third(third_trim + c)
+        run()
+
+    return three
 
 
 class Bench:
@@ -229,27 +307,27 @@ class Bench:
         self._frame_s = frame_s
         self._points = list(pressures_Pa)
         self._k = 0
+        self.motion = self._told
+        self.step = self._next
 
-    def motion(self) -> tuple[float, ...]:
-        """Return q̄ in Pa and a load factor of one."""
+    def _told(self) -> tuple[float, ...]:
         time = self._k * self._frame_s
         points = self._points
         if time <= points[0][0]:
-            return (points[0][1], 1.0)
+            return (points[0][1],)
         for (t0, q0), (t1, q1) in pairwise(points):
             if time < t1:
-                return (q0 + (q1 - q0) * (time - t0) / (t1 - t0), 1.0)
-        return (points[-1][1], 1.0)
+                return (q0 + (q1 - q0) * (time - t0) / (t1 - t0),)
+        return (points[-1][1],)
+
+    def _next(self, commands: tuple[float, float, float], /) -> None:
+        self._k += 1
 
     def extra(self) -> tuple[float, ...]:
         """Return nothing: a bench has no properties."""
         return ()
 
-    def step(self, commands: tuple[float, float, float]) -> None:
-        """Go to the next frame."""
-        self._k += 1
-
-    def trouble(self) -> str:
+    def trouble(self, motion: tuple[float, ...]) -> str:
         """Return nothing: a bench has no trouble."""
         return ""
 
@@ -271,8 +349,9 @@ def check_direct_controls(
         moved = JSBSimAirframe(flight, frame_s, controls, **where)
         step = 0.05 if control == "wheel" else -0.05  # positive force of the pilot
         commands = (step * (i == 0), step * (i == 1), step * (i == 2))
-        at = MOTION.index(f"{surface}_rad")
-        turn = MOTION.index(rates.get(control, "yaw_rate_rad_per_s"))
+        channels = motion_channels(controls, flown=True)
+        at = channels.index(f"{surface}_rad")
+        turn = channels.index(rates.get(control, "yaw_rate_rad_per_s"))
         positions, rate = [], 0.0
         for _ in range(max(2, round(0.1 / frame_s))):
             still.step((0.0, 0.0, 0.0))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,6 @@ from coupled.flight.pilot import Action
 from coupled.flight.scenario import Scenario
 from coupled.record import Record
 from coupled.resources import aircraft_folder
-from coupled.rig.control import at_rest
 from coupled.rig.frame import step_frame
 from coupled.rig.packing import pack
 from coupled.rig.parameters import Control
@@ -54,36 +54,42 @@ def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
     names = list(rig.controls)
     channels = record_channels(names, rig.flight is not None)
     controls = pack(rig, {name: action.hand for name, action in actions.items()})
-    states = at_rest(len(names))
     script = _script(names, actions, frames * substeps + 1, h)
-    noise = _noise(channels, rig.noise, frames, run.seed)
-    data = np.zeros((frames, len(channels)))
-    looks = [(states[names.index(n)], a.look) for n, a in actions.items() if a.look]
+    data = _noise(channels, rig.noise, frames, run.seed)
+    hands = controls["state"]["hand"]
+    looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
+    motions: list[tuple[float, ...]] = []
     extra: list[tuple[float, ...]] = []
 
+    read, step, trouble = airframe.motion, airframe.step, airframe.trouble
+    flown, asked = rig.flight is not None, bool(run.record_properties)
     ended: dict[str, Any] | None = None
     done = 0
     try:
         for k in range(frames):
-            trouble = airframe.trouble()
-            if trouble:
-                ended = {"reason": trouble, "time_s": k / rig.frame_rate}
+            motion = read()
+            why = trouble(motion)
+            if why:
+                ended = {"reason": why, "time_s": k / rig.frame_rate}
                 break
-            motion = airframe.motion()
-            for state, look in looks:
-                state["hand"]["command"] = look(k / rig.frame_rate, motion)
-            commands = step_frame(controls, states, script, noise, data, k, substeps, h, motion)
-            if run.record_properties:
+            if looks:
+                for state, look in looks:
+                    state["command"] = look(k / rig.frame_rate, motion)
+            load = motion[1] if flown else 1.0
+            commands = step_frame(controls, script, data, k, motion[0], load)
+            motions.append(motion)
+            if asked:
                 extra.append(airframe.extra())
-            airframe.step(commands)
+            step(commands)
             done = k + 1
-            if progress is not None and done % 64 == 0:
+            if not done & 63 and progress is not None:
                 progress(done, frames)
     except KeyboardInterrupt:
         ended = {"reason": "interrupted", "time_s": done / rig.frame_rate}
     data = data[:done]
+    _add_motion(data, motions[:done])
     data[:, 0] = np.arange(done) / rig.frame_rate
-    if run.record_properties:
+    if asked:
         channels = (*channels, *run.record_properties)
         data = np.column_stack((data, np.reshape(extra[:done], (done, -1))))
     return Record(channels, data, _manifest(scenario, channels, data, ended))
@@ -119,17 +125,30 @@ def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: flo
     times: Floats = np.arange(nodes, dtype=np.float64) * h
     script = np.zeros((len(names), 2, nodes))
     for name, action in actions.items():
-        script[names.index(name)] = action.force(times), action.held(times)
+        force, held = script[names.index(name)]
+        if action.force is not None:
+            force[:] = action.force(times)
+        if action.held is not None:
+            held[:] = action.held(times)
     return script
 
 
+def _add_motion(data: Floats, motions: list[tuple[float, ...]]) -> None:
+    """Add the motion to the last columns of the record; q̄, their first, the kernel wrote."""
+    if motions:
+        width = len(motions[0])
+        values = np.fromiter(chain.from_iterable(motions), np.float64, len(motions) * width)
+        data[:, data.shape[1] - width + 1 :] += values.reshape(-1, width)[:, 1:]
+
+
 def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, seed: int) -> Floats:
-    """Return white noise for every channel, or one row of zeros where there is none."""
+    """Return a record that holds nothing yet but the noise of its channels."""
     sigma = np.array([levels.get(channel, 0.0) for channel in channels])
     if not sigma.any():
-        return np.zeros((1, len(channels)))
+        return np.zeros((frames, len(channels)))
     hiss = np.random.default_rng(seed).standard_normal((frames, len(channels)))
-    return np.asarray(hiss * sigma)
+    hiss *= sigma
+    return hiss
 
 
 def _manifest(

@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.channels import MOTION, TIME, channel
+from coupled.channels import LONGITUDINAL, TIME, channel
 from coupled.errors import InputError, nearest
 from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
@@ -35,8 +35,8 @@ class Action:
     once a frame.
     """
 
-    force: Callable[[Floats], Floats] = np.zeros_like
-    held: Callable[[Floats], Floats] = np.zeros_like
+    force: Callable[[Floats], Floats] | None = None
+    held: Callable[[Floats], Floats] | None = None
     hand: Hand = field(default_factory=Hand)
     look: Look | None = None
 
@@ -57,12 +57,17 @@ class Pilot(Section):
 
 
 def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> Floats:
-    """Return a signal that goes to each (time, level) in turn, over `rise` seconds from it."""
+    """Return a signal that goes to each (time, level) in turn, over `rise` seconds from it.
+
+    `times` rise; each edge is a half cosine.
+    """
     out = np.zeros_like(times)
     before = 0.0
     for at, level in levels:
-        share = (times - at) / rise if rise > 0.0 else np.where(times >= at, 1.0, 0.0)
-        out += (level - before) * 0.5 * (1.0 - np.cos(np.pi * np.clip(share, 0.0, 1.0)))
+        start, end = np.searchsorted(times, (at, at + rise))
+        share = (times[start:end] - at) / rise if rise > 0.0 else times[start:end]
+        out[start:end] += (level - before) * 0.5 * (1.0 - np.cos(np.pi * share))
+        out[end:] += level - before
         before = level
     return out
 
@@ -206,8 +211,8 @@ class Attitude(Pilot):
     integral_gain: float = quantity("N_per_rad_s", 0.0, ge=0)
     lag: float = quantity("s", 0.1, ge=0)
     force_limit: float = quantity("N", 330.0, gt=0)
-    _PITCH: ClassVar[int] = MOTION.index("pitch_rad")
-    _RATE: ClassVar[int] = MOTION.index("pitch_rate_rad_per_s")
+    _PITCH: ClassVar[int] = LONGITUDINAL.index("pitch_rad")
+    _RATE: ClassVar[int] = LONGITUDINAL.index("pitch_rate_rad_per_s")
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return the hand, with a memory of its own."""

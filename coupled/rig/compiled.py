@@ -19,6 +19,9 @@ import numba
 import numpy as np
 from numba.core import config
 
+# Below this a decaying state is at rest: further down lie subnormal numbers, a hundred times slower.
+TINY = 1e-100
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 

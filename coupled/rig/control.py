@@ -18,10 +18,20 @@ from coupled.rig import (
     sensing,
     surface,
 )
+from coupled.rig.compiled import layout
+
+
+class Clock(Protocol):
+    """How the loader's time divides a frame."""
+
+    substeps: int
+    substep: float  # s
 
 
 class ControlParameters(Protocol):
     """Parameters of every stage, in the order of the signal chain."""
+
+    clock: Clock
 
     hand: hand.HandParameters
     schedule: schedule.ScheduleParameters
@@ -45,8 +55,16 @@ class ControlState(Protocol):
     surface: surface.SurfaceState
 
 
+class Control(Protocol):
+    """One control, whole."""
+
+    parameters: ControlParameters
+    state: ControlState
+
+
 CONTROL_PARAMETERS = np.dtype(
     [
+        ("clock", layout(Clock)),
         ("hand", hand.HAND_PARAMETERS),
         ("schedule", schedule.SCHEDULE_PARAMETERS),
         ("modification", modification.MODIFICATION_PARAMETERS),
@@ -69,10 +87,7 @@ CONTROL_STATE = np.dtype(
     ]
 )
 
-# Arrays of the two layouts, one element a control; a kernel sees an element as the class above.
+CONTROL = np.dtype([("parameters", CONTROL_PARAMETERS), ("state", CONTROL_STATE)])
+
+# An array of that layout, one element a control; a kernel sees an element as a `Control`.
 ControlArray = NDArray[np.void]
-
-
-def at_rest(controls: int) -> ControlArray:
-    """Return the states of so many controls at rest in trim, shape (controls,)."""
-    return np.zeros(controls, CONTROL_STATE)

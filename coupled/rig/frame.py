@@ -6,14 +6,12 @@ that follows, hand, loader and linkage run on at the loader's own rate.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry, stage
-from coupled.rig.control import ControlArray
+from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.hand import grip_force, move_muscle
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
@@ -26,31 +24,29 @@ Floats = NDArray[np.float64]
 
 # What the kernel records of each control, in this order; `record` names the channels.
 CHANNELS_PER_CONTROL = 9
-MAX_CONTROLS = 3
 
 
 @stage
 def host_frame(
-    p: Any,
-    s: Any,
+    p: ControlParameters,
+    s: ControlState,
     force: float,
     pressure_read: float,
     pressure: float,
-    noise: Floats,
     out: Floats,
 ) -> float:
     """Do what host and recorder do at t_k; return the surface command over the frame.
 
-    `noise` and `out` have the channels of one control: F, δc, δ, δ̂, G_T, F_mod,
-    the step that F_mod makes here, the surface command, and the stop met since the
-    last frame.
+    `out` are the channels of one control: F, δc, δ, δ̂, G_T, F_mod, the step that F_mod makes
+    here, the surface command, and the stop met since the last frame. It comes holding the
+    noise of each.
     """
     computed = s.loader.computed
     m = s.modification
     ended = m.held if p.modification.digital else modifying_force(m, computed)
 
-    force_read = read_force(p.sensing, force, noise[0])
-    computed_read = read_computed(p.sensing, computed, noise[1])
+    force_read = read_force(p.sensing, force, out[0])
+    computed_read = read_computed(p.sensing, computed, out[1])
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
     set_gradients(p.modification, m, first, second)
     if p.modification.digital:
@@ -63,15 +59,15 @@ def host_frame(
         m.second = converted(m.second, step, full)
         product = modifying_force(m, computed)
     believed = estimate(p.compensation, computed_read, force_read)
+    command = command_surface(p.surface, s.surface, believed, pressure)
 
     out[0] = force_read
     out[1] = computed_read
-    out[2] = transducer(p.linkage, deflection(p.linkage, s.linkage, force)) + noise[2]
+    out[2] += transducer(p.linkage, deflection(p.linkage, s.linkage, force))
     out[3] = believed
     out[4] = first
-    out[5] = product + noise[5]
+    out[5] += product
     out[6] = product - ended
-    command = command_surface(p.surface, s.surface, believed, pressure)
     out[7] = command
     out[8] = s.loader.stop
     return command
@@ -79,22 +75,21 @@ def host_frame(
 
 @stage
 def run_frame(
-    p: Any,
-    s: Any,
+    p: ControlParameters,
+    s: ControlState,
     force: Floats,
     held: Floats,
     first_node: int,
-    substeps: int,
-    h: float,
     load_factor: float,
 ) -> None:
-    """Run hand, loader and linkage over the frame, `substeps` of h seconds.
+    """Run hand, loader and linkage over a frame.
 
     `force` and `held` are the hand's script on the nodes of the whole flight, N and d.
     """
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
-    for node in range(first_node + 1, first_node + substeps + 1):
+    h = p.clock.substep
+    for node in range(first_node + 1, first_node + p.clock.substeps + 1):
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
         ahead = s.hand.force + force[node] - force[node - 1]
@@ -108,42 +103,41 @@ def run_frame(
 @entry
 def step_frame(
     controls: ControlArray,
-    states: ControlArray,
     script: Floats,
-    noise: Floats,
     record: Floats,
     k: int,
-    substeps: int,
-    h: float,
-    motion: tuple[float, ...],
+    dynamic_pressure: float,
+    load_factor: float,
 ) -> tuple[float, float, float]:
-    """Run frame k of all controls, write row k of the record, return the surface commands.
+    """Run frame k of all controls, write their part of row k, return the surface commands.
 
-    controls, states  shape (n,), n ≤ 3
-    script            shape (n, 2, frames·substeps + 1): force in N and held deflection
-    noise             shape (1 or frames, channels), added to what is read
-    record            shape (frames, channels): t, 9 a control, then `motion`
-    motion            what the airframe gives: q̄ in Pa and load factor first
+    controls  shape (n,), n ≤ 3
+    script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
+    record    shape (frames, channels): t, 9 a control, q̄, and more; comes holding the noise
+              that is added to what is read
     The commands are in ±1, one a control, 0 for a control that is absent.
     """
-    commands = np.zeros(MAX_CONTROLS)
-    hiss = noise[k % noise.shape[0]]
+    first_command = second_command = third_command = 0.0
     row = record[k]
-    row[0] = k * substeps * h
-    column = 1 + CHANNELS_PER_CONTROL * len(controls)
-    for i in range(len(motion)):
-        row[column + i] = motion[i] + hiss[column + i]
+    pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
+    row[pressure_at] += dynamic_pressure
     for i in range(len(controls)):
-        p, s = controls[i], states[i]
+        p, s = controls[i].parameters, controls[i].state
         force, held = script[i, 0], script[i, 1]
-        node = k * substeps
+        node = k * p.clock.substeps
         if k == 0:
-            grip_force(p.hand, s.hand, p.linkage, s.linkage, force[0], held[0], 0.0, h)
+            grip_force(
+                p.hand, s.hand, p.linkage, s.linkage, force[0], held[0], 0.0, p.clock.substep
+            )
             start_delay(p.loader, s.loader, s.hand.force)
         first = 1 + CHANNELS_PER_CONTROL * i
-        channels = slice(first, first + CHANNELS_PER_CONTROL)
-        commands[i] = host_frame(
-            p, s, s.hand.force, row[column], motion[0], hiss[channels], row[channels]
-        )
-        run_frame(p, s, force, held, node, substeps, h, motion[1])
-    return commands[0], commands[1], commands[2]
+        out = row[first : first + CHANNELS_PER_CONTROL]
+        command = host_frame(p, s, s.hand.force, row[pressure_at], dynamic_pressure, out)
+        run_frame(p, s, force, held, node, load_factor)
+        if i == 0:
+            first_command = command
+        elif i == 1:
+            second_command = command
+        else:
+            third_command = command
+    return first_command, second_command, third_command

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
 
 
@@ -76,3 +76,5 @@ def grip_force(
 def move_muscle(p: HandParameters, s: HandState) -> None:
     """Let the pilot's command act for a substep through the muscle's lag."""
     s.muscle += p.lag_gain * (s.command - s.muscle)
+    if abs(s.muscle) < TINY:
+        s.muscle = 0.0

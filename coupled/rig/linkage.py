@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import TINY, layout, stage
 
 
 class LinkageParameters(Protocol):
@@ -73,6 +73,8 @@ def move_linkage(
         s.rate = min(max(s.rate, -p.rate_limit), p.rate_limit)
         step = p.rate_limit * h
         s.position = min(max(s.position, x - step), x + step)
+    if abs(s.position) < TINY and abs(s.rate) < TINY:
+        s.position = s.rate = 0.0
     half = 0.5 * p.play
     s.grip = min(max(s.grip, s.position - half), s.position + half)
 

@@ -23,7 +23,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.friction import FrictionParameters, running_friction
 from coupled.rig.modification import ModificationState, slope, smooth_force
 
@@ -228,6 +228,8 @@ def move_loader(
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
         if event == NOTHING:
+            if abs(s.computed) < TINY and abs(s.rate) < TINY:
+                s.computed = s.rate = 0.0
             return
         done += span
         if event == REST:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.rig.control import CONTROL_PARAMETERS, ControlArray
+from coupled.rig.control import CONTROL, ControlArray
 from coupled.rig.linkage import servo_weights
 from coupled.rig.parameters import Control, Rig
 
@@ -31,11 +31,12 @@ COMMAND_SIGN = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
 
 
 def pack(rig: Rig, hands: dict[str, Hand] | None = None) -> ControlArray:
-    """Return the parameters of a rig's controls, shape (controls,), in the rig's order."""
-    packed = np.zeros(len(rig.controls), CONTROL_PARAMETERS)
+    """Return a rig's controls at rest in trim, shape (controls,), in the rig's order."""
+    packed = np.zeros(len(rig.controls), CONTROL)
     frame_s = 1.0 / rig.frame_rate
     h = frame_s / rig.substeps
-    for p, (name, control) in zip(packed, rig.controls.items(), strict=True):
+    for p, (name, control) in zip(packed["parameters"], rig.controls.items(), strict=True):
+        p["clock"]["substeps"], p["clock"]["substep"] = rig.substeps, h
         _pack_hand(p["hand"], (hands or {}).get(name, Hand()), h)
         _pack_host(p, control, frame_s)
         _pack_loader(p, control, h)

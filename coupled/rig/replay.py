@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
-from coupled.rig.control import at_rest
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import modifying_force, set_gradients
@@ -96,9 +95,10 @@ def replay_surface(rig: Rig, control: str, believed: Floats, pressure_Pa: Floats
 
 
 def _one(rig: Rig, control: str) -> tuple[Any, Any]:
-    """Return parameters and state of one control, each of shape (1,)."""
+    """Return parameters and state of one control at rest, each of shape (1,)."""
     i = [str(name) for name in rig.controls].index(control)
-    return pack(rig)[i : i + 1], at_rest(1)
+    packed = pack(rig)[i : i + 1]
+    return packed["parameters"].copy(), packed["state"].copy()
 
 
 def _on_nodes(rig: Rig, samples: Floats) -> tuple[Floats, float]:

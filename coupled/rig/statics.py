@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from coupled.rig.compensation import estimate
-from coupled.rig.control import at_rest
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import pack
@@ -59,7 +58,8 @@ class Statics:
 def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) -> Statics:
     """Return the static line at the given δc in d, which are not to be zero."""
     i = [str(name) for name in rig.controls].index(control)
-    p, s = pack(rig)[i], at_rest(1)[0]
+    packed = pack(rig)[i]
+    p, s = packed["parameters"], packed["state"]
     first, second = gradients(p["schedule"], pressure_Pa)
     set_gradients(p["modification"], s["modification"], first, second)
     loader, side = p["loader"], np.sign(computed)
@@ -83,18 +83,20 @@ def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) ->
     )
 
 
-def specified_force(rig: Rig, control: str, pressure_Pa: float, deflection: Floats) -> Floats:
+def specified_force(
+    rig: Rig, control: str, pressure_Pa: float | Floats, deflection: Floats
+) -> Floats:
     """Return the force in N specified at δ in d: breakout and one or two slopes."""
     data = rig.controls[cast(ControlName, control)]
     table = data.schedule
-    first = float(np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient))
+    first = np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient)
     second = first
     if table.second_gradient is not None:
-        second = float(np.interp(pressure_Pa, table.dynamic_pressure, table.second_gradient))
+        second = np.interp(pressure_Pa, table.dynamic_pressure, table.second_gradient)
     size = np.abs(deflection)
     beyond = np.maximum(size - table.break_deflection, 0.0) if table.break_deflection else 0.0
     slope_part = first * (size - beyond) + second * beyond
-    return np.sign(deflection) * (data.loader.breakout + slope_part)
+    return np.asarray(np.sign(deflection) * (data.loader.breakout + slope_part))
 
 
 def static_point(rig: Rig, control: str, pressure_Pa: float, deflection: float) -> Statics:

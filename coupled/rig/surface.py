@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import TINY, layout, stage
 
 
 class SurfaceParameters(Protocol):
@@ -48,6 +48,8 @@ def command_surface(
     asked = min(max(p.gain * estimate, -1.0), 1.0)
     asked /= 1.0 + p.stretch * dynamic_pressure
     s.lagged += p.lag_gain * (asked - s.lagged)
+    if abs(s.lagged) < TINY:
+        s.lagged = 0.0
     if p.rate_step > 0.0:
         s.moved += min(max(s.lagged - s.moved, -p.rate_step), p.rate_step)
     else:

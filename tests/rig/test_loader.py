@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coupled.rig.replay import drive_loader
 from tests.rigs import bench, push
 
 M, C, K = 4.0, 75.0, 560.0
@@ -39,11 +40,7 @@ def test_step_response_of_the_mass_spring_damper(damping: float) -> None:
 
 
 def test_bob_weight_offset_and_cubic_stand_in_the_balance() -> None:
-    from coupled.rig.replay import drive_loader
-
-    rig = bench(
-        {**PLAIN, "bob_weight_N_per_g": 12.0, "offset_N": 3.0, "cubic_N_per_m3": 4.0e4}
-    )
+    rig = bench({**PLAIN, "bob_weight_N_per_g": 12.0, "offset_N": 3.0, "cubic_N_per_m3": 4.0e4})
     frames = 1000
     nodes = np.full(frames * rig.substeps + 1, 40.0)
     load = np.full(frames, 2.5)

@@ -1,0 +1,95 @@
+"""What a coupled frame costs, as a ratio to JSBSim's own run(), measured side by side.
+
+Run alone, with its figures printed:  pytest tests/benchmarks -s
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import time
+
+import pytest
+
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.loop import fly
+from coupled.flight.scenario import Scenario, read_run
+
+FRAMES = 4800
+ROUNDS = 7
+
+
+def of(run: str, controls: int, frames: int) -> Scenario:
+    """Return a shipped run with its first controls only, of so many frames."""
+    scenario = read_run(run)[0]
+    names = list(scenario.rig.controls)[:controls]
+    rig = scenario.rig.model_copy(
+        update={"controls": {name: scenario.rig.controls[name] for name in names}}
+    )
+    length = scenario.run.model_copy(update={"duration": frames / rig.frame_rate})
+    pilots = {name: pilot for name, pilot in scenario.pilots.items() if name in names}
+    return Scenario(length, scenario.file, rig, scenario.rig_file, pilots, scenario.label)
+
+
+def flown_s(scenario: Scenario) -> float:
+    start = time.perf_counter()
+    record = fly(scenario)
+    assert len(record) == scenario.frames
+    return time.perf_counter() - start
+
+
+def bare_s(scenario: Scenario) -> float:
+    assert scenario.rig.flight is not None
+    airframe = JSBSimAirframe(scenario.rig.flight, 1.0 / scenario.rig.frame_rate)
+    run = airframe._fdm.run
+    start = time.perf_counter()
+    for _ in range(scenario.frames):
+        run()
+    return time.perf_counter() - start
+
+
+@pytest.mark.parametrize(("controls", "most"), [(1, 1.5), (3, 2.0)])
+@pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
+def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, most: float) -> None:
+    long, short = of(run, controls, FRAMES), of(run, controls, 1)
+    flown_s(short)
+    ratios = []
+    for _ in range(ROUNDS):
+        bare = bare_s(long)
+        ratios.append((flown_s(long) - flown_s(short)) / bare)
+    ratio = statistics.median(ratios)
+    print(f"\n{run}, {controls} control(s): {ratio:.2f} times run(), bound {most}")
+    assert ratio <= most
+
+
+def test_a_60_s_flight_and_its_record_fit_in_60_mb(tmp_path: object) -> None:
+    code = f"""
+import resource, sys
+from pathlib import Path
+from tests.benchmarks.test_frame_cost import of
+from coupled.flight.loop import fly
+from coupled.record import write_record
+fly(of("three-controls", 3, 10))
+write_record(fly(of("three-controls", 3, 10)), Path({str(tmp_path)!r}) / "a.csv")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+write_record(fly(of("three-controls", 3, 7200)), Path({str(tmp_path)!r}) / "b.csv")
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    print(f"\n60 s with three controls: {float(done.stdout):.1f} MB above a short flight's peak")
+    assert float(done.stdout) < 60.0
+
+
+def test_a_second_start_takes_under_2_s() -> None:
+    code = "from coupled.flight.loop import fly; from coupled.flight.scenario import read_run;"
+    code += "from tests.benchmarks.test_frame_cost import of; fly(of('pull-up-c172p', 1, 2))"
+    taken = []
+    for _ in range(4):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+        taken.append(time.perf_counter() - start)
+    print(f"\nstart to first frame, compiled code cached: {min(taken[1:]):.2f} s")
+    assert min(taken[1:]) < 2.0
