@@ -9,6 +9,7 @@ before they start, and JSBSim's log is kept to be quoted where something fails.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -46,6 +47,8 @@ _LATERAL = (
 assert len(_LONGITUDINAL) == len(LONGITUDINAL)
 assert len(_LATERAL) == len(LATERAL)
 _ALTITUDE = LONGITUDINAL.index("altitude_m")
+_ELEVATOR = LONGITUDINAL.index("elevator_rad")
+_PITCH_RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -162,7 +165,11 @@ class JSBSimAirframe:
         if not loaded:
             raise self._fault("model", f"{name} does not load: {_log.text.strip()[-200:]}")
         fdm.disable_input()
-        fdm.disable_output()
+        fdm.disable_output()  # which does not keep run_ic from opening the files
+        output = 0
+        while fdm.get_output_filename(output):
+            fdm.set_output_filename(output, os.devnull)
+            output += 1
         fdm.set_dt(frame_s / self._flight.steps_per_frame)
         self._properties = fdm.get_property_manager()
         return fdm
@@ -214,6 +221,9 @@ class JSBSimAirframe:
 
     def trouble(self, motion: tuple[float, ...]) -> str:
         """Return why the flight cannot go on from this motion, or an empty string."""
+        turning = motion[_ELEVATOR] + motion[_PITCH_RATE]  # the first to go where a state does
+        if turning - turning != 0.0:
+            return "the state is not finite"
         if motion[_ALTITUDE] > self._safe_m:
             return ""
         height = self._height()

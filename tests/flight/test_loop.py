@@ -1,0 +1,133 @@
+"""Flights: how they end, what their record says, and that they repeat to the bit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.channels import record_channels
+from coupled.flight import loop
+from coupled.flight.loop import fly
+from coupled.flight.scenario import Scenario, read_run
+from coupled.record import manifest_path, read_record, write_record
+
+RUN = """
+name = "test"
+card = "A test."
+rig = "report-column"
+duration_s = {duration}
+seed = 3
+
+[pilot.column]
+{pilot}
+"""
+
+
+def scenario(folder: Path, pilot: str, duration: float = 4.0, more: str = "") -> Scenario:
+    path = folder / "test.toml"
+    path.write_text(RUN.format(duration=duration, pilot=pilot) + more, encoding="utf-8")
+    return read_run(str(path))[0]
+
+
+def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
+    noise = '\n[[case]]\nlabel = "noisy"\nrig = { "noise.column_force_N" = 0.2 }\n'
+    flown = scenario(tmp_path, 'kind = "doublet"\nforce_N = 40.0\nhalf_period_s = 0.7', more=noise)
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for path in paths:
+        write_record(fly(flown), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert manifest_path(paths[0]).read_bytes() == manifest_path(paths[1]).read_bytes()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_record_is_read_back_as_it_was_written(tmp_path: Path, suffix: str) -> None:
+    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 30.0'))
+    path = tmp_path / f"flight{suffix}"
+    write_record(record, path)
+    again = read_record(path)
+    assert again.channels == record.channels
+    assert np.array_equal(again.data, record.data)
+    assert again.manifest == json.loads(json.dumps(record.manifest))
+    assert {p.name for p in tmp_path.iterdir()} == {path.name, "flight.manifest.json", "test.toml"}
+
+
+def test_the_manifest_says_what_went_in(tmp_path: Path) -> None:
+    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 30.0'))
+    manifest = record.manifest
+    assert manifest["seed"] == 3
+    assert manifest["ended_early"] is None
+    assert set(manifest["inputs_sha256"]) == {"test.toml", "report-column.toml"}
+    assert {"coupled", "jsbsim", "numpy", "numba", "python"} <= set(manifest["versions"])
+    assert record.channels == record_channels(["column"], flown=True)
+    assert record.time_s[1] == pytest.approx(1 / 120)
+
+
+def test_a_dive_ends_at_the_ground_and_keeps_the_record(tmp_path: Path) -> None:
+    low = '\n[[case]]\nlabel = "low"\nrig = { "flight.altitude_m" = 60.0 }\n'
+    push = 'kind = "step"\nforce_N = -60.0'
+    record = fly(scenario(tmp_path, push, duration=30.0, more=low))
+    ended = record.manifest["ended_early"]
+    assert ended["reason"] == "the aircraft met the ground"
+    assert 1.0 < ended["time_s"] < 29.0
+    assert len(record) == round(ended["time_s"] * 120)
+    assert record["altitude_m"][-1] < 10.0
+
+
+def test_a_state_that_is_not_finite_ends_the_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A NaN command gives JSBSim an all-NaN state while run() goes on saying true."""
+    flown = scenario(tmp_path, 'kind = "step"\nforce_N = 10.0')
+    step_frame = loop.step_frame
+    calls = 0
+
+    def broken(*args: object) -> tuple[float, float, float]:
+        nonlocal calls
+        calls += 1
+        return (float("nan"), 0.0, 0.0) if calls == 100 else step_frame(*args)
+
+    monkeypatch.setattr(loop, "step_frame", broken)
+    record = fly(flown)
+    ended = record.manifest["ended_early"]
+    assert ended["reason"] == "the state is not finite"
+    assert ended["time_s"] == pytest.approx(100 / 120)
+    assert np.all(np.isfinite(record.data))
+
+
+def test_an_interrupted_flight_keeps_its_record(tmp_path: Path) -> None:
+    def stop(done: int, total: int) -> None:
+        if done >= 128:
+            raise KeyboardInterrupt
+
+    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 10.0'), stop)
+    assert record.manifest["ended_early"]["reason"] == "interrupted"
+    assert len(record) == 128
+    assert record["true_airspeed_m_per_s"].min() > 100.0
+
+
+def test_the_attitude_hand_captures_and_holds(tmp_path: Path) -> None:
+    hand = 'kind = "attitude"\nchange_rad = 0.05\ngain_N_per_rad = 900.0\n'
+    hand += "rate_gain_N_s_per_rad = 150.0\nintegral_gain_N_per_rad_s = 300.0"
+    record = fly(scenario(tmp_path, hand, duration=30.0))
+    pitch = record["pitch_rad"] - record["pitch_rad"][0]
+    assert pitch[record.time_s > 20.0] == pytest.approx(0.05, abs=0.004)
+    assert np.max(np.abs(record["column_force_N"])) < 330.0
+
+
+def test_further_properties_are_recorded(tmp_path: Path) -> None:
+    path = tmp_path / "test.toml"
+    text = RUN.format(duration=1.0, pilot='kind = "step"\nforce_N = 1.0')
+    path.write_text(text.replace("seed = 3", 'record_properties = ["inertia/weight-lbs"]'))
+    record = fly(read_run(str(path))[0])
+    assert record.channels[-1] == "inertia/weight-lbs"
+    assert 3000.0 < record["inertia/weight-lbs"][0] < 8000.0
+
+
+def test_three_controls_fly_together() -> None:
+    record = fly(read_run("three-controls")[0])
+    for control, rate in (("column", "pitch"), ("wheel", "roll"), ("pedals", "yaw")):
+        assert np.max(np.abs(record[f"{control}_force_N"])) > 10.0
+        assert np.max(np.abs(record[f"{rate}_rate_rad_per_s"])) > 0.1

@@ -1,0 +1,171 @@
+"""Records reproduced stage by stage, each stage driven by its measured input.
+
+Three of them were made by another program from the same description (they lie beside the
+project, where it was founded); a fourth is flown here, with noise, so that a stranger's
+clone tests the same. What a stage leaves must be the channel's noise and no more: at most
+1.1 times it, where the noise of a channel is told by its own fourth differences, and the
+noise of a stage's input is carried through the stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.loop import fly
+from coupled.flight.scenario import read_run
+from coupled.record import Record, read_record
+from coupled.rig.parameters import Rig
+from coupled.rig.replay import (
+    replay_compensation,
+    replay_linkage,
+    replay_loader,
+    replay_schedule,
+    replay_surface,
+)
+from coupled.rig.rigfile import read_rig
+
+Floats = NDArray[np.float64]
+FOUNDERS = Path(__file__).parents[3] / "shared" / "rig"
+OWN = "flown here"
+RECORDS = {
+    "clean-c172p": "c172p",
+    "clean-737-compensated": "737-compensated",
+    "clean-bench": "bench",
+}
+NOISE = {
+    "column_force_N": 0.15,
+    "column_computed_m": 2e-5,
+    "column_deflection_m": 4e-5,
+    "column_modifying_force_N": 0.05,
+    "dynamic_pressure_Pa": 1.0,
+    "elevator_rad": 1.5e-4,
+    "pitch_rate_rad_per_s": 2e-4,
+    "alpha_rad": 4e-4,
+    "pitch_rad": 2e-4,
+    "load_factor": 4e-3,
+    "true_airspeed_m_per_s": 0.05,
+    "altitude_m": 0.2,
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    rig: Rig
+    record: Record
+
+    def __getitem__(self, channel: str) -> Floats:
+        return self.record[channel]
+
+
+def available() -> list[str]:
+    return [OWN, *(RECORDS if FOUNDERS.is_dir() else [])]
+
+
+@pytest.fixture(scope="module", params=available())
+def case(request: pytest.FixtureRequest) -> Case:
+    name = request.param
+    if name != OWN:
+        rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
+        return Case(rig, read_record(FOUNDERS / "examples" / f"{name}.csv"))
+    [scenario] = read_run("sweep")
+    noisy = scenario.rig.model_copy(update={"noise": NOISE})
+    changed = scenario.__class__(**{**scenario.__dict__, "rig": noisy})
+    return Case(noisy, fly(changed))
+
+
+def white(signal: Floats) -> float:
+    """Return the white noise in a smooth signal: fourth differences, gain √70."""
+    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+
+
+def rms(signal: Floats) -> float:
+    return float(np.sqrt(np.mean(signal**2)))
+
+
+def carried(stage: Callable[[Floats], Floats], signal: Floats, level: float) -> float:
+    """Return how much of a noise of `level` on its input a stage passes on, by ten tries."""
+    rng = np.random.default_rng(20)
+    base = stage(signal)
+    tries = [stage(signal + rng.normal(0.0, level, len(signal))) - base for _ in range(10)]
+    return float(np.sqrt(np.mean(np.square(tries))))
+
+
+def test_schedule(case: Case) -> None:
+    q = case["dynamic_pressure_Pa"]
+
+    def stage(pressure: Floats) -> Floats:
+        return replay_schedule(case.rig, "column", pressure)
+
+    left = rms(case["column_gradient_N_per_m"] - stage(q))
+    assert left <= 1.1 * carried(stage, q, NOISE["dynamic_pressure_Pa"]) + 1e-3
+
+
+def test_loader(case: Case) -> None:
+    force, computed = case["column_force_N"], case["column_computed_m"]
+    gradient = case["column_gradient_N_per_m"]
+
+    def stage(f: Floats) -> Floats:
+        return replay_loader(case.rig, "column", f, gradient, computed)[0]
+
+    floor = np.hypot(white(computed), carried(stage, force, white(force)))
+    assert rms(computed - stage(force)) <= 1.1 * floor
+
+
+def test_modifying_force(case: Case) -> None:
+    computed, product = case["column_computed_m"], case["column_modifying_force_N"]
+    gradient = case["column_gradient_N_per_m"]
+    host = case.rig.controls["column"].compensation
+    bend = host.bend if host.gradient else 0.0
+    added = gradient / (1.0 - bend * gradient)
+    added -= case.rig.controls["column"].loader.basic_gradient
+    floor = np.hypot(white(product), rms(added) * white(computed))
+    assert rms(product - added * computed) <= 1.1 * floor
+
+
+def test_linkage(case: Case) -> None:
+    computed, force = case["column_computed_m"], case["column_force_N"]
+
+    def stage(c: Floats) -> Floats:
+        return replay_linkage(case.rig, "column", c, force)
+
+    bend = case.rig.controls["column"].loader.bend
+    noise = np.hypot(white(case["column_deflection_m"]), bend * white(force))
+    floor = np.hypot(noise, carried(stage, computed, white(computed)))
+    assert rms(case["column_deflection_m"] - stage(computed)) <= 1.1 * floor
+
+
+def test_compensation_is_exact(case: Case) -> None:
+    left = case["column_estimate_m"] - replay_compensation(
+        case.rig, "column", case["column_computed_m"], case["column_force_N"]
+    )
+    assert np.max(np.abs(left)) < 2e-7  # the records' last digit
+
+
+def test_surface_and_airframe(case: Case) -> None:
+    """The aircraft flown by the record's own δ̂: nothing is left but white noise."""
+    if case.rig.flight is None:
+        assert "elevator_rad" not in case.record
+        return
+    frame_s = 1.0 / case.rig.frame_rate
+    commands = replay_surface(
+        case.rig, "column", case["column_estimate_m"], case["dynamic_pressure_Pa"]
+    )
+    airframe = JSBSimAirframe(case.rig.flight, frame_s, ["column"])
+    flown = []
+    for command in commands:
+        flown.append(airframe.motion())
+        airframe.step((command, 0.0, 0.0))
+    motion = np.array(flown)
+    names = ("dynamic_pressure_Pa", "load_factor", "elevator_rad", "pitch_rate_rad_per_s")
+    names += ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
+    for i, name in enumerate(names):
+        left = case[name] - motion[:, i]
+        assert rms(left) <= 1.1 * white(left), name
+        assert rms(left) == pytest.approx(NOISE[name], rel=0.1), name

@@ -1,0 +1,239 @@
+"""Schedule, modification, linkage, sensing, compensation and surface, each by its closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupled.flight.scenario import configure
+from coupled.rig import linkage, modification, sensing
+from coupled.rig.packing import pack
+from coupled.rig.parameters import Rig
+from coupled.rig.replay import drive_loader, replay_linkage, replay_schedule, replay_surface
+from coupled.rig.statics import bend_loss, static_line, static_point, uncompensated_loss
+from tests.rigs import G_STIFF, K_REPORT, bench
+
+SCHEDULE = "controls.column.schedule"
+
+
+# --- schedule ------------------------------------------------------------------------------------
+
+
+def test_schedule_interpolates_and_holds_its_ends() -> None:
+    q = np.array([-10.0, 0.0, 1500.0, 3000.0, 9000.0])
+    g = replay_schedule(bench(), "column", q)
+    assert g == pytest.approx([560.0, 560.0, (560.0 + G_STIFF) / 2, G_STIFF, G_STIFF], rel=1e-12)
+
+
+def test_schedule_scale_and_slope() -> None:
+    q = np.array([0.0, 1000.0])
+    scaled = replay_schedule(bench({f"{SCHEDULE}.pressure_scale": 1.5}), "column", q)
+    assert scaled == pytest.approx([560.0, 560.0 + (G_STIFF - 560.0) * 0.5], rel=1e-12)
+    sloped = replay_schedule(bench({f"{SCHEDULE}.slope": 0.5}), "column", q)
+    assert sloped == pytest.approx([560.0, 560.0 + 0.5 * (G_STIFF - 560.0) / 3], rel=1e-12)
+
+
+def test_pressure_lag_is_first_order() -> None:
+    rig = bench({f"{SCHEDULE}.pressure_lag_s": 0.4})
+    t = np.arange(200) / rig.frame_rate
+    q = np.where(t > 0.0, 3000.0, 0.0)
+    g = replay_schedule(rig, "column", q)
+    exact = 560.0 + (G_STIFF - 560.0) * (1.0 - np.exp(-t / 0.4))
+    assert g == pytest.approx(exact, rel=1e-12)
+
+
+# --- gradient modification: eqs. (9) to (12), appendix C -----------------------------------------
+
+
+@given(share=st.floats(0.0, 0.95), gradient=st.floats(1.0, 5000.0))
+def test_eq_12_gives_the_asked_gradient_at_the_grip(share: float, gradient: float) -> None:
+    bend = share / gradient
+    on_computed = modification.total_to_computed(gradient, bend)
+    computed = 0.03
+    force = on_computed * computed
+    assert force / (computed + bend * force) == pytest.approx(gradient, rel=1e-9)
+
+
+def two_segments(breakout: float, term: str) -> Rig:
+    return bench(
+        {
+            "breakout_N": breakout,
+            f"{SCHEDULE}.second_gradient_N_per_m": [300.0, 1000.0],
+            f"{SCHEDULE}.break_deflection_m": 0.05,
+            "controls.column.compensation.breakout_term": term,
+        }
+    )
+
+
+def test_two_segments_with_breakout_are_felt_exactly() -> None:
+    line = static_line(two_segments(9.0, "exact"), "column", 3000.0, np.linspace(0.001, 0.12, 200))
+    assert line.force == pytest.approx(line.specified, rel=1e-12)
+    assert line.estimate == pytest.approx(line.deflection, rel=1e-12)
+
+
+def test_appendix_c_as_printed_is_too_light_by_k_g_times_the_breakout() -> None:
+    """Cleveland, appendix C leaves out the term: the pilot feels K·G₁·F_BO too little."""
+    exact = two_segments(9.0, "exact")
+    printed = two_segments(9.0, "printed")
+    for deflection in (0.01, 0.03, -0.04):
+        right = static_point(exact, "column", 3000.0, deflection)
+        wrong = static_point(printed, "column", 3000.0, deflection)
+        missing = abs(right.force[0]) - abs(wrong.force[0])
+        assert missing == pytest.approx(K_REPORT * G_STIFF * 9.0, rel=1e-9)
+    plain = static_point(two_segments(0.0, "printed"), "column", 3000.0, 0.03)
+    assert plain.force[0] == pytest.approx(plain.specified[0], rel=1e-12)
+
+
+def test_the_loader_holds_the_two_segment_force() -> None:
+    rig = two_segments(9.0, "exact")
+    frames = 800
+    for force in (30.0, 160.0, -200.0):
+        nodes = np.full(frames * rig.substeps + 1, force)
+        first, second = np.full(frames, G_STIFF), np.full(frames, 1000.0)
+        x, _ = drive_loader(rig, "column", nodes, first, np.zeros(frames), None, second)
+        line = static_line(rig, "column", 3000.0, x[-1:])
+        assert line.force[0] == pytest.approx(force, rel=1e-6)
+
+
+# --- the report's numbers ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("deflection_in", "gradient_lb_per_in", "loss"), [(2.0, 12.5, 0.20), (7.0, 3.2, 0.0512)]
+)
+def test_the_reports_losses(deflection_in: float, gradient_lb_per_in: float, loss: float) -> None:
+    """Cleveland, p. 5: 0.4 in of 2 in lost, and 0.36 in of 7 in."""
+    gradient = gradient_lb_per_in * 175.126835
+    rig = bench({f"{SCHEDULE}.total_gradient_N_per_m": [gradient, gradient]})
+    right = static_point(configure(rig, "gradient only"), "column", 0.0, deflection_in * 0.0254)
+    lost = 1.0 - right.estimate[0] / right.deflection[0]
+    assert lost == pytest.approx(loss, rel=1e-3)
+    assert lost == pytest.approx(bend_loss(K_REPORT, gradient), rel=1e-9)
+    plain = static_point(configure(rig, "uncompensated"), "column", 0.0, deflection_in * 0.0254)
+    lost = 1.0 - plain.estimate[0] / plain.deflection[0]
+    assert lost == pytest.approx(uncompensated_loss(K_REPORT, gradient), rel=1e-9)
+    assert plain.force[0] / plain.specified[0] == pytest.approx(1 / (1 + K_REPORT * gradient))
+
+
+# --- linkage -------------------------------------------------------------------------------------
+
+
+def servo(changes: dict[str, Any], computed: np.ndarray, force: np.ndarray | float = 0.0) -> Any:
+    rig = bench({"bend_m_per_N": 0.0, "controls.column.compensation.bend_m_per_N": 0.0, **changes})
+    rig = rig.model_copy(update={"frame_rate": 2000.0})
+    return replay_linkage(rig, "column", computed, np.zeros_like(computed) + force)
+
+
+def test_servo_ramp_response() -> None:
+    w, z = 2 * math.pi * 18.0, 0.7
+    t = np.arange(2000) / 2000.0
+    x = servo({}, 0.1 * t)
+    wd = w * math.sqrt(1 - z * z)
+    lag = 2 * z / w
+    decay = np.exp(-z * w * t) * (
+        lag * np.cos(wd * t) + (2 * z * z - 1) / (w * math.sqrt(1 - z * z)) * np.sin(wd * t)
+    )
+    assert x == pytest.approx(0.1 * (t - lag + decay), abs=1e-9)
+
+
+@pytest.mark.parametrize("frequency_Hz", [2.0, 1000.0])
+def test_servo_is_stable_at_any_frequency(frequency_Hz: float) -> None:
+    x = servo({"servo_frequency_Hz": frequency_Hz}, np.full(8000, 0.02))
+    assert x[-1] == pytest.approx(0.02, rel=1e-9)
+
+
+def test_servo_rate_limit_is_the_slope() -> None:
+    t = np.arange(4000) / 2000.0
+    x = servo({"servo_rate_limit_m_per_s": 0.05}, np.where(t < 0.2, 0.0, 0.08))
+    moving = (x > 0.01) & (x < 0.06)
+    assert np.diff(x)[moving[:-1] & moving[1:]] * 2000.0 == pytest.approx(0.05, rel=1e-9)
+    assert x[-1] == pytest.approx(0.08, rel=1e-6)
+
+
+def test_backlash_lets_the_grip_lag_by_half_the_play_each_way() -> None:
+    t = np.arange(40000) / 2000.0
+    x = 0.04 * np.sin(2 * np.pi * t / 10.0)
+    loose = servo({"play_m": 0.006}, x)
+    tight = servo({}, x)
+    assert np.max(loose) == pytest.approx(0.04 - 0.003, rel=1e-4)
+    rising = (np.diff(tight)[:-1] > 0) & (t[1:-1] > 8.6) & (t[1:-1] < 12.0)
+    assert (tight - loose)[1:-1][rising] == pytest.approx(0.003, abs=1e-9)
+
+
+def test_bend_is_linear_or_saturates_towards_its_limit() -> None:
+    force = np.linspace(-400.0, 400.0, 101)
+    flat = np.zeros_like(force)
+    bent = servo({"bend_m_per_N": K_REPORT}, flat, force)
+    assert bent == pytest.approx(K_REPORT * force, rel=1e-12)
+    stiff = servo({"bend_m_per_N": K_REPORT, "bend_limit_m": 0.02}, flat, force)
+    assert stiff == pytest.approx(0.02 * np.tanh(K_REPORT * force / 0.02), rel=1e-12)
+    p = pack(bench({"bend_limit_m": 0.02}))[0]["parameters"]["linkage"]
+    ahead = (linkage.bend(p, 100.01) - linkage.bend(p, 99.99)) / 0.02
+    assert linkage.bend_slope(p, 100.0) == pytest.approx(ahead, rel=1e-7)
+
+
+def test_arc_eqs_15_to_17() -> None:
+    """The report: 1 % at 14°, 2 % at 20° (by its own series 19.8°)."""
+    for angle_deg, error in ((14.0, 0.01), (19.8, 0.02)):
+        rig = bench({"arc_geometry": True, "controls.column.length_m": 0.4})
+        p = pack(rig)[0]["parameters"]["linkage"]
+        along = 0.4 * math.radians(angle_deg)
+        assert 1.0 - linkage.transducer(p, along) / along == pytest.approx(error, rel=2e-2)
+
+
+# --- sensing and surface -------------------------------------------------------------------------
+
+
+@given(value=st.floats(-0.2, 0.2), bits=st.integers(6, 16))
+def test_a_converter_is_within_half_a_step(value: float, bits: int) -> None:
+    step = 2 * 0.2 / 2**bits
+    got = sensing.converted(value, step, 0.2)
+    assert abs(got - value) <= (0.5 if value < 0.2 - step else 1.0) * step + 1e-15
+    assert sensing.converted(got, step, 0.2) == pytest.approx(got, abs=1e-15)
+
+
+def test_scales_and_word_length_set_the_steps() -> None:
+    prefix = "controls.column.sensing"
+    rig = bench(
+        {
+            f"{prefix}.word_length_bits": 12,
+            f"{prefix}.s1_V_per_m": 500.0,
+            f"{prefix}.s2_V_per_N": 0.2,
+            f"{prefix}.s3_V_per_N": 0.25,
+        }
+    )
+    p = pack(rig)[0]["parameters"]["sensing"]
+    assert p["computed_step"] == pytest.approx(200.0 / 4096 / 500.0)
+    assert p["force_step"] == pytest.approx(200.0 / 4096 / 0.25)
+    assert p["product_step"] == pytest.approx(200.0 / 4096 / 0.2)
+    assert p["gradient_range"] == pytest.approx(500.0 / 0.2)
+
+
+def command(changes: dict[str, Any], believed: np.ndarray, q: float = 1000.0) -> np.ndarray:
+    rig = bench({f"controls.column.rigging.{k}": v for k, v in changes.items()})
+    return replay_surface(rig, "column", believed, np.full_like(believed, q))
+
+
+def test_surface_command_sign_travel_and_clip() -> None:
+    believed = np.array([0.0, 0.0889, -0.1778, 0.5])
+    assert command({}, believed) == pytest.approx([0.0, -0.5, 1.0, -1.0])
+
+
+def test_cable_stretch_lag_rate_play_and_offset() -> None:
+    frames = np.arange(300)
+    step = np.where(frames > 0, -0.1778, 0.0)
+    stretched = command({"stretch_loss_per_Pa": 1e-4}, step)
+    assert stretched[-1] == pytest.approx(1.0 / 1.1)
+    lagged = command({"lag_s": 0.2}, step)
+    assert lagged == pytest.approx(1.0 - np.exp(-frames / 100.0 / 0.2), abs=1e-12)
+    limited = command({"rate_limit_norm_per_s": 2.0}, step)
+    assert limited == pytest.approx(np.minimum(frames * 0.02, 1.0), abs=1e-12)
+    loose = command({"play_norm": 0.1}, -0.1778 * np.sin(frames / 30.0))
+    assert np.max(loose) == pytest.approx(0.95, abs=1e-3)
+    assert np.min(loose) == pytest.approx(-0.95, abs=1e-3)
+    assert command({"offset_norm": 0.03}, step)[0] == pytest.approx(0.03)

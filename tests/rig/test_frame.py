@@ -1,0 +1,150 @@
+"""The stages together on a bench: hands, multipliers, corrections, and repeatability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coupled.flight.loop import fly
+from coupled.flight.pilot import PILOTS
+from coupled.flight.scenario import Bench, RunFile, Scenario, configure
+from coupled.record import Record
+from coupled.schema import build
+from tests.rigs import G_STIFF, K_REPORT, bench
+
+
+def run(
+    pilot: dict[str, Any],
+    changes: dict[str, Any] | None = None,
+    q: float = 3000.0,
+    seconds: float = 6.0,
+    configuration: Any = None,
+    seed: int = 0,
+    frame_rate: float = 100.0,
+) -> Record:
+    rig = bench(changes).model_copy(update={"frame_rate": frame_rate})
+    if configuration:
+        rig = configure(rig, configuration)
+    told = Bench(time=[0.0], dynamic_pressure=[q])
+    file = RunFile(name="t", card="t", rig="t", duration=seconds, bench=told, seed=seed)
+    hand = build(PILOTS[pilot["kind"]], pilot, "t", "pilot.column")
+    here = Path(__file__)
+    return fly(Scenario(file, here, rig, here, {"column": hand}, "t"))
+
+
+CLAMP = {"kind": "clamp", "deflection_m": 0.0508}
+
+
+@pytest.mark.parametrize(
+    ("configuration", "loss", "felt"),
+    [
+        ("rigid", 0.0, 1.0),
+        ("uncompensated", 1 - 1 / (1 + K_REPORT * G_STIFF), 1 / (1 + K_REPORT * G_STIFF)),
+        ("deflection only", 0.0, 1 / (1 + K_REPORT * G_STIFF)),
+        ("gradient only", K_REPORT * G_STIFF, 1.0),
+        ("compensated", 0.0, 1.0),
+    ],
+)
+def test_the_clamp_shows_the_closed_form_of_each_configuration(
+    configuration: str, loss: float, felt: float
+) -> None:
+    record = run(CLAMP, configuration=configuration)
+    held = record["column_deflection_m"][-1]
+    assert held == pytest.approx(0.0508, rel=1e-6)
+    assert 1 - record["column_estimate_m"][-1] / held == pytest.approx(loss, abs=1e-6)
+    assert record["column_force_N"][-1] / (G_STIFF * held) == pytest.approx(felt, rel=1e-6)
+
+
+def test_the_loader_does_not_depend_on_the_frame_rate() -> None:
+    hand = {"kind": "doublet", "force_N": 40.0, "half_period_s": 0.6}
+    coarse = run(hand, {"friction_N": 3.0}, frame_rate=20.0)
+    fine = run(hand, {"friction_N": 3.0}, frame_rate=100.0)
+    every = fine["column_computed_m"][::5]
+    assert coarse["column_computed_m"] == pytest.approx(every, abs=1e-12)
+    assert np.max(np.abs(every)) > 0.01
+
+
+@given(
+    share=st.floats(0.0, 0.6),
+    force=st.floats(5.0, 150.0),
+    q=st.floats(0.0, 5000.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_compensated_the_host_always_has_the_true_deflection(
+    share: float, force: float, q: float
+) -> None:
+    bend = share / G_STIFF
+    changes = {"bend_m_per_N": bend, "controls.column.compensation.bend_m_per_N": bend}
+    record = run({"kind": "ramp", "force_N": force, "ramp_s": 2.0}, changes, q, 8.0)
+    held = record["column_deflection_m"][-1]
+    if record["column_stop"].any():
+        return
+    assert record["column_estimate_m"][-1] == pytest.approx(held, rel=1e-6)
+    assert record["column_gradient_N_per_m"][-1] * held == pytest.approx(force, rel=1e-5)
+
+
+def test_the_host_may_believe_another_bend_than_the_real_one() -> None:
+    changes = {"controls.column.compensation.bend_m_per_N": 0.5 * K_REPORT}
+    record = run({"kind": "step", "force_N": 60.0}, changes, seconds=8.0)
+    half = 0.5 * K_REPORT * 60.0
+    assert record["column_deflection_m"][-1] - record["column_estimate_m"][-1] == pytest.approx(half)
+
+
+def test_the_digital_product_is_held_over_the_frame_and_steps_by_its_change() -> None:
+    hand = {"kind": "sweep", "force_N": 40.0, "duration_s": 5.0}
+    digital = run(hand, {"multiplier": "digital"})
+    product = digital["column_modifying_force_N"]
+    gain = G_STIFF / (1 - K_REPORT * G_STIFF) - 560.0
+    assert product == pytest.approx(gain * digital["column_computed_m"], rel=1e-9, abs=1e-12)
+    steps = digital["column_force_step_N"][1:]
+    assert steps == pytest.approx(np.diff(product), rel=1e-9, abs=1e-9)
+    hybrid = run(hand, {"multiplier": "hybrid"})
+    assert np.max(np.abs(hybrid["column_force_step_N"])) < 1e-9 < np.max(np.abs(steps))
+
+
+def test_a_wrong_scale_is_read_and_used_by_the_host() -> None:
+    changes = {
+        "controls.column.sensing.deflection_scale": 1.1,
+        "bend_m_per_N": 0.0,
+        "controls.column.compensation.bend_m_per_N": 0.0,
+    }
+    record = run({"kind": "step", "force_N": 50.0}, changes, seconds=8.0)
+    assert record["column_estimate_m"][-1] / record["column_deflection_m"][-1] == pytest.approx(1.1)
+
+
+def test_a_coarse_converter_shows_in_the_estimate() -> None:
+    prefix = "controls.column.sensing"
+    changes = {
+        f"{prefix}.word_length_bits": 8,
+        f"{prefix}.s1_V_per_m": 500.0,
+        f"{prefix}.s2_V_per_N": 0.2,
+        f"{prefix}.s3_V_per_N": 0.25,
+    }
+    record = run({"kind": "ramp", "force_N": 80.0, "ramp_s": 4.0}, changes)
+    step = 200.0 / 256 / 500.0
+    read = record["column_computed_m"] / step
+    assert read == pytest.approx(np.round(read), abs=1e-9)
+    assert len(np.unique(read)) > 10
+
+
+def test_reaching_a_stop_is_marked_in_record_and_manifest() -> None:
+    record = run({"kind": "ramp", "force_N": 900.0, "ramp_s": 2.0})
+    met = np.flatnonzero(record["column_stop"])
+    assert met.size
+    assert record["column_computed_m"][met[0] + 1] == pytest.approx(0.1778)
+    assert record.manifest["stop_first_met_s"]["column"] == record.time_s[met[0]]
+
+
+def test_noise_is_of_the_level_asked_and_of_the_seed() -> None:
+    changes = {"noise.column_force_N": 0.5}
+    hand = {"kind": "ramp", "force_N": 1e-9, "ramp_s": 1.0}
+    one, again, other = (run(hand, changes, seconds=60.0, seed=s) for s in (1, 1, 2))
+    assert np.array_equal(one.data, again.data)
+    assert not np.array_equal(one.data, other.data)
+    assert np.std(one["column_force_N"]) == pytest.approx(0.5, rel=0.05)
+    assert np.std(one["column_estimate_m"]) == pytest.approx(0.5 * K_REPORT, rel=0.05)
