@@ -163,7 +163,8 @@ def _felt_and_specified(
     pressure = record["dynamic_pressure_Pa"][held]
     loader = rig.controls[control].loader
     preload = np.sign(deflection) * loader.breakout
-    weight = loader.bob_weight * (record["load_factor"][held] - 1.0)
+    flown = rig.flight is not None
+    weight = loader.bob_weight * (record["load_factor"][held] - 1.0) if flown else 0.0
     specified = specified_force(rig, control, pressure, deflection)
     felt = record[channel(control, "force")][held]
     return float(np.mean(felt - preload - weight)), float(np.mean(specified - preload))

@@ -177,20 +177,25 @@ def plot(
 
 @app.command()
 def runs(json_file: JsonOption = "") -> None:
-    """List the shipped run files, each with its card, and the shipped rigs."""
+    """List the shipped run files, what each shows, and the shipped rigs."""
     from coupled.schema import load_toml
 
     cards = {name: load_toml(path) for name, path in shipped_runs().items()}
     if json_file != "-":
-        table = Table("run", "rig", "what it shows", title="Shipped runs", show_lines=True)
+        table = Table("run", "rig", "what it shows", box=None, pad_edge=False)
         for name, card in cards.items():
-            table.add_row(name, card["rig"], " ".join(card["card"].split()))
+            table.add_row(name, card["rig"], _sentence(card["card"]))
         out.print(table)
-        out.print("rigs: " + ", ".join(shipped_rigs()))
+        out.print("\nrigs: " + ", ".join(shipped_rigs()))
     rows = [
         {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()
     ]
     _give_json(rows, json_file)
+
+
+def _sentence(card: str) -> str:
+    """Return the first sentence of a card."""
+    return " ".join(card.split()).partition(". ")[0].rstrip(".") + "."
 
 
 @contextmanager

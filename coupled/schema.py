@@ -88,7 +88,22 @@ _UNITS = frozenset(
     (
         *("m", "mm", "cm", "in", "inch", "ft", "rad", "deg", "degrees"),
         *("kg", "g", "lb", "lbs", "lbf", "slug", "n", "kn", "pa", "psf", "psi"),
-        *("s", "ms", "hz", "kt", "kts", "knots", "per", "norm", "v", "volt", "volts", "bits"),
+        *(
+            "s",
+            "ms",
+            "min",
+            "h",
+            "hz",
+            "kt",
+            "kts",
+            "knots",
+            "per",
+            "norm",
+            "v",
+            "volt",
+            "volts",
+            "bits",
+        ),
     )
 )
 

@@ -1,6 +1,6 @@
 """The aircraft: the only module that knows JSBSim.
 
-An `Airframe` is trimmed level, takes the commands of elevator, aileron and rudder
+The airframe is trimmed level, takes the commands of elevator, aileron and rudder
 (about trim, ±1 for the whole travel) and gives the motion. It opens no socket,
 writes no file and prints nothing: a model's own inputs and outputs are disabled
 before they start, and JSBSim's log is kept to be quoted where something fails.
@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import jsbsim
 
@@ -50,19 +49,6 @@ _ALTITUDE = LONGITUDINAL.index("altitude_m")
 _ELEVATOR = LONGITUDINAL.index("elevator_rad")
 _PITCH_RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
-
-
-class Airframe(Protocol):
-    """What the frame loop flies: an aircraft, or a bench that only tells q̄."""
-
-    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
-    step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
-
-    def trouble(self, motion: tuple[float, ...]) -> str:
-        """Return why the flight cannot go on from this motion, or an empty string."""
-
-    def extra(self) -> tuple[float, ...]:
-        """Return the further properties that a run asked for."""
 
 
 class _Log(jsbsim.FGLogger):
@@ -308,80 +294,3 @@ def _stepper(
         run()
 
     return three
-
-
-class Bench:
-    """No aircraft: the dynamic pressure that the host is told, from a schedule in time."""
-
-    def __init__(self, frame_s: float, pressures_Pa: Sequence[tuple[float, float]]) -> None:
-        self._frame_s = frame_s
-        self._points = list(pressures_Pa)
-        self._k = 0
-        self.motion = self._told
-        self.step = self._next
-
-    def _told(self) -> tuple[float, ...]:
-        time = self._k * self._frame_s
-        points = self._points
-        if time <= points[0][0]:
-            return (points[0][1],)
-        for (t0, q0), (t1, q1) in pairwise(points):
-            if time < t1:
-                return (q0 + (q1 - q0) * (time - t0) / (t1 - t0),)
-        return (points[-1][1],)
-
-    def _next(self, commands: tuple[float, float, float], /) -> None:
-        self._k += 1
-
-    def extra(self) -> tuple[float, ...]:
-        """Return nothing: a bench has no properties."""
-        return ()
-
-    def trouble(self, motion: tuple[float, ...]) -> str:
-        """Return nothing: a bench has no trouble."""
-        return ""
-
-
-def check_direct_controls(
-    flight: Flight, frame_s: float, controls: Sequence[str], **where: Any
-) -> Mapping[str, float]:
-    """Fly a small step of each control on an aircraft of its own, and refuse what is not direct.
-
-    Direct means: within one step the surface stands at its new place, stays there, and the
-    aircraft turns to the side that the rig's signs say. Returns {control: surface travel in
-    rad per unit of command}.
-    """
-    rates = {"column": "pitch_rate_rad_per_s", "wheel": "roll_rate_rad_per_s"}
-    travel = {}
-    for i, control in enumerate(controls):
-        surface = SURFACES[control]
-        still = JSBSimAirframe(flight, frame_s, controls, **where)
-        moved = JSBSimAirframe(flight, frame_s, controls, **where)
-        step = 0.05 if control == "wheel" else -0.05  # positive force of the pilot
-        commands = (step * (i == 0), step * (i == 1), step * (i == 2))
-        channels = motion_channels(controls, flown=True)
-        at = channels.index(f"{surface}_rad")
-        turn = channels.index(rates.get(control, "yaw_rate_rad_per_s"))
-        positions, rate = [], 0.0
-        for _ in range(max(2, round(0.1 / frame_s))):
-            still.step((0.0, 0.0, 0.0))
-            moved.step(commands)
-            positions.append(moved.motion()[at] - still.motion()[at])
-            rate = moved.motion()[turn] - still.motion()[turn]
-        first, last = positions[0], positions[-1]
-        fault = ""
-        if not math.isfinite(first) or abs(first) < 1e-4:
-            fault = f"does not move its {surface} at once"
-        elif abs(last - first) > 0.25 * abs(first):
-            fault = f"moves its {surface} by more than the command (a control law or a lag)"
-        elif rate <= 0.0:
-            fault = f"turns the wrong way on a positive {control}"
-        if fault:
-            raise InputError(
-                where.get("file", "rig"),
-                "flight.model",
-                f"{flight.model} has no direct controls: it {fault};"
-                " c172p, T37, 737 and B747 fly with theirs",
-            )
-        travel[control] = first / step
-    return travel

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from coupled.channels import TIME, control_channels, record_channels
 from coupled.files import sha256
-from coupled.flight.airframe import Airframe, Bench, JSBSimAirframe, check_direct_controls
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.bench import Airframe, Bench
+from coupled.flight.direct import check_direct_controls
 from coupled.flight.pilot import Action
 from coupled.flight.scenario import Scenario
 from coupled.record import Record

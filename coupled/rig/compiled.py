@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from numba.core import config
 
-# Below this a decaying state is at rest: further down lie subnormal numbers, a hundred times slower.
+# Below this a decaying state is at rest; further down subnormal numbers slow the processor.
 TINY = 1e-100
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -11,8 +11,8 @@ since the loader sees δc = δ − K·F. With a breakout, solving that for δ gi
 
     F_extra = G₁·K·F_BO/(1 − K·G₁)
 
-which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G₁·F_BO
-too little at every deflection. The break lies at δc₁ = δ₁ − K·F(δ₁).
+which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too
+little at every deflection, G being the slope there. The break lies at δc₁ = δ₁ − K·F(δ₁).
 """
 
 from __future__ import annotations

@@ -92,7 +92,9 @@ def test_the_host_may_believe_another_bend_than_the_real_one() -> None:
     changes = {"controls.column.compensation.bend_m_per_N": 0.5 * K_REPORT}
     record = run({"kind": "step", "force_N": 60.0}, changes, seconds=8.0)
     half = 0.5 * K_REPORT * 60.0
-    assert record["column_deflection_m"][-1] - record["column_estimate_m"][-1] == pytest.approx(half)
+    assert record["column_deflection_m"][-1] - record["column_estimate_m"][-1] == pytest.approx(
+        half
+    )
 
 
 def test_the_digital_product_is_held_over_the_frame_and_steps_by_its_change() -> None:

@@ -1,0 +1,5 @@
+"""`python -m coupled`: the command line."""
+
+from coupled.cli import main
+
+main()

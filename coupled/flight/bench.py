@@ -1,0 +1,52 @@
+"""What the frame loop flies, and the simplest of it: a bench, where q̄ is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Protocol
+
+
+class Airframe(Protocol):
+    """What the frame loop flies: an aircraft, or a bench that only tells q̄."""
+
+    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
+    step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
+
+    def trouble(self, motion: tuple[float, ...]) -> str:
+        """Return why the flight cannot go on from this motion, or an empty string."""
+
+    def extra(self) -> tuple[float, ...]:
+        """Return the further properties that a run asked for."""
+
+
+class Bench:
+    """No aircraft: the dynamic pressure that the host is told, from a schedule in time."""
+
+    def __init__(self, frame_s: float, pressures_Pa: Sequence[tuple[float, float]]) -> None:
+        self._frame_s = frame_s
+        self._points = list(pressures_Pa)
+        self._k = 0
+        self.motion = self._told
+        self.step = self._next
+
+    def _told(self) -> tuple[float, ...]:
+        time = self._k * self._frame_s
+        points = self._points
+        if time <= points[0][0]:
+            return (points[0][1],)
+        for (t0, q0), (t1, q1) in pairwise(points):
+            if time < t1:
+                return (q0 + (q1 - q0) * (time - t0) / (t1 - t0),)
+        return (points[-1][1],)
+
+    def _next(self, commands: tuple[float, float, float], /) -> None:
+        self._k += 1
+
+    def extra(self) -> tuple[float, ...]:
+        """Return nothing: a bench has no properties."""
+        return ()
+
+    def trouble(self, motion: tuple[float, ...]) -> str:
+        """Return nothing: a bench has no trouble."""
+        return ""

@@ -1,0 +1,116 @@
+"""Rig files: what is read, and each fault in one line with its key."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coupled.errors import InputError
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import change, read_rig, rig_from_table
+from tests.rigs import BENCH, bench
+
+LOADER = "controls.column.loader"
+SCHEDULE = "controls.column.schedule"
+HOST = "controls.column.compensation"
+
+
+@pytest.mark.parametrize("name", list(shipped_rigs()))
+def test_every_shipped_rig_reads(name: str) -> None:
+    rig = read_rig(shipped_rigs()[name])
+    assert rig.name == name
+    assert rig.substeps * rig.frame_rate >= 2000.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        (f"{LOADER}.mass_kg", 0.0, "greater than 0"),
+        (f"{LOADER}.mass_kg", "4", "valid number"),
+        (f"{LOADER}.damping_N_s_per_m", -1.0, "greater than or equal to 0"),
+        (f"{LOADER}.bend_m_per_N", float("nan"), "finite"),
+        (f"{LOADER}.bend_m_per_N", float("inf"), "finite"),
+        (f"{LOADER}.bend_in_per_lb", 0.016, "give bend_m_per_N instead"),
+        (f"{LOADER}.friction", 2.0, "give friction_N instead"),
+        (f"{LOADER}.frction_N", 2.0, "did you mean friction_N?"),
+        (f"{LOADER}.breakaway_N", 1.0, "below friction_N"),
+        (f"{LOADER}.multiplier", "analog", "'hybrid' or 'digital'"),
+        (f"{LOADER}.delay_s", 5.0, "less than or equal to 0.2"),
+        ("controls.column.travel_in", 7.0, "give travel_m instead"),
+        ("controls.column.surface", "rudder", "moves the elevator"),
+        ("controls.colunm", {}, "did you mean column?"),
+        (f"{SCHEDULE}.dynamic_pressure_Pa", [0.0, 3000.0, 2000.0], "must rise"),
+        (f"{SCHEDULE}.dynamic_pressure_psf", [0.0, 60.0], "give dynamic_pressure_Pa"),
+        (f"{SCHEDULE}.total_gradient_N_per_m", [560.0], "has 1 values"),
+        (f"{SCHEDULE}.total_gradient_N_per_m", [560.0, -3.0], "cannot be negative"),
+        (f"{SCHEDULE}.total_gradient_N_per_m", [560.0, "stiff"], "valid number"),
+        (f"{SCHEDULE}.break_deflection_m", 0.05, "second segment needs both"),
+        (f"{HOST}.deflection", 1, "valid boolean"),
+        ("frame_rate_Hz", 0.0, "greater than or equal to 1"),
+        ("frame_rate_kHz", 0.1, "give frame_rate_Hz instead"),
+        ("noise.column_force_lb", 0.1, "no such channel"),
+        ("noise.column_force_N", -0.1, "cannot be negative"),
+        ("flight", {"model": "c172p"}, "is missing"),
+        ("flight", 3, "should be a table"),
+        ("controls.column.sensing.word_length_bits", 12, "must be given"),
+    ],
+)
+def test_a_fault_is_one_line_with_its_key(key: str, value: Any, says: str) -> None:
+    table = copy.deepcopy(BENCH)
+    change(table, key, value)
+    if key.endswith("breakaway_N"):
+        change(table, f"{LOADER}.friction_N", 3.0)
+    with pytest.raises(InputError) as caught:
+        rig_from_table(table, "my-rig.toml")
+    text = str(caught.value)
+    assert text.startswith("my-rig.toml: ")
+    assert key.rsplit(".", maxsplit=1)[-1] in text
+    assert says in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("where", [LOADER, HOST])
+@pytest.mark.parametrize("table", ["total_gradient_N_per_m", "second_gradient_N_per_m"])
+def test_no_gradient_stiffer_than_the_structure(where: str, table: str) -> None:
+    changes: dict[str, Any] = {f"{where}.bend_m_per_N": 1 / 2500.0}
+    changes[f"{SCHEDULE}.{table}"] = [560.0, 2600.0]
+    if table.startswith("second"):
+        changes[f"{SCHEDULE}.break_deflection_m"] = 0.05
+        changes[f"{SCHEDULE}.total_gradient_N_per_m"] = [560.0, 2000.0]
+    with pytest.raises(InputError, match=r"K·G_T = 1\.04 at 3000 Pa.*must stay below 0\.000385"):
+        bench(changes)
+
+
+def test_files_that_are_no_rigs(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    with pytest.raises(InputError, match="cannot be read"):
+        read_rig(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="UTF-8"):
+        read_rig(path)
+    path.write_text("name = ")
+    with pytest.raises(InputError, match="not valid TOML"):
+        read_rig(path)
+    path.write_text("")
+    with pytest.raises(InputError, match="controls: needs at least one"):
+        read_rig(path)
+
+
+def test_a_wheel_is_in_rad() -> None:
+    table = copy.deepcopy(BENCH)
+    column = table["controls"].pop("column")
+    wheel: dict[str, Any] = {"surface": "aileron", "travel_rad": 1.5}
+    for section in ("loader", "schedule", "compensation"):
+        wheel[section] = {
+            key.replace("_m_per_N", "_rad_per_N").replace("_per_m", "_per_rad"): value
+            for key, value in column[section].items()
+        }
+    wheel["loader"]["bend_rad_per_N"] = wheel["compensation"]["bend_rad_per_N"] = 1e-4
+    table["controls"]["wheel"] = wheel
+    assert rig_from_table(table, "t").controls["wheel"].travel == 1.5
+    wheel["travel_m"] = wheel.pop("travel_rad")
+    with pytest.raises(InputError, match="give travel_rad instead"):
+        rig_from_table(table, "t")

@@ -1,0 +1,64 @@
+"""Every shipped run file, flown in every case and configuration, and what its card promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.authority import Flight, compare
+from coupled.flight.scenario import read_run
+from coupled.resources import shipped_runs
+
+
+def flown(name: str) -> list[Flight]:
+    return compare(read_run(name))
+
+
+@pytest.mark.parametrize("name", sorted(set(shipped_runs()) - {"worst-case", "multiplier"}))
+def test_every_run_flies_to_its_end(name: str) -> None:
+    flights = flown(name)
+    scenario = flights[0].scenario
+    assert len(flights) == len(read_run(name)) * len(scenario.run.configurations)
+    for flight in flights:
+        assert flight.outcome.ended_early == ""
+        assert len(flight.record) == scenario.frames
+        assert np.all(np.isfinite(flight.record.data))
+        assert flight.record.manifest["stop_first_met_s"] == {}
+        if flight.configuration in ("rigid", "compensated", "deflection only"):
+            assert abs(flight.outcome.loss) < 0.03
+        else:
+            assert flight.outcome.loss > 0.02
+
+
+def test_the_reports_worst_case_is_flown_to_a_thousandth_of_its_closed_form() -> None:
+    """Cleveland, p. 5: 20 % lost at 2 in and 12.5 lb/in, about 5 % at 7 in and 3.2 lb/in."""
+    flights = {(f.outcome.case[:4], f.configuration): f.outcome for f in flown("worst-case")}
+    for case, share in (("2 in", 0.016 * 12.5), ("7 in", 0.016 * 3.2)):
+        gradient_only = flights[case, "gradient only"]
+        assert gradient_only.loss == pytest.approx(share, abs=1e-3)
+        assert gradient_only.loss == pytest.approx(gradient_only.loss_closed_form, abs=1e-3)
+        plain = flights[case, "uncompensated"]
+        assert plain.loss == pytest.approx(share / (1 + share), abs=1e-3)
+        assert plain.felt_ratio == pytest.approx(1 / (1 + share), abs=2e-3)
+        for whole in ("rigid", "compensated"):
+            assert flights[case, whole].loss == pytest.approx(0.0, abs=1e-3)
+            assert flights[case, whole].felt_ratio == pytest.approx(1.0, abs=2e-3)
+    stiff = {name: o for (case, name), o in flights.items() if case == "2 in"}
+    rate = {name: o.peak_rate_rad_per_s or 0.0 for name, o in stiff.items()}
+    assert rate["gradient only"] < 0.82 * rate["rigid"]
+    assert rate["compensated"] == pytest.approx(rate["rigid"], rel=0.02)
+
+
+def test_the_digital_multipliers_steps_are_what_pilots_would_not_tolerate() -> None:
+    steps = {flight.outcome.case: flight.outcome.force_step_N for flight in flown("multiplier")}
+    for rate in (20, 60, 120):
+        assert steps[f"hybrid {rate} Hz"] < 0.5
+        assert steps[f"digital {rate} Hz"] > 50 * steps[f"hybrid {rate} Hz"]
+    assert steps["digital 20 Hz"] > 2 * steps["digital 60 Hz"] > 3 * steps["digital 120 Hz"]
+
+
+def test_appendix_c_as_printed_feels_too_light() -> None:
+    felt = {f.outcome.case[:5]: f.outcome.felt_ratio for f in flown("appendix-c")[1::2]}
+    assert felt["exact"] == pytest.approx(1.0, abs=1e-3)
+    missing = 1.0 - felt["as pr"]
+    assert 0.003 < missing < 0.01
