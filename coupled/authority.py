@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import channel
+from coupled.channels import ControlName, channel
 from coupled.flight.loop import fly
 from coupled.flight.scenario import Configuration, Scenario
 from coupled.record import Record
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import ControlName, Rig
+from coupled.rig.parameters import Rig
 from coupled.rig.statics import specified_force, static_point
 
 Floats = NDArray[np.float64]

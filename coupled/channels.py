@@ -1,4 +1,4 @@
-"""The names of a record's channels; each ends in its unit.
+"""The names of controls, and of a record's channels; each channel ends in its unit.
 
 Those of a control come from the rig, those of the motion from the airframe. A bench
 record has of the motion only the dynamic pressure that the host was told.
@@ -7,8 +7,17 @@ record has of the motion only the dynamic pressure that the host was told.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
-from coupled.rig.parameters import unit_of
+ControlName = Literal["column", "wheel", "pedals"]
+CONTROL_NAMES: tuple[ControlName, ...] = ("column", "wheel", "pedals")
+SURFACES = {"column": "elevator", "wheel": "aileron", "pedals": "rudder"}
+
+
+def unit_of(control: str) -> str:
+    """Return the unit of a control's deflection."""
+    return "rad" if control == "wheel" else "m"
+
 
 TIME = "time_s"
 

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coupled.channels import channel, control_channels
+from coupled.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.errors import InputError
 from coupled.files import write_whole
 from coupled.record import Record
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import CONTROL_NAMES, unit_of
 from coupled.rig.statics import specified_force
 from coupled.units import DEGREE_rad
 
@@ -48,7 +48,8 @@ def save(figure: Figure, path: Path) -> None:
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()[1:]
     no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
-    write_whole(path, lambda part: figure.savefig(part, dpi=130, format=kind, metadata=no_date))
+    with rc_context({"svg.hashsalt": "coupled"}):
+        write_whole(path, lambda part: figure.savefig(part, dpi=130, format=kind, metadata=no_date))
 
 
 def draw_comparison(flights: Sequence[Flight]) -> Figure:

@@ -16,9 +16,9 @@ from typing import Any
 
 import jsbsim
 
-from coupled.channels import LATERAL, LONGITUDINAL, motion_channels
+from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
-from coupled.rig.parameters import SURFACES, Flight
+from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s, PSF_Pa
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from coupled.channels import motion_channels
+from coupled.channels import SURFACES, motion_channels
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.rig.parameters import SURFACES, Flight
+from coupled.rig.parameters import Flight
 
 
 def check_direct_controls(

@@ -13,11 +13,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from coupled.channels import channel
+from coupled.channels import CONTROL_NAMES, ControlName, channel, unit_of
 from coupled.errors import InputError, nearest
 from coupled.flight.pilot import PILOTS, Pilot, Table, read_force_table
 from coupled.resources import find, shipped_rigs, shipped_runs
-from coupled.rig.parameters import CONTROL_NAMES, ControlName, Rig, unit_of
+from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import change, read_rig
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
 

@@ -10,16 +10,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from coupled.channels import ControlName
 from coupled.schema import Section, quantity
-
-ControlName = Literal["column", "wheel", "pedals"]
-CONTROL_NAMES: tuple[ControlName, ...] = ("column", "wheel", "pedals")
-SURFACES = {"column": "elevator", "wheel": "aileron", "pedals": "rudder"}
-
-
-def unit_of(control: str) -> str:
-    """Return the unit of a control's deflection."""
-    return "rad" if control == "wheel" else "m"
 
 
 class Loader(Section):

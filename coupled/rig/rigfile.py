@@ -13,17 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from coupled.channels import noisy_channels
+from coupled.channels import CONTROL_NAMES, SURFACES, noisy_channels, unit_of
 from coupled.errors import InputError, nearest
 from coupled.rig.loader import DELAY_SLOTS
-from coupled.rig.parameters import (
-    CONTROL_NAMES,
-    SURFACES,
-    Control,
-    Flight,
-    Rig,
-    unit_of,
-)
+from coupled.rig.parameters import Control, Flight, Rig
 from coupled.rig.schedule import MAX_ROWS
 from coupled.schema import build, file_keys, known_keys, load_toml
 

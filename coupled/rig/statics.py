@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from coupled.channels import ControlName
 from coupled.rig.compensation import estimate
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import pack
-from coupled.rig.parameters import ControlName, Rig
+from coupled.rig.parameters import Rig
 from coupled.rig.schedule import gradients
 
 Floats = NDArray[np.float64]

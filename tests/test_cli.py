@@ -1,0 +1,160 @@
+"""The command line as its users meet it: outputs, exit codes, and nothing written on a fault."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from coupled.channels import record_channels
+from coupled.plots import draw_record, save
+from coupled.record import read_record
+
+ROOT = Path(__file__).parents[1]
+SHORT = """
+name = "short"
+card = "A short pull."
+rig = "report-column"
+duration_s = 2.0
+configurations = ["rigid", "compensated"]
+
+[pilot.column]
+kind = "step"
+start_s = 0.2
+force_N = 40.0
+"""
+
+
+def coupled(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
+    return subprocess.run(
+        [sys.executable, "-m", "coupled", *words],
+        check=False,
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def files(folder: Path) -> set[str]:
+    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "short.toml").write_text(SHORT)
+    return tmp_path
+
+
+def test_help_has_examples_and_takes_no_physics_to_show(folder: Path) -> None:
+    for words in ([], ["compare"], ["fly"], ["plot"], ["runs"]):
+        done = coupled(folder, *words, "--help")
+        assert done.returncode == 0
+        assert done.stderr == ""
+    assert "Examples" in coupled(folder, "compare", "--help").stdout
+    code = "import sys, coupled.cli; print([m for m in ('numba', 'jsbsim', 'matplotlib', 'polars')"
+    code += " if m in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_compare_writes_figure_and_json(folder: Path) -> None:
+    done = coupled(folder, "compare", "short.toml", "--figure", "a/b.pdf", "--json", "t.json")
+    assert done.returncode == 0, done.stderr
+    assert files(folder) == {"short.toml", "a/b.pdf", "t.json"}
+    assert (folder / "a/b.pdf").read_bytes().startswith(b"%PDF")
+    table = json.loads((folder / "t.json").read_text())
+    assert [row["configuration"] for row in table] == ["rigid", "compensated"]
+    assert table[0]["control"] == "column"
+    assert table[0]["force_N"] == pytest.approx(40.0)
+    printed = coupled(folder, "compare", "short.toml", "--no-figure", "--json", "-")
+    assert json.loads(printed.stdout) == table
+
+
+def test_fly_writes_a_record_that_other_tools_read(folder: Path) -> None:
+    done = coupled(folder, "fly", "short.toml", "-o", "r.parquet", "--configuration", "rigid")
+    assert done.returncode == 0, done.stderr
+    assert files(folder) == {"short.toml", "r.parquet", "r.manifest.json"}
+    frame = pl.read_parquet(folder / "r.parquet")
+    assert tuple(frame.columns) == record_channels(["column"], flown=True)
+    assert frame.height == 240
+    manifest = json.loads((folder / "r.manifest.json").read_text())
+    assert manifest["rig"]["controls"]["column"]["loader"]["bend"] == 0.0
+    drawn = coupled(folder, "plot", "r.parquet")
+    assert drawn.returncode == 0, drawn.stderr
+    assert (folder / "r.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_figure_is_the_same_bytes_again(tmp_path: Path, folder: Path) -> None:
+    assert coupled(folder, "fly", "short.toml", "-o", "r.csv").returncode == 0
+    record = read_record(folder / "r.csv")
+    for suffix in ("png", "pdf", "svg"):
+        for name in ("one", "two"):
+            save(draw_record(record, "r"), tmp_path / f"{name}.{suffix}")
+        one, two = (tmp_path / f"{name}.{suffix}" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes(), suffix
+
+
+def test_a_flight_that_ends_early_says_so_and_exits_with_1(folder: Path) -> None:
+    text = SHORT.replace("force_N = 40.0", "force_N = -80.0").replace("= 2.0", "= 30.0")
+    text += '\n[[case]]\nlabel = "low"\nrig = { "flight.altitude_m" = 60.0 }\n'
+    (folder / "short.toml").write_text(text)
+    done = coupled(folder, "fly", "short.toml", "-o", "r.csv")
+    assert done.returncode == 1
+    assert "ended early: the aircraft met the ground at" in done.stderr
+    assert json.loads((folder / "r.manifest.json").read_text())["ended_early"]["time_s"] > 0.5
+    assert len(read_record(folder / "r.csv")) > 60
+    both = coupled(folder, "compare", "short.toml", "--no-figure")
+    assert both.returncode == 1
+    assert "ended early" in both.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["compare", "nothing"], "nothing: is no shipped run; known: appendix-c"),
+        (["compare", "nothing.toml"], "nothing.toml: there is no such run file"),
+        (["compare", "short.toml", "--figure", "a.bmp"], "a.bmp: a figure ends in .png"),
+        (["fly", "short.toml", "-o", "a.xls"], "a.xls: a record ends in .csv or .parquet"),
+        (["fly", "short.toml", "--case", "x"], "--case: no case 'x'; known: short"),
+        (["fly", "short.toml", "--configuration", "rigd"], "did you mean rigid?"),
+        (["plot", "short.toml"], "a record ends in .csv or .parquet"),
+        (["plot", "none.csv"], "none.csv: cannot be read"),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_nothing_written(
+    folder: Path, words: list[str], says: str
+) -> None:
+    done = coupled(folder, *words)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert says in done.stderr
+    assert done.stdout == ""
+    assert files(folder) == {"short.toml"}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a,b\n1,2\n", "time_s: is missing"),
+        ("time_s,a\n0,x\n", "a: holds something that is not a number"),
+        ("time_s,a\n1,1\n0,1\n", "time_s: must rise from row to row"),
+        ("", "is not a table"),
+    ],
+)
+def test_a_table_that_is_no_record(folder: Path, text: str, says: str) -> None:
+    (folder / "r.csv").write_text(text)
+    done = coupled(folder, "plot", "r.csv")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
