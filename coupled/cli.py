@@ -18,10 +18,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from typer.exceptions import TyperException
 
 from coupled import __version__
 from coupled.errors import InputError
-from coupled.files import write_text
+from coupled.files import check_target, write_text
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
 
 if TYPE_CHECKING:
@@ -49,13 +50,28 @@ JsonOption = Annotated[
 def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""
     try:
-        app(standalone_mode=True)
+        code = app(standalone_mode=False)
     except InputError as error:
-        err.print(f"[red]error:[/] {escape(str(error))}", soft_wrap=True)
-        sys.exit(2)
+        _say_error(str(error))
+        code = 2
+    except TyperException as error:  # a word of the command line that it does not know
+        _say_error(" ".join(str(error).split()) + " (coupled --help shows what there is)")
+        code = 2
+    except (typer.Abort, KeyboardInterrupt):
+        code = 130
     except BrokenPipeError:
         sys.stderr.close()
-        sys.exit(1)
+        code = 1
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _say(text: str) -> None:
+    """Print a line that may name a file, as it is."""
+    out.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def _say_error(text: str) -> None:
+    err.print(f"[red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
 
 
 def _version(wanted: bool) -> None:
@@ -92,10 +108,13 @@ def compare(
 
     scenarios = read_run(run)
     path = figure or Path("out") / f"{scenarios[0].run.name}.png"
+    inputs = [scenarios[0].file, *(scenario.rig_file for scenario in scenarios)]
     if not no_figure:
         from coupled.plots import check_format
 
         check_format(path)
+        check_target(path, inputs)
+    _check_json(json_file, [*inputs, path])
     with _progress() as advance:
         flights = compare_flights(scenarios, advance)
     if json_file != "-":
@@ -105,7 +124,7 @@ def compare(
 
         save(draw_comparison(flights), path)
         if json_file != "-":
-            out.print(f"figure: {path}")
+            _say(f"figure: {path}")
     _give_json([flight.outcome.as_dict() for flight in flights], json_file)
     _end(flights)
 
@@ -128,6 +147,7 @@ def fly(
     from coupled.authority import judge
     from coupled.errors import nearest
     from coupled.flight.loop import fly as fly_scenario
+    from coupled.flight.loop import input_files
     from coupled.flight.scenario import CONFIGURATIONS, read_run
     from coupled.record import check_suffix, manifest_path, write_record
 
@@ -143,13 +163,17 @@ def fly(
         raise InputError(run, "--configuration", f"no {configuration!r}; {hint}")
     path = output or Path("out") / f"{scenario.run.name}.csv"
     check_suffix(path)
+    inputs = input_files(scenario)
+    for target in (path, manifest_path(path)):
+        check_target(target, inputs)
+    _check_json(json_file, [*inputs, path, manifest_path(path)])
     with _progress() as advance:
         record = fly_scenario(scenario, lambda done, total: advance(scenario.label, done, total))
     write_record(record, path)
     outcome = judge(scenario, configuration or "as the rig file says", record)
     if json_file != "-":
-        out.print(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
-        out.print(f"manifest: {manifest_path(path)}")
+        _say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
+        _say(f"manifest: {manifest_path(path)}")
         for control, when in record.manifest["stop_first_met_s"].items():
             out.print(f"the {control} met its stop, first at {when:.2f} s")
     _give_json(outcome.as_dict(), json_file)
@@ -167,12 +191,14 @@ def plot(
 ) -> None:
     """Draw a record."""
     from coupled.plots import check_format, draw_record, save
-    from coupled.record import read_record
+    from coupled.record import check_suffix, read_record
 
+    check_suffix(record)
     path = figure or record.with_suffix(".png")
     check_format(path)
+    check_target(path, [record])
     save(draw_record(read_record(record), record.stem), path)
-    out.print(f"figure: {path}")
+    _say(f"figure: {path}")
 
 
 @app.command()
@@ -180,6 +206,7 @@ def runs(json_file: JsonOption = "") -> None:
     """List the shipped run files, what each shows, and the shipped rigs."""
     from coupled.schema import load_toml
 
+    _check_json(json_file, [])
     cards = {name: load_toml(path) for name, path in shipped_runs().items()}
     if json_file != "-":
         table = Table("run", "rig", "what it shows", box=None, pad_edge=False)
@@ -209,6 +236,15 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
             bar.update(task, description=escape(label), completed=done, total=total)
 
         yield advance
+
+
+def _check_json(target: str, others: list[Path]) -> None:
+    """Refuse a JSON file that could not be written, or that is one of the others."""
+    if target and target != "-":
+        path = Path(target)
+        check_target(path, others)
+        if path.absolute() in [other.absolute() for other in others]:
+            raise InputError(path, "--json", "is another file of this command")
 
 
 def _give_json(table: Any, target: str) -> None:

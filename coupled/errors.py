@@ -5,6 +5,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+LONGEST = 200  # characters of a user's word that a message repeats
+
+
+def _shown(text: str) -> str:
+    """Return a user's word on one line, cut if it is endless."""
+    plain = "".join(c if c.isprintable() else "?" for c in text)
+    return plain if len(plain) <= LONGEST else plain[:LONGEST] + "…"
+
 
 class InputError(ValueError):
     """Input that cannot be used. Its text is the one line that a user sees.
@@ -14,13 +22,14 @@ class InputError(ValueError):
     """
 
     def __init__(self, file: object, key: str, problem: str) -> None:
-        self.file, self.key, self.problem = str(file), key, problem
-        where = f"{file}: {key}: " if key else f"{file}: "
+        self.file, self.key, self.problem = _shown(str(file)), _shown(key), problem
+        where = f"{self.file}: {self.key}: " if key else f"{self.file}: "
         super().__init__(where + " ".join(problem.split()))
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a hint that names the known word most like `word`, or lists them all."""
     known = list(known)
+    word = word[:LONGEST]
     match = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean {match[0]}?" if match else "known: " + ", ".join(sorted(known))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from coupled.errors import InputError
@@ -28,6 +28,27 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
         raise InputError(path, "", f"cannot be written: {error.strerror or error}") from None
     finally:
         part.unlink(missing_ok=True)
+
+
+def check_target(path: Path, inputs: Iterable[Path] = ()) -> None:
+    """Refuse a file that could not be written, before the work that it is to hold.
+
+    Nothing is made or changed. `inputs` are files that must not be overwritten.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(path, "", "is a folder; give a file")
+        if any(other.is_file() and path.exists() and path.samefile(other) for other in inputs):
+            raise InputError(path, "", "is a file that this reads; give another to write")
+        parent = path.absolute().parent
+        while not parent.exists():
+            parent = parent.parent
+        if not parent.is_dir() or not os.access(parent, os.W_OK) or len(path.name) > 200:
+            raise InputError(path, "", "cannot be written there")
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(path, "", "cannot be written there") from None
 
 
 def write_text(path: Path, text: str) -> None:

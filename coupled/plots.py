@@ -109,7 +109,12 @@ def _title(flight: Flight) -> str:
 
 
 def _wrapped(text: str, width: int = 42) -> str:
-    return "\n".join(textwrap.wrap(text, width))
+    return "\n".join(textwrap.wrap(_plain(text), width))
+
+
+def _plain(text: str) -> str:
+    """Return a user's words as words, where a dollar sign would begin a formula."""
+    return text.replace("$", r"\$")
 
 
 def _share_limits(row: Sequence[Any]) -> None:
@@ -252,6 +257,8 @@ def draw_record(record: Record, title: str) -> Figure:
         present = [line for line in lines if line[0] in record]
         if present:
             shown.append((label, present))
+    if not shown:
+        raise InputError(title, "", f"has no channel of a record; it has {record.channels[:5]}")
     half = (len(shown) + 1) // 2
     figure = Figure(figsize=(11, 1.0 + 1.9 * half), layout="constrained")
     grid = figure.subplots(half, 2, sharex=True, squeeze=False)
@@ -269,5 +276,5 @@ def draw_record(record: Record, title: str) -> Figure:
         if visible:
             visible[-1].set_xlabel("time, s")
             visible[-1].tick_params(labelbottom=True)
-    figure.suptitle(title, fontsize=12)
+    figure.suptitle(_plain(title), fontsize=12)
     return figure

@@ -17,6 +17,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.channels import TIME
+from coupled.csvfile import read_columns
 from coupled.errors import InputError, nearest
 from coupled.files import write_text, write_whole
 
@@ -80,29 +81,20 @@ def write_record(record: Record, path: Path) -> None:
 def read_record(path: Path) -> Record:
     """Return the record of a file, with its manifest where there is one."""
     check_suffix(path)
-    read = pl.read_csv if path.suffix.lower() == ".csv" else pl.read_parquet
-    try:
-        frame = read(path)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except pl.exceptions.PolarsError as error:
-        raise InputError(path, "", f"is not a table: {str(error).splitlines()[0]}") from None
-    if TIME not in frame.columns:
-        raise InputError(
-            path, TIME, f"is missing; a record has it ({nearest(TIME, frame.columns)})"
-        )
-    for column in frame.columns:
-        if not frame[column].dtype.is_numeric():
-            raise InputError(path, column, "holds something that is not a number")
-    data = np.ascontiguousarray(frame.cast(pl.Float64).to_numpy(), dtype=np.float64)
-    if np.any(np.diff(data[:, frame.columns.index(TIME)]) <= 0.0):
-        raise InputError(path, TIME, "must rise from row to row")
-    return Record(tuple(frame.columns), data, _read_manifest(manifest_path(path)))
+    columns = read_columns(path, gaps=True)
+    if TIME not in columns:
+        raise InputError(path, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
+    if len(columns) < 2 or len(columns[TIME]) < 2:
+        raise InputError(path, "", "holds no channel over time")
+    if not np.all(np.diff(columns[TIME]) > 0.0):
+        raise InputError(path, TIME, "must rise from row to row, without a gap")
+    data = np.column_stack(list(columns.values()))
+    return Record(tuple(columns), data, _read_manifest(manifest_path(path)))
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return manifest if isinstance(manifest, dict) else {}

@@ -45,6 +45,9 @@ def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = N
             return shipped[name]
         raise InputError(name, "", f"is no shipped {kind}; {nearest(name, shipped)}")
     for folder in ([beside] if beside else []) + [Path()]:
-        if (folder / name).is_file():
-            return folder / name
+        try:
+            if (folder / name).is_file():
+                return folder / name
+        except (OSError, ValueError):  # a name that no file can have
+            break
     raise InputError(name, "", f"there is no such {kind} file")

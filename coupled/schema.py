@@ -24,6 +24,7 @@ class Section(BaseModel):
 
 
 S = TypeVar("S", bound=Section)
+LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
 
 
 def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
@@ -44,13 +45,12 @@ def file_keys(section: type[Section], d: str) -> dict[str, str]:
 def load_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's tables."""
     try:
-        text = path.read_text(encoding="utf-8")
-        return tomllib.loads(text)
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "is not text in UTF-8; a TOML file is wanted") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"is not valid TOML: {error}") from None
 
 
@@ -71,6 +71,8 @@ def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) 
 
 def _other_unit(key: str, keys: Mapping[str, object]) -> str:
     """Return the known key that has this key's name with another unit, or nothing."""
+    if len(key) > 100:
+        return ""
     for known in sorted(keys, key=len, reverse=True):
         parts = known.split("_")
         for cut in range(len(parts) - 1, 0, -1):
@@ -118,6 +120,7 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
     values = {}
     for key, given in table.items():
         value = given
+        _refuse_huge(value, file, f"{path}.{key}" if path else key)
         kind = section.model_fields[keys[key]].annotation
         dotted = f"{path}.{key}" if path else key
         if isinstance(kind, type) and issubclass(kind, Section):
@@ -127,6 +130,12 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
         return section(**values)
     except ValidationError as error:
         raise _first_fault(error, keys, file, path) from None
+
+
+def _refuse_huge(value: Any, file: object, key: str) -> None:
+    for number in value if isinstance(value, list) else [value]:
+        if isinstance(number, (int, float)) and LARGEST < abs(number) < float("inf"):
+            raise InputError(file, key, f"{_shown(number)} is larger than any real one")
 
 
 def _first_fault(
@@ -146,5 +155,6 @@ def _first_fault(
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    huge = isinstance(value, int) and abs(value) > 10**300
+    text = "an integer of hundreds of digits" if huge else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

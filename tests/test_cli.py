@@ -147,7 +147,7 @@ def test_bad_input_is_one_line_exit_2_and_nothing_written(
     ("text", "says"),
     [
         ("a,b\n1,2\n", "time_s: is missing"),
-        ("time_s,a\n0,x\n", "a: holds something that is not a number"),
+        ("time_s,a\n0,x\n", "a: row 2 holds 'x', which is no number"),
         ("time_s,a\n1,1\n0,1\n", "time_s: must rise from row to row"),
         ("", "is not a table"),
     ],
@@ -158,3 +158,109 @@ def test_a_table_that_is_no_record(folder: Path, text: str, says: str) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert says in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+RIG = "aircraft/T37/report-column.toml"
+HOSTILE = [
+    ("run", "", ""),
+    ("run", 'name = "short"', 'name = "../esc"'),
+    ("run", 'name = "short"', 'name = "x\\u0000y"'),
+    ("run", 'kind = "step"', 'kind = ["step"]'),
+    ("run", "force_N = 40.0", "force_N = 1e308"),
+    ("run", "force_N = 40.0", "force_N = 1e9"),
+    ("run", "force_N = 40.0", "force_N = " + "9" * 5000),
+    ("run", "force_N = 40.0", "force_N = " + "[" * 5000),
+    ("run", "force_N = 40.0", "k" * 100_000 + " = 1"),
+    ("run", 'kind = "step"\nstart_s = 0.2', 'kind = "sweep"\nduration_s = 1.0\nhigh_Hz = 70.0'),
+    ("run", "duration_s = 2.0", 'duration_s = 2.0\nrecord_properties = ["../..//["]'),
+    ("run", "duration_s = 2.0", 'duration_s = 2.0\nrecord_properties = ["aero"]'),
+    ("run", '"compensated"]', '"rigid"]'),
+    ("run", "force_N = 40.0", 'force_N = 40.0\n[[case]]\nlabel = "a"\n[[case]]\nlabel = "a"'),
+    (
+        "run",
+        "force_N = 40.0",
+        'force_N = 40.0\n[[case]]\nlabel = "a"\nrig = { flight.altitude_m = 2000.0 }',
+    ),
+    (
+        "run",
+        "force_N = 40.0",
+        'force_N = 40.0\n[[case]]\nlabel = "a"\nrig = { "frame_rate_Hz.x" = 1.0 }',
+    ),
+    (
+        "run",
+        "force_N = 40.0",
+        'force_N = 40.0\n[[case]]\nlabel = "a"\npilot = { "column.force_lb" = 1.0 }',
+    ),
+    ("run", 'kind = "step"\nstart_s = 0.2\nforce_N = 40.0', 'kind = "table"\nfile = "*.csv"'),
+    ("rig", '"gear/gear-cmd-norm"', '"Gear up"'),
+    ("rig", '"gear/gear-cmd-norm"', '"fcs/throttle-cmd-norm[-1]"'),
+    ("rig", '"gear/gear-cmd-norm"', '"simulation/do_simple_trim"'),
+    ("rig", '"gear/gear-cmd-norm"', '"ic/h-sl-ft"'),
+    ("rig", '"gear/gear-cmd-norm"', '"aero/qbar-psf"'),
+    ("rig", 'model = "T37"', 'model = "ball"'),
+    ("rig", 'model = "T37"', 'model = "global5001"'),
+    ("rig", "altitude_m = 1500.0", "altitude_m = -500.0"),
+    ("rig", "mass_kg = 4.0", "mass_kg = 1e308"),
+    ("rig", "mass_kg = 4.0", "mass_kg = 0x" + "f" * 4000),
+]
+
+
+@pytest.mark.parametrize(
+    ("which", "old", "new"), HOSTILE, ids=[str(i) for i in range(len(HOSTILE))]
+)
+def test_hostile_files_end_in_one_line(folder: Path, which: str, old: str, new: str) -> None:
+    """Found by trying: each of these once died, hung, or wrote where it should not."""
+    (folder / "t.csv").write_text("time_s,column_force_N\n0,0\n1,1\n")
+    rig = (ROOT / RIG).read_text(encoding="utf-8")
+    run = SHORT.replace('"report-column"', '"rig.toml"')
+    if old == "":
+        run, old = "\ufeffname = 3", "\ufeff"
+    assert old in {"run": run, "rig": rig}[which]
+    run, rig = (
+        (run.replace(old, new or old), rig) if which == "run" else (run, rig.replace(old, new))
+    )
+    (folder / "short.toml").write_text(run, encoding="utf-8")
+    (folder / "rig.toml").write_text(rig, encoding="utf-8")
+    before = files(folder.parent)
+    done = coupled(folder, "fly", "short.toml")
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("error: "), done.stderr
+    assert done.stderr.count("\n") == 1
+    assert len(done.stderr) < 700
+    assert done.stdout == ""
+    assert files(folder.parent) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fly", "short.toml", "-o", "short.toml/r.csv"],
+        ["fly", "short.toml", "--json", "."],
+        ["fly", "short.toml", "-o", "r.csv", "--json", "r.csv"],
+        ["fly", "short.toml", "--json", "short.toml"],
+        ["compare", "short.toml", "--figure", "short.toml/x.png"],
+        ["compare", "a" * 5000 + ".toml"],
+        ["plot", "."],
+        ["fly", "short.toml", "--nonsense"],
+        ["nonsense"],
+        ["runs", "--json", "."],
+    ],
+    ids=lambda words: " ".join(words)[:40],
+)
+def test_words_that_lead_nowhere_are_refused_before_the_flight(
+    folder: Path, words: list[str]
+) -> None:
+    done = coupled(folder, *words)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert files(folder) == {"short.toml"}
+
+
+def test_a_dollar_sign_is_a_word_and_a_bracket_a_file(folder: Path) -> None:
+    text = SHORT + '\n[[case]]\nlabel = "$\\\\foo{$ [red]x"\n'
+    (folder / "short.toml").write_text(text)
+    done = coupled(folder, "compare", "short.toml")
+    assert done.returncode == 0, done.stderr
+    assert coupled(folder, "fly", "short.toml", "-o", "r[1].csv").returncode == 0
+    assert coupled(folder, "plot", "r[1].csv", "--figure", "$x.png").returncode == 0

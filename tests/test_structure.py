@@ -18,7 +18,18 @@ PACKAGE = Path(__file__).parents[1] / "coupled"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # A room may import from the rooms left of it.
-ORDER = ["errors", "units", "files", "schema", "resources", "channels", "rig", "record", "flight"]
+ORDER = [
+    "errors",
+    "units",
+    "files",
+    "schema",
+    "csvfile",
+    "resources",
+    "channels",
+    "rig",
+    "record",
+    "flight",
+]
 ORDER += ["authority", "plots", "tables", "cli"]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 

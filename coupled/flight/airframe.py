@@ -8,6 +8,7 @@ before they start, and JSBSim's log is kept to be quoted where something fails.
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -18,8 +19,9 @@ import jsbsim
 
 from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
+from coupled.flight.everyframe import motion_reader, stepper
 from coupled.rig.parameters import Flight
-from coupled.units import FOOT_m, KNOT_m_per_s, PSF_Pa
+from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
 
@@ -45,9 +47,7 @@ _LATERAL = (
 )
 assert len(_LONGITUDINAL) == len(LONGITUDINAL)
 assert len(_LATERAL) == len(LATERAL)
-_ALTITUDE = LONGITUDINAL.index("altitude_m")
-_ELEVATOR = LONGITUDINAL.index("elevator_rad")
-_PITCH_RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
+ALTITUDE = LONGITUDINAL.index("altitude_m")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -113,7 +113,7 @@ class JSBSimAirframe:
         self._fdm = self._load(models, frame_s)
         self._trim()
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
-        self.motion = _motion_reader(
+        self.motion = motion_reader(
             [self._node(name).get_double_value for name in _LONGITUDINAL],
             [self._node(name).get_double_value for name in _LATERAL] if lateral else [],
         )
@@ -124,10 +124,13 @@ class JSBSimAirframe:
         for control in controls:
             node = self._node(_COMMANDS[SURFACES[control]])
             writes.append((node.set_double_value, node.get_double_value()))
-        self.step = _stepper(self._fdm.run, writes, flight.steps_per_frame)
+        self.step = stepper(self._fdm.run, writes, flight.steps_per_frame)
         # Above this altitude no wheel is near the ground, and no height need be asked for.
-        ground_m = self.motion()[_ALTITUDE] - self._height() * FOOT_m
-        self._safe_m = ground_m + 100.0
+        ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
+        self.safe_altitude_m = ground_m + 100.0
+        trouble = self.trouble()
+        if trouble:
+            raise self._fault("altitude_m", f"{trouble} at the start; choose a higher one")
 
     def _fault(self, key: str, problem: str) -> InputError:
         return InputError(self._file, f"flight.{key}" if key else "flight", problem)
@@ -158,10 +161,29 @@ class JSBSimAirframe:
             output += 1
         fdm.set_dt(frame_s / self._flight.steps_per_frame)
         self._properties = fdm.get_property_manager()
+        # By this list, since asking the manager for a malformed name ends the process.
+        lines = fdm.query_property_catalog("").split("\n")
+        self._catalog = {line.rpartition(" (")[0] for line in lines}
         return fdm
 
+    def _set(self, name: str, value: float) -> None:
+        """Set a property that the rig file names, if it is there and is the model's to set."""
+        key = f"properties.{name}"
+        if name.startswith(("simulation/", "ic/")) or name == "propulsion/set-running":
+            raise self._fault(key, "is set from the rig's other keys; leave it out")
+        if name not in self._catalog:
+            hint = difflib.get_close_matches(name[:100], self._catalog, n=1)
+            like = f", but {hint[0]}" if hint else ""
+            raise self._fault(
+                key, f"{self._flight.model} has no such property{like}; none is created"
+            )
+        node = self._node(name)
+        node.set_double_value(value)
+        if not math.isclose(node.get_double_value(), value, rel_tol=1e-6, abs_tol=1e-12):
+            raise self._fault(key, f"{self._flight.model} does not let it be set to {value:g}")
+
     def _node(self, name: str, key: str = "model") -> Any:
-        node = self._properties.get_node(name)
+        node = self._properties.get_node(name) if name in self._catalog else None
         if node is None:
             problem = f"{self._flight.model} has no property {name!r}"
             if key == "model":
@@ -181,12 +203,7 @@ class JSBSimAirframe:
                 if node is not None:
                     node.set_double_value(1.0)
         for name, value in flight.properties.items():
-            node = self._properties.get_node(name)
-            if node is None:
-                raise self._fault(
-                    f"properties.{name}", f"{flight.model} has no such property; none is created"
-                )
-            node.set_double_value(value)
+            self._set(name, value)
         _log.text = ""
         where = (
             f"{flight.model} does not trim level at altitude_m = {flight.altitude:g},"
@@ -205,92 +222,9 @@ class JSBSimAirframe:
         """Return the further properties, in JSBSim's units."""
         return tuple([read() for read in self._extra])
 
-    def trouble(self, motion: tuple[float, ...]) -> str:
-        """Return why the flight cannot go on from this motion, or an empty string."""
-        turning = motion[_ELEVATOR] + motion[_PITCH_RATE]  # the first to go where a state does
-        if turning - turning != 0.0:
-            return "the state is not finite"
-        if motion[_ALTITUDE] > self._safe_m:
-            return ""
+    def trouble(self) -> str:
+        """Return why the flight cannot go on, or an empty string."""
         height = self._height()
         if height > 0.0 and not self._wheels():
             return ""
         return "the state is not finite" if math.isnan(height) else "the aircraft met the ground"
-
-
-def _motion_reader(
-    longitudinal: Sequence[Callable[[], float]], lateral: Sequence[Callable[[], float]]
-) -> Callable[[], tuple[float, ...]]:
-    """Return a function that reads the motion in SI; written out, since every frame calls it."""
-    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = longitudinal
-
-    def column() -> tuple[float, ...]:
-        return (
-            qbar() * PSF_Pa,
-            load(),
-            elevator(),
-            pitch_rate(),
-            alpha(),
-            pitch(),
-            speed() * FOOT_m,
-            height() * FOOT_m,
-        )
-
-    if not lateral:
-        return column
-    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
-
-    def all_controls() -> tuple[float, ...]:
-        return (
-            qbar() * PSF_Pa,
-            load(),
-            elevator(),
-            pitch_rate(),
-            alpha(),
-            pitch(),
-            speed() * FOOT_m,
-            height() * FOOT_m,
-            aileron(),
-            rudder(),
-            roll_rate(),
-            yaw_rate(),
-            beta(),
-            roll(),
-            heading(),
-        )
-
-    return all_controls
-
-
-def _stepper(
-    run: Callable[[], bool],
-    writes: Sequence[tuple[Callable[[float], object], float]],
-    steps: int,
-) -> Callable[[tuple[float, float, float]], None]:
-    """Return a function that runs a frame with commands about trim, one a control."""
-    (first, first_trim), *others = writes
-
-    def one(commands: tuple[float, float, float], /) -> None:
-        first(first_trim + commands[0])
-        run()
-
-    def several(commands: tuple[float, float, float], /) -> None:
-        for (write, trim), command in zip(writes, commands, strict=False):
-            write(trim + command)
-        for _ in range(steps):
-            run()
-
-    if steps > 1 or len(others) == 1:
-        return several
-    if not others:
-        return one
-    (second, second_trim), (third, third_trim) = others
-
-    def three(commands: tuple[float, float, float], /) -> None:
-        a, b, c = commands
-        first(first_trim + a)
-        second(second_trim + b)
-        third(third_trim + c)
-        run()
-
-    return three

@@ -12,9 +12,10 @@ class Airframe(Protocol):
 
     motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
+    safe_altitude_m: float  # above it there is no ground to meet
 
-    def trouble(self, motion: tuple[float, ...]) -> str:
-        """Return why the flight cannot go on from this motion, or an empty string."""
+    def trouble(self) -> str:
+        """Return why the flight cannot go on, or an empty string; asked below safe_altitude_m."""
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties that a run asked for."""
@@ -27,6 +28,7 @@ class Bench:
         self._frame_s = frame_s
         self._points = list(pressures_Pa)
         self._k = 0
+        self.safe_altitude_m = 0.0
         self.motion = self._told
         self.step = self._next
 
@@ -47,6 +49,6 @@ class Bench:
         """Return nothing: a bench has no properties."""
         return ()
 
-    def trouble(self, motion: tuple[float, ...]) -> str:
+    def trouble(self) -> str:
         """Return nothing: a bench has no trouble."""
         return ""

@@ -11,20 +11,23 @@ import platform
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.channels import TIME, control_channels, record_channels
+from coupled.errors import InputError
 from coupled.files import sha256
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.airframe import ALTITUDE, JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.pilot import Action
+from coupled.flight.pilot import Action, Table
 from coupled.flight.scenario import Scenario
 from coupled.record import Record
 from coupled.resources import aircraft_folder
+from coupled.rig.compiled import bound
 from coupled.rig.frame import step_frame
 from coupled.rig.packing import pack
 from coupled.rig.parameters import Control
@@ -63,22 +66,23 @@ def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
     motions: list[tuple[float, ...]] = []
     extra: list[tuple[float, ...]] = []
 
-    read, step, trouble = airframe.motion, airframe.step, airframe.trouble
+    read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
+    rig_frame = bound(step_frame, controls, script, data, 0, 1.0, 1.0)
     flown, asked = rig.flight is not None, bool(run.record_properties)
     ended: dict[str, Any] | None = None
     done = 0
     try:
         for k in range(frames):
             motion = read()
-            why = trouble(motion)
-            if why:
+            # Not above it: near the ground, or not a number.
+            if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
                 ended = {"reason": why, "time_s": k / rig.frame_rate}
                 break
             if looks:
                 for state, look in looks:
                     state["command"] = look(k / rig.frame_rate, motion)
             load = motion[1] if flown else 1.0
-            commands = step_frame(controls, script, data, k, motion[0], load)
+            commands = rig_frame(controls, script, data, k, motion[0], load)
             motions.append(motion)
             if asked:
                 extra.append(airframe.extra())
@@ -90,10 +94,14 @@ def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
         ended = {"reason": "interrupted", "time_s": done / rig.frame_rate}
     data = data[:done]
     _add_motion(data, motions[:done])
-    data[:, 0] = np.arange(done) / rig.frame_rate
+    lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
+    if lost.size:
+        data = data[: lost[0]]
+        ended = {"reason": "the state is not finite", "time_s": int(lost[0]) / rig.frame_rate}
+    data[:, 0] = np.arange(len(data)) / rig.frame_rate
     if asked:
         channels = (*channels, *run.record_properties)
-        data = np.column_stack((data, np.reshape(extra[:done], (done, -1))))
+        data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
     return Record(channels, data, _manifest(scenario, channels, data, ended))
 
 
@@ -105,15 +113,16 @@ def make_airframe(scenario: Scenario) -> Airframe:
         points = list(zip(run.bench.time, run.bench.dynamic_pressure, strict=True))
         return Bench(1.0 / rig.frame_rate, points)
     where: dict[str, Any] = {"models": [aircraft_folder()], "file": scenario.rig_file}
-    check_direct_controls(rig.flight, 1.0 / rig.frame_rate, list(rig.controls), **where)
-    return JSBSimAirframe(
-        rig.flight,
-        1.0 / rig.frame_rate,
-        list(rig.controls),
-        record=run.record_properties,
-        record_file=scenario.file,
-        **where,
-    )
+    frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
+    try:
+        check_direct_controls(rig.flight, frame_s, controls, **where)
+        asked: dict[str, Any] = {"record": run.record_properties, "record_file": scenario.file}
+        return JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
+    except InputError as error:
+        if error.key not in scenario.changes:
+            raise
+        place = f"case {scenario.label!r}: rig.{error.key}"
+        raise InputError(scenario.file, place, error.problem) from None
 
 
 def gradient_at(control: Control, pressure_Pa: float) -> float:
@@ -153,14 +162,16 @@ def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, see
     return hiss
 
 
+def input_files(scenario: Scenario) -> list[Path]:
+    """Return the files that a flight reads: run, rig, and a pilot's tables."""
+    tables = [pilot.file for pilot in scenario.pilots.values() if isinstance(pilot, Table)]
+    here = scenario.file.parent
+    return [scenario.file, scenario.rig_file, *(here / name for name in tables)]
+
+
 def _manifest(
     scenario: Scenario, channels: tuple[str, ...], data: Floats, ended: dict[str, Any] | None
 ) -> dict[str, Any]:
-    inputs = {scenario.file.name: scenario.file, scenario.rig_file.name: scenario.rig_file}
-    for pilot in scenario.pilots.values():
-        name = getattr(pilot, "file", None)
-        if name is not None:
-            inputs[name] = scenario.file.parent / name
     stops = {}
     for control in scenario.rig.controls:
         met = np.flatnonzero(data[:, channels.index(control_channels(control)[-1])])
@@ -176,7 +187,7 @@ def _manifest(
         "rows": len(data),
         "ended_early": ended,
         "stop_first_met_s": stops,
-        "inputs_sha256": {name: sha256(path) for name, path in inputs.items()},
+        "inputs_sha256": {path.name: sha256(path) for path in input_files(scenario)},
         "versions": {
             "coupled": version("coupled"),
             "python": platform.python_version(),

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from coupled.channels import LONGITUDINAL, TIME, channel
+from coupled.csvfile import read_columns
 from coupled.errors import InputError, nearest
 from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
@@ -41,11 +41,14 @@ class Action:
     look: Look | None = None
 
 
+STRONGEST = 5000.0  # N; 14 CFR 25.143 asks at most 670 N of a pilot, for a short time
+
+
 class Pilot(Section):
     """What every pilot has."""
 
     kind: str
-    start: float = quantity("s", 1.0, ge=0)
+    start: float = quantity("s", 1.0, ge=0, le=7200)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return what this pilot does on a control.
@@ -75,8 +78,8 @@ def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> 
 class _Levels(Pilot):
     """A force that goes from level to level."""
 
-    force: float = quantity("N")
-    rise: float = quantity("s", 0.1, ge=0)
+    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
+    rise: float = quantity("s", 0.1, ge=0, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the (time in s, share of the force) that the signal goes to."""
@@ -91,7 +94,7 @@ class Step(_Levels):
     """A force held for `duration_s`, or to the end where that is 0."""
 
     kind: Literal["step"]
-    duration: float = quantity("s", 0.0, ge=0)
+    duration: float = quantity("s", 0.0, ge=0, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return one level, and its end."""
@@ -103,8 +106,8 @@ class Ramp(Pilot):
     """A force that grows evenly over `ramp_s`, and is then held."""
 
     kind: Literal["ramp"]
-    force: float = quantity("N")
-    ramp: float = quantity("s", gt=0)
+    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
+    ramp: float = quantity("s", ge=1e-3, le=7200)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return the ramp."""
@@ -115,7 +118,7 @@ class Doublet(_Levels):
     """A force one way, then as long the other way."""
 
     kind: Literal["doublet"]
-    half_period: float = quantity("s", gt=0)
+    half_period: float = quantity("s", ge=1e-3, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the two halves."""
@@ -127,7 +130,7 @@ class ThreeTwoOneOne(_Levels):
     """The 3-2-1-1 of aircraft identification: alternating pulses of 3, 2, 1 and 1 units."""
 
     kind: Literal["3211"]
-    unit: float = quantity("s", gt=0)
+    unit: float = quantity("s", ge=1e-3, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the four pulses."""
@@ -136,13 +139,13 @@ class ThreeTwoOneOne(_Levels):
 
 
 class Sweep(Pilot):
-    """A sine whose frequency grows exponentially from `low_Hz` to `high_Hz`."""
+    """A sine whose frequency goes exponentially from `low_Hz` to `high_Hz`."""
 
     kind: Literal["sweep"]
-    force: float = quantity("N")
-    duration: float = quantity("s", gt=0)
-    low: float = quantity("Hz", 0.1, gt=0)
-    high: float = quantity("Hz", 2.0, gt=0)
+    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
+    duration: float = quantity("s", ge=1e-3, le=7200)
+    low: float = quantity("Hz", 0.1, ge=1e-3, le=50)
+    high: float = quantity("Hz", 2.0, ge=1e-3, le=50)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return the sweep, faded in and out over a tenth of it."""
@@ -166,7 +169,7 @@ class Table(Pilot):
 
     kind: Literal["table"]
     file: str
-    start: float = quantity("s", 0.0, ge=0)
+    start: float = quantity("s", 0.0, ge=0, le=7200)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return the table's force."""
@@ -184,7 +187,7 @@ class Clamp(Pilot):
     kind: Literal["clamp"]
     deflection: float = quantity("{d}")
     rise: float = quantity("s", 0.5, gt=0)
-    duration: float = quantity("s", 0.0, ge=0)
+    duration: float = quantity("s", 0.0, ge=0, le=7200)
     bandwidth: float = quantity("rad_per_s", 6.0, gt=0, le=30)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
@@ -204,13 +207,13 @@ class Attitude(Pilot):
     """
 
     kind: Literal["attitude"]
-    change: float = quantity("rad", 0.0)
+    change: float = quantity("rad", 0.0, ge=-1.5, le=1.5)
     rise: float = quantity("s", 1.0, ge=0)
-    gain: float = quantity("N_per_rad", ge=0)
-    rate_gain: float = quantity("N_s_per_rad", 0.0, ge=0)
-    integral_gain: float = quantity("N_per_rad_s", 0.0, ge=0)
-    lag: float = quantity("s", 0.1, ge=0)
-    force_limit: float = quantity("N", 330.0, gt=0)
+    gain: float = quantity("N_per_rad", ge=0, le=1e6)
+    rate_gain: float = quantity("N_s_per_rad", 0.0, ge=0, le=1e6)
+    integral_gain: float = quantity("N_per_rad_s", 0.0, ge=0, le=1e6)
+    lag: float = quantity("s", 0.1, ge=0, le=7200)
+    force_limit: float = quantity("N", 330.0, gt=0, le=STRONGEST)
     _PITCH: ClassVar[int] = LONGITUDINAL.index("pitch_rad")
     _RATE: ClassVar[int] = LONGITUDINAL.index("pitch_rate_rad_per_s")
 
@@ -248,24 +251,13 @@ PILOTS: dict[str, type[Pilot]] = {
 
 def read_force_table(path: Path, wanted: str) -> tuple[Floats, Floats]:
     """Return times in s and forces in N of a CSV; gaps and disorder are refused by row."""
-    try:
-        table = pl.read_csv(path, infer_schema=False)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except pl.exceptions.PolarsError as error:
-        raise InputError(path, "", f"is not a table: {str(error).splitlines()[0]}") from None
-    columns = []
+    columns = read_columns(path)
     for name in (TIME, wanted):
-        if name not in table.columns:
-            raise InputError(path, name, f"no such column; {nearest(name, table.columns)}")
-        values = table[name].cast(pl.Float64, strict=False).to_numpy()
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise InputError(
-                path, name, f"row {bad[0] + 2} holds no finite number; a table has no gaps"
-            )
-        columns.append(values.astype(np.float64))
-    times, forces = columns
+        if name not in columns:
+            raise InputError(path, name, f"no such column; {nearest(name, columns)}")
+    times, forces = columns[TIME], columns[wanted]
+    if np.max(np.abs(forces), initial=0.0) > STRONGEST:
+        raise InputError(path, wanted, f"holds more than {STRONGEST:g} N, which no pilot can")
     if len(times) < 2:
         raise InputError(path, TIME, "needs at least two rows")
     disorder = np.flatnonzero(np.diff(times) <= 0.0)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
 from coupled.channels import CONTROL_NAMES, ControlName, channel, unit_of
 from coupled.errors import InputError, nearest
-from coupled.flight.pilot import PILOTS, Pilot, Table, read_force_table
+from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, read_force_table
 from coupled.resources import find, shipped_rigs, shipped_runs
-from coupled.rig.parameters import Rig
+from coupled.rig.parameters import PLAIN_NAME, Rig
 from coupled.rig.rigfile import change, read_rig
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
 
@@ -48,7 +48,7 @@ class Bench(Section):
 class Case(Section):
     """A variant of the run: dotted keys of rig and pilot, with their values here."""
 
-    label: str = quantity("", min_length=1)
+    label: str = quantity("", pattern=r"^[^\x00-\x1f\x7f]{1,120}$")
     rig: dict[str, Any] = {}
     pilot: dict[str, Any] = {}
 
@@ -56,7 +56,7 @@ class Case(Section):
 class RunFile(Section):
     """The tables of a run file, its pilots apart."""
 
-    name: str = quantity("", min_length=1)
+    name: str = quantity("", pattern=PLAIN_NAME)
     card: str = quantity("", min_length=1)
     rig: str = quantity("", min_length=1)
     duration: float = quantity("s", gt=0, le=7200)
@@ -78,6 +78,7 @@ class Scenario:
     rig_file: Path
     pilots: Mapping[ControlName, Pilot]
     label: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -133,19 +134,14 @@ def read_run(name: str) -> list[Scenario]:
     run = build(RunFile, table, file, "")
     if run.bench is not None:
         _check_bench(run.bench, file)
+    _refuse_doubles(run, file)
     variants = run.case or [Case(label=run.name)]
     return [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
 
 
 def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> Scenario:
     rig_file = find(run.rig, shipped_rigs(), "rig", beside=file.parent)
-    try:
-        rig = read_rig(rig_file, case.rig)
-    except InputError as error:
-        if case.rig and any(error.key.endswith(key.split(".")[-1]) for key in case.rig):
-            key = f"case[{index}].rig.{error.key}"
-            raise InputError(file, key, error.problem) from None
-        raise
+    rig = _changed_rig(rig_file, case, file, index)
     if rig.flight is None and run.bench is None:
         raise InputError(file, "bench", f"is missing: {rig_file.name} has no aircraft, so say q̄")
     if rig.flight is not None and run.bench is not None:
@@ -157,11 +153,46 @@ def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> 
         place = f"case[{index}].pilot.{key}"
         if not isinstance(pilots, dict) or key.split(".")[0] not in pilots or "." not in key:
             raise InputError(file, place, "no such pilot; write CONTROL.KEY of one in this run")
-        change(pilots, key, value)
-    ready = _pilots(pilots, rig, file)
+        if not change(pilots, key, value):
+            raise InputError(file, place, "leads through a value, not a table")
+    try:
+        ready = _pilots(pilots, rig, file)
+    except InputError as error:
+        if error.key.removeprefix("pilot.") in case.pilot:
+            raise InputError(error.file, f"case[{index}].{error.key}", error.problem) from None
+        raise
     if run.measure.control is not None and run.measure.control not in rig.controls:
         raise InputError(file, "measure.control", f"{rig_file.name} has no {run.measure.control}")
-    return Scenario(run, file, rig, rig_file, ready, case.label)
+    return Scenario(run, file, rig, rig_file, ready, case.label, case.rig)
+
+
+def _refuse_doubles(run: RunFile, file: Path) -> None:
+    lists: dict[str, list[Any]] = {
+        "record_properties": run.record_properties,
+        "configurations": list(run.configurations),
+        "case": [case.label for case in run.case],
+    }
+    for key, values in lists.items():
+        for value in values:
+            if values.count(value) > 1:
+                raise InputError(file, key, f"{value!r} stands there twice")
+
+
+def _changed_rig(rig_file: Path, case: Case, file: Path, index: int) -> Rig:
+    """Return the rig as a case has it; what only the case makes wrong is blamed on the case."""
+    for key, value in case.rig.items():
+        if isinstance(value, dict) and key in ("flight", "controls"):
+            place = f"case[{index}].rig.{key}"
+            raise InputError(file, place, f'put the dotted key in quotes: "{key}.…" = …')
+    try:
+        return read_rig(rig_file, case.rig)
+    except InputError as error:
+        if not case.rig:
+            raise
+        read_rig(rig_file)
+        problem = error.problem if error.key in case.rig else f"{error.key}: {error.problem}"
+        key = f".{error.key}" if error.key in case.rig else ""
+        raise InputError(file, f"case[{index}].rig{key}", problem) from None
 
 
 def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
@@ -173,14 +204,19 @@ def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
         path = f"pilot.{name}"
         if name not in rig.controls:
             raise InputError(file, path, f"the rig has no {name}; {nearest(name, rig.controls)}")
-        kind = table.get("kind") if isinstance(table, dict) else None
-        if kind not in PILOTS:
+        if not isinstance(table, dict) or "kind" not in table:
+            raise InputError(file, f"{path}.kind", f"is missing; one of {', '.join(PILOTS)}")
+        kind = table["kind"]
+        if not isinstance(kind, str) or kind not in PILOTS:
             raise InputError(file, f"{path}.kind", f"is {kind!r}; {nearest(str(kind), PILOTS)}")
         pilot = build(PILOTS[kind], table, file, path, unit_of(name))
         if kind == "attitude" and (name != "column" or rig.flight is None):
             raise InputError(
                 file, path, "only the column of a rig that flies holds a pitch attitude"
             )
+        if isinstance(pilot, Sweep) and max(pilot.low, pilot.high) > 0.5 * rig.frame_rate:
+            problem = f"is beyond half the frame rate, {0.5 * rig.frame_rate:g} Hz"
+            raise InputError(file, f"{path}.high_Hz", problem)
         if isinstance(pilot, Table):
             read_force_table(file.parent / pilot.file, channel(name, "force"))
         _check_deflection(pilot, rig, name, file)

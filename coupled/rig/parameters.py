@@ -13,6 +13,9 @@ from typing import Literal
 from coupled.channels import ControlName
 from coupled.schema import Section, quantity
 
+# A name that may become a file's: letters, digits, dot, dash, underscore.
+PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+
 
 class Loader(Section):
     """Electronics, servo and structure: the hardware, as it really is."""
@@ -47,7 +50,7 @@ class Schedule(Section):
     break_deflection: float = quantity("{d}", 0.0, ge=0)
     pressure_scale: float = quantity("", 1.0, gt=0)
     pressure_lag: float = quantity("s", 0.0, ge=0)
-    slope: float = quantity("", 1.0)
+    slope: float = quantity("", 1.0, ge=0, le=100)
 
 
 class Compensation(Section):
@@ -112,7 +115,7 @@ class Rig(Section):
     the standard deviation of a channel's white noise by the channel's name.
     """
 
-    name: str = quantity("", min_length=1)
+    name: str = quantity("", pattern=PLAIN_NAME)
     frame_rate: float = quantity("Hz", ge=1, le=2000)
     loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
     controls: dict[ControlName, Control]

@@ -25,18 +25,20 @@ def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
     """Return the rig of a file, with `changes` made to it: {dotted key: value}."""
     table = load_toml(path)
     for key, value in (changes or {}).items():
-        change(table, key, value)
+        if not change(table, key, value):
+            raise InputError(path, key, "leads through a value, not a table")
     return rig_from_table(table, path)
 
 
-def change(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key of a table of tables in place."""
+def change(table: dict[str, Any], key: str, value: Any) -> bool:
+    """Set a dotted key of a table of tables in place; false where it leads through a value."""
     *parents, last = key.split(".")
     for parent in parents:
         table = table.setdefault(parent, {})
         if not isinstance(table, dict):
-            return  # building the rig says what is wrong
+            return False
     table[last] = copy.deepcopy(value)
+    return True
 
 
 def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
@@ -130,7 +132,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
                     bend_key,
                     f"K·G_T = {bend * max(sloped):.3g} at {where:g} Pa: no gradient stiffer than"
                     f" the structure can be given; K must stay below {1.0 / max(sloped):.3g}"
-                    f" {d}/N, or G_T below {1.0 / bend:.4g} N/{d}",
+                    f" {d}/N, or {table_key} below {1.0 / bend:.4g}",
                 )
 
 

@@ -5,7 +5,6 @@ Run alone, with its figures printed:  pytest tests/benchmarks -s
 
 from __future__ import annotations
 
-import statistics
 import subprocess
 import sys
 import time
@@ -17,7 +16,7 @@ from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
 
 FRAMES = 4800
-ROUNDS = 7
+ROUNDS = 9
 
 
 def of(run: str, controls: int, frames: int) -> Scenario:
@@ -54,11 +53,13 @@ def bare_s(scenario: Scenario) -> float:
 def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, most: float) -> None:
     long, short = of(run, controls, FRAMES), of(run, controls, 1)
     flown_s(short)
-    ratios = []
-    for _ in range(ROUNDS):
-        bare = bare_s(long)
-        ratios.append((flown_s(long) - flown_s(short)) / bare)
-    ratio = statistics.median(ratios)
+    bare, flown, start = [], [], []
+    for _ in range(ROUNDS):  # in turn, so that a machine that drifts does so for all three
+        bare.append(bare_s(long))
+        flown.append(flown_s(long))
+        start.append(flown_s(short))
+    # What disturbs a measurement only ever adds to it: the least of each is the cost.
+    ratio = (min(flown) - min(start)) / min(bare)
     print(f"\n{run}, {controls} control(s): {ratio:.2f} times run(), bound {most}")
     assert ratio <= most
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,15 +82,20 @@ def test_a_state_that_is_not_finite_ends_the_flight(
 ) -> None:
     """A NaN command gives JSBSim an all-NaN state while run() goes on saying true."""
     flown = scenario(tmp_path, 'kind = "step"\nforce_N = 10.0')
-    step_frame = loop.step_frame
+    bound = loop.bound
     calls = 0
 
-    def broken(*args: object) -> tuple[float, float, float]:
-        nonlocal calls
-        calls += 1
-        return (float("nan"), 0.0, 0.0) if calls == 100 else step_frame(*args)
+    def breaking(kernel: Any, *arguments: Any) -> Any:
+        whole = bound(kernel, *arguments)
 
-    monkeypatch.setattr(loop, "step_frame", broken)
+        def broken(*now: Any) -> tuple[float, float, float]:
+            nonlocal calls
+            calls += 1
+            return (float("nan"), 0.0, 0.0) if calls == 100 else whole(*now)
+
+        return broken
+
+    monkeypatch.setattr(loop, "bound", breaking)
     record = fly(flown)
     ended = record.manifest["ended_early"]
     assert ended["reason"] == "the state is not finite"

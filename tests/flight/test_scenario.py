@@ -92,7 +92,10 @@ def test_a_fault_is_one_line_with_its_key(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time_s,column_force_N\n0,0\n1,\n2,3\n", "row 3 holds no finite number"),
+        (
+            "time_s,column_force_N\n0,0\n1,\n2,3\n",
+            "row 3 holds no finite number",
+        ),
         ("time_s,column_force_N\n0,0\n1,x\n", "row 3"),
         ("time_s,column_force_N\n0,0\n2,1\n1,1\n", "must rise: row 4"),
         ("time_s,force\n0,0\n1,1\n", "no such column; known: force, time_s"),

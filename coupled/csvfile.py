@@ -1,0 +1,56 @@
+"""Columns of numbers from a CSV or Parquet file; a fault names the file, the column, the row."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.schema import LARGEST
+
+Floats = NDArray[np.float64]
+
+
+def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
+    """Return a table's columns by name, as doubles.
+
+    An empty cell is NaN where `gaps` are allowed, and a fault where not.
+    """
+    try:
+        content = io.BytesIO(path.read_bytes())
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    try:
+        if path.suffix.lower() == ".parquet":
+            table = pl.read_parquet(content)
+        else:
+            table = pl.read_csv(content, infer_schema=False)
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise InputError(path, "", f"is not a table: {str(error).splitlines()[0]}") from None
+    doubled = [name for name in table.columns if "_duplicated_" in name]
+    if doubled:
+        raise InputError(path, doubled[0].partition("_duplicated_")[0], "stands there twice")
+    return {name: _numbers(path, name, table[name], gaps) for name in table.columns}
+
+
+def _numbers(path: Path, name: str, column: pl.Series, gaps: bool) -> Floats:
+    if column.dtype == pl.String:
+        column = column.str.strip_chars()
+        column = column.set(column == "", None)
+    numbers = column.cast(pl.Float64, strict=False)
+    text = np.flatnonzero(numbers.is_null().to_numpy() & column.is_not_null().to_numpy())
+    if text.size:
+        row = int(text[0])
+        raise InputError(path, name, f"row {row + 2} holds {column[row]!r}, which is no number")
+    values = numbers.to_numpy().astype(np.float64)
+    bad = np.isinf(values) | (np.abs(values) > LARGEST)
+    if not gaps:
+        bad |= np.isnan(values)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(path, name, f"row {row + 2} holds no finite number; a table has no gaps")
+    return values

@@ -1,0 +1,78 @@
+"""The two calls of every frame, to read the motion and to run: written out, to be quick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from coupled.units import FOOT_m, PSF_Pa
+
+
+def motion_reader(
+    longitudinal: Sequence[Callable[[], float]], lateral: Sequence[Callable[[], float]]
+) -> Callable[[], tuple[float, ...]]:
+    """Return a function that reads the motion in SI; written out, since every frame calls it."""
+    qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = longitudinal
+
+    def column() -> tuple[float, ...]:
+        return (
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            height() * FOOT_m,
+        )
+
+    if not lateral:
+        return column
+    aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
+
+    def all_controls() -> tuple[float, ...]:
+        return (
+            *column(),
+            aileron(),
+            rudder(),
+            roll_rate(),
+            yaw_rate(),
+            beta(),
+            roll(),
+            heading(),
+        )
+
+    return all_controls
+
+
+def stepper(
+    run: Callable[[], bool],
+    writes: Sequence[tuple[Callable[[float], object], float]],
+    steps: int,
+) -> Callable[[tuple[float, float, float]], None]:
+    """Return a function that runs a frame with commands about trim, one a control."""
+    (first, first_trim), *others = writes
+
+    def one(commands: tuple[float, float, float], /) -> None:
+        first(first_trim + commands[0])
+        run()
+
+    def several(commands: tuple[float, float, float], /) -> None:
+        for (write, trim), command in zip(writes, commands, strict=False):
+            write(trim + command)
+        for _ in range(steps):
+            run()
+
+    if steps > 1 or len(others) == 1:
+        return several
+    if not others:
+        return one
+    (second, second_trim), (third, third_trim) = others
+
+    def three(commands: tuple[float, float, float], /) -> None:
+        a, b, c = commands
+        first(first_trim + a)
+        second(second_trim + b)
+        third(third_trim + c)
+        run()
+
+    return three
