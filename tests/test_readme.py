@@ -84,7 +84,8 @@ def test_the_python_example_prints_what_it_says(folder: Path) -> None:
 
 
 def test_the_pictures_and_pages_that_the_readme_shows_are_there() -> None:
-    for target in re.findall(r"\]\(([^)#:]+)\)", README.read_text(encoding="utf-8")):
+    text = README.read_text(encoding="utf-8")
+    for target in [*re.findall(r"\]\(([^)#:]+)\)", text), *re.findall(r'src="([^"]+)"', text)]:
         assert (ROOT / target).exists(), target
 
 
