@@ -201,6 +201,36 @@ def plot(
     _say(f"figure: {path}")
 
 
+@app.command(epilog="[dim]Example: coupled diagnose out/737.csv --rig 737 --json out/737.json[/]")
+def diagnose(
+    record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
+    rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")],
+    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    json_file: JsonOption = "",
+) -> None:
+    """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
+    from coupled.channels import CONTROL_NAMES
+    from coupled.gap.diagnose import diagnose as find_gap
+    from coupled.gap.diagnose import in_words
+    from coupled.record import read_record
+    from coupled.resources import find
+    from coupled.rig.rigfile import read_rig
+    from coupled.tables import print_stages
+
+    rig_file = find(rig, shipped_rigs(), "rig")
+    _check_json(json_file, [record, rig_file])
+    for name in CONTROL_NAMES:
+        if name == control:
+            diagnosis, _ = find_gap(read_rig(rig_file), read_record(record), name, record)
+            break
+    else:
+        raise InputError(record, "--control", f"is {control!r}; one of {', '.join(CONTROL_NAMES)}")
+    if json_file != "-":
+        out.print(in_words(diagnosis, control), markup=False, highlight=False)
+        print_stages(out, diagnosis)
+    _give_json(diagnosis, json_file)
+
+
 @app.command()
 def runs(json_file: JsonOption = "") -> None:
     """List the shipped run files, what each shows, and the shipped rigs."""

@@ -74,6 +74,12 @@ def drive_loader(
     return out[0], out[1]
 
 
+def replay_product(rig: Rig, control: str, computed: Floats, gradient: Floats) -> Floats:
+    """Return F_mod in N for δc in d at each frame and G_T in N/d, on a rig of one segment."""
+    p, s = _one(rig, control)
+    return _product(p, s, computed, gradient, np.empty_like(computed))
+
+
 def replay_linkage(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
     """Return what the transducer at the grip reads, d, for δc in d and F in N."""
     p, s = _one(rig, control)
@@ -146,6 +152,15 @@ def _loader(
         if k + 1 < frames:
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
                 move_loader(p.loader, p.friction, m, s.loader, force[node], h)
+
+
+@entry
+def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) -> Floats:
+    m = s[0].modification
+    for k in range(len(out)):
+        set_gradients(p[0].modification, m, gradient[k], gradient[k])
+        out[k] = modifying_force(m, computed[k])
+    return out
 
 
 @entry

@@ -1,0 +1,172 @@
+"""The library of effects: what a rig may have and its nominal model lacks.
+
+An entry is data: a name, the stage where it acts, and the parameters of the rig that it
+frees, with their bounds and where a fit starts. Adding an effect to a rig means writing
+values into the rig's own data, which the same stages then fly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from coupled.channels import ControlName, unit_of
+from coupled.rig.parameters import Rig
+
+Mode = Literal["value", "factor", "added", "switch"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One freed number of the rig: `section.field`, and how a fitted value enters it.
+
+    `value` replaces the nominal one, `factor` multiplies it, `added` is added to it; a
+    `switch` has no number, and sets the field to `on`. `{d}` in the name is m, or rad on a wheel.
+    """
+
+    name: str
+    section: str
+    field: str
+    mode: Mode
+    low: float = 0.0
+    high: float = 0.0
+    starts: tuple[float, ...] = (0.0,)
+    on: Any = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named effect of one stage."""
+
+    name: str
+    stage: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def free(self) -> tuple[Parameter, ...]:
+        """The parameters that have a number to fit."""
+        return tuple(p for p in self.parameters if p.mode != "switch")
+
+
+def _one(stage: str, name: str, parameter: Parameter) -> Effect:
+    return Effect(name, stage, (parameter,))
+
+
+def _factor(
+    section: str, field: str, start: float, low: float = 0.1, high: float = 10.0
+) -> Parameter:
+    return Parameter("factor", section, field, "factor", low, high, (start,))
+
+
+def _added(
+    name: str, section: str, field: str, low: float, high: float, *starts: float
+) -> Parameter:
+    return Parameter(name, section, field, "added", low, high, starts)
+
+
+def _value(
+    name: str, section: str, field: str, low: float, high: float, *starts: float
+) -> Parameter:
+    return Parameter(name, section, field, "value", low, high, starts)
+
+
+def _switch(section: str, field: str, on: Any) -> Parameter:
+    return Parameter("", section, field, "switch", on=on)
+
+
+EFFECTS: tuple[Effect, ...] = (
+    _one("schedule", "pressure_lag", _value("lag_s", "schedule", "pressure_lag", 0, 10, 0.3)),
+    _one("schedule", "pressure_scale", _factor("schedule", "pressure_scale", 1.05)),
+    _one("schedule", "schedule_slope", _factor("schedule", "slope", 1.05)),
+    _one("loader", "coulomb_friction", _added("friction_N", "loader", "friction", 0, 60, 1.5)),
+    Effect(
+        "stribeck_friction",
+        "loader",
+        (
+            _added("friction_N", "loader", "friction", 0, 60, 1.0),
+            _value("breakaway_N", "loader", "breakaway", 0, 120, 3.0),
+        ),
+    ),
+    _one("loader", "viscous_damping", _factor("loader", "damping", 1.2)),
+    _one("loader", "inertia", _factor("loader", "mass", 1.2)),
+    _one("loader", "gradient_error", _factor("loader", "basic_gradient", 1.05)),
+    _one("loader", "cubic_stiffness", _added("cubic_N_per_{d}3", "loader", "cubic", 0, 1e7, 2e4)),
+    _one("loader", "breakout", _added("breakout_N", "loader", "breakout", 0, 60, 2.0)),
+    _one("loader", "bob_weight", _added("force_N_per_g", "loader", "bob_weight", -200, 200, 5.0)),
+    _one("loader", "force_offset", _added("offset_N", "loader", "offset", -100, 100, 1.0)),
+    _one("loader", "digital_multiplier", _switch("loader", "multiplier", "digital")),
+    _one("loader", "transport_delay", _added("delay_s", "loader", "delay", 0, 0.19, 0.01, 0.04)),
+    _one("sensing", "deflection_scale", _factor("sensing", "deflection_scale", 1.03)),
+    _one("linkage", "bend", _value("bend_{d}_per_N", "loader", "bend", 0, 1e-2, 5e-5)),
+    Effect(
+        "stiffening_bend",
+        "linkage",
+        (
+            _value("bend_{d}_per_N", "loader", "bend", 0, 1e-2, 1e-4),
+            _value("limit_{d}", "loader", "bend_limit", 1e-4, 1, 5e-3, 2e-2),
+        ),
+    ),
+    _one("linkage", "backlash", _added("play_{d}", "loader", "play", 0, 0.1, 5e-4, 3e-3)),
+    _one("linkage", "servo_lag", _factor("loader", "servo_frequency", 0.8)),
+    _one(
+        "linkage",
+        "servo_rate_limit",
+        _value("rate_{d}_per_s", "loader", "servo_rate_limit", 1e-3, 10, 0.05, 0.2),
+    ),
+    _one("linkage", "arc_geometry", _switch("loader", "arc_geometry", True)),
+    _one(
+        "surface", "cable_stretch", _added("loss_per_Pa", "rigging", "stretch_loss", 0, 1e-2, 1e-5)
+    ),
+    _one("surface", "surface_lag", _added("lag_s", "rigging", "lag", 0, 3, 0.05)),
+    _one(
+        "surface",
+        "surface_rate_limit",
+        _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.3, 1.0),
+    ),
+    _one("surface", "surface_freeplay", _added("play_norm", "rigging", "play", 0, 0.5, 0.01)),
+    _one("surface", "rigging_offset", _added("offset_norm", "rigging", "offset", -0.5, 0.5, 0.01)),
+)
+BY_NAME = {effect.name: effect for effect in EFFECTS}
+STAGES = ("schedule", "loader", "sensing", "linkage", "compensation", "surface", "airframe")
+
+
+def parameter_name(parameter: Parameter, control: str) -> str:
+    """Return a parameter's name with its unit on this control."""
+    return parameter.name.format(d=unit_of(control))
+
+
+def _entered(parameter: Parameter, nominal: Any, value: float) -> Any:
+    """Return the rig's new number for a fitted value."""
+    if parameter.mode == "switch":
+        return parameter.on
+    if parameter.mode == "factor":
+        return nominal * value
+    return nominal + value if parameter.mode == "added" else value
+
+
+def apply(
+    rig: Rig, control: ControlName, effects: Sequence[Effect], values: Mapping[str, float]
+) -> Rig:
+    """Return the rig with effects added; `values` by "effect.parameter".
+
+    The host goes on believing what it believed: its G_B and F_BO are pinned to the nominal.
+    """
+    data = rig.controls[control]
+    sections: dict[str, dict[str, Any]] = {}
+    for effect in effects:
+        for p in effect.parameters:
+            nominal = getattr(getattr(data, p.section), p.field)
+            new = _entered(p, nominal, values.get(f"{effect.name}.{p.name}", 0.0))
+            sections.setdefault(p.section, {})[p.field] = new
+    host = data.compensation
+    believed = {
+        "basic_gradient": data.loader.basic_gradient
+        if host.basic_gradient is None
+        else host.basic_gradient,
+        "breakout": data.loader.breakout if host.breakout is None else host.breakout,
+    }
+    changed = {name: getattr(data, name).model_copy(update=new) for name, new in sections.items()}
+    changed["compensation"] = host.model_copy(update=believed)
+    controls = {**rig.controls, control: data.model_copy(update=changed)}
+    return rig.model_copy(update={"controls": controls})

@@ -1,0 +1,220 @@
+"""Each stage's residual: what is measured less what the stage makes of its measured input.
+
+The chain is cut at every measured signal, so that a fault upstream is inherited by nobody.
+Inputs are smoothed first (`smooth`). A residual is divided by the channel's floor: its own
+white noise, told by fourth differences (gain √70), and the input's carried through the stage.
+
+    schedule      q̄ → G_T                       surface   δ̂, q̄ → elevator
+    loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
+    multiplier    δc, G_T → F_mod (part of the loader)
+    linkage       δc, F → δ
+    compensation  δc, F → δ̂ (the host's own arithmetic)
+
+A wrong scale S₁ is not a stage that can be driven alone: it shows in the loader's, the
+multiplier's and the linkage's residuals at once, so it is judged on all three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import ControlName, channel
+from coupled.gap.smooth import smoothed
+from coupled.record import Record
+from coupled.rig.parameters import Rig
+from coupled.rig.replay import (
+    replay_compensation,
+    replay_linkage,
+    replay_loader,
+    replay_product,
+    replay_schedule,
+    replay_surface,
+)
+
+Floats = NDArray[np.float64]
+Predict = Callable[[Rig], Floats]
+TRIES = 4  # realisations of the input's noise, to carry it through a stage
+
+
+@dataclass(frozen=True)
+class Output:
+    """One measured output of a stage, and how a rig predicts it from the measured input.
+
+    `floor` is the rms that noise alone leaves, in the channel's unit.
+    """
+
+    stage: str
+    channel: str
+    measured: Floats
+    predict: Predict
+    floor: float
+
+    def residual(self, rig: Rig) -> Floats:
+        """Return measured less predicted, in floors, shape (frames,)."""
+        return (self.measured - self.predict(rig)) / self.floor
+
+
+def white(signal: Floats) -> float:
+    """Return the white noise in a smooth signal, by its fourth differences."""
+    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Builds the outputs that a record lets judge, and says which channels lack."""
+
+    rig: Rig
+    record: Record
+    control: ControlName
+    surface_points: Callable[[Rig], tuple[Floats, Floats]]  # the model's own command map
+
+    def signal(self, quantity: str) -> Floats:
+        """Return a control's channel."""
+        return self.record[channel(self.control, quantity)]
+
+    def missing(self) -> dict[str, list[str]]:
+        """Return the channels that each stage would need and the record lacks."""
+        needs = {
+            "schedule": ["dynamic_pressure_Pa", self._name("gradient")],
+            "loader": [self._name(q) for q in ("force", "gradient", "computed")],
+            "multiplier": [self._name(q) for q in ("computed", "gradient", "modifying_force")],
+            "linkage": [self._name(q) for q in ("computed", "force", "deflection")],
+            "compensation": [self._name(q) for q in ("computed", "force", "estimate")],
+            "surface": [self._name("estimate"), "dynamic_pressure_Pa", "elevator_rad"],
+        }
+        lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        return {stage: names for stage, names in lacking.items() if names}
+
+    def _name(self, quantity: str) -> str:
+        return channel(self.control, quantity)
+
+    def outputs(self) -> list[Output]:
+        """Return every output that the record lets judge, in the order of the chain."""
+        lacking = self.missing()
+        makers = {
+            "schedule": self._schedule,
+            "loader": self._loader,
+            "multiplier": self._multiplier,
+            "linkage": self._linkage,
+            "surface": self._surface,
+        }
+        found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
+        return [out for out in found if np.isfinite(out.floor) and out.floor > 0.0]
+
+    def _made(
+        self,
+        stage: str,
+        name: str,
+        measured: Floats,
+        predict: Predict,
+        noisy: Callable[[Rig, int], Floats],
+        own: float,
+    ) -> Output:
+        """Return an output whose floor is its own noise and its input's, carried through."""
+        base = predict(self.rig)
+        tries = [noisy(self.rig, k) - base for k in range(TRIES)]
+        carried = float(np.sqrt(np.mean(np.square(tries)))) if tries else 0.0
+        return Output(stage, name, measured, predict, float(np.hypot(own, carried)))
+
+    def _noise(self, signal: Floats, k: int, level: float) -> Floats:
+        return signal + np.random.default_rng([41, k]).normal(0.0, level, len(signal))
+
+    def _schedule(self) -> list[Output]:
+        pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
+        own, level, calm = white(gradient), white(pressure), smoothed(pressure)
+
+        def predict(rig: Rig, q: Floats = calm) -> Floats:
+            return replay_schedule(rig, self.control, q)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            return predict(rig, smoothed(self._noise(calm, k, level)))
+
+        made = self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)
+        return [made]
+
+    def _loader(self) -> list[Output]:
+        noisy_force, gradient = self.signal("force"), self.signal("gradient")
+        force, level = smoothed(noisy_force), white(noisy_force)
+        computed = self.signal("computed")
+        flown = "load_factor" in self.record
+        load = smoothed(self.record["load_factor"]) if flown else None
+
+        def predict(rig: Rig, f: Floats = force) -> Floats:
+            scale = rig.controls[self.control].sensing.deflection_scale
+            return scale * replay_loader(rig, self.control, f, gradient, computed, load)[0]
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            return predict(rig, smoothed(self._noise(force, k, level)))
+
+        name = self._name("computed")
+        return [self._made("loader", name, computed, predict, noisy, white(computed))]
+
+    def _multiplier(self) -> list[Output]:
+        """Return F_mod against the product it should be: of δc itself, or of δc as read.
+
+        A digital product repeats the noise of the δc that it was made from, an analog one
+        does not know of it; a wrong scale is in the one and not in the other.
+        """
+        computed, product = self.signal("computed"), self.signal("modifying_force")
+        gradient, calm = self.signal("gradient"), smoothed(computed)
+
+        def predict(rig: Rig) -> Floats:
+            data = rig.controls[self.control]
+            read = computed if data.loader.multiplier == "digital" else calm
+            if data.loader.multiplier == "hybrid":
+                read = read / data.sensing.deflection_scale
+            return replay_product(rig, self.control, read, gradient)
+
+        own = white(product)
+        return [Output("multiplier", self._name("modifying_force"), product, predict, own)]
+
+    def _linkage(self) -> list[Output]:
+        computed, force = self.signal("computed"), self.signal("force")
+        measured = self.signal("deflection")
+        levels, calm, calm_force = (
+            (white(computed), white(force)),
+            smoothed(computed),
+            smoothed(force),
+        )
+
+        def predict(rig: Rig, c: Floats = calm, f: Floats = calm_force) -> Floats:
+            scale = rig.controls[self.control].sensing.deflection_scale
+            return replay_linkage(rig, self.control, c / scale, f)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            c = smoothed(self._noise(calm, k, levels[0]))
+            return predict(rig, c, smoothed(self._noise(calm_force, k + TRIES, levels[1])))
+
+        name = self._name("deflection")
+        return [self._made("linkage", name, measured, predict, noisy, white(measured))]
+
+    def _surface(self) -> list[Output]:
+        if self.control != "column" or self.rig.flight is None:
+            return []
+        believed, measured = self.signal("estimate"), self.record["elevator_rad"]
+        pressure = self.record["dynamic_pressure_Pa"]
+        command = replay_surface(self.rig, self.control, believed, pressure)
+        commands_at, positions = self.surface_points(self.rig)
+
+        def position(wanted: Floats) -> Floats:
+            return np.interp(wanted, commands_at, positions)
+
+        def predict(rig: Rig) -> Floats:
+            commands = replay_surface(rig, self.control, believed, pressure)
+            # Row k is the answer to row k − 1; the first is the trim.
+            return position(np.concatenate(([0.0], commands[:-1])))
+
+        # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
+        left = measured - position(np.concatenate(([0.0], command[:-1])))
+        return [Output("surface", "elevator_rad", measured, predict, white(left))]
+
+
+def compensation_gap(reader: Reader) -> float:
+    """Return the rms departure of the host's δ̂ from its own arithmetic, over δc's noise."""
+    computed, force = reader.signal("computed"), reader.signal("force")
+    made = replay_compensation(reader.rig, reader.control, computed, force)
+    return float(np.sqrt(np.mean((reader.signal("estimate") - made) ** 2))) / white(computed)

@@ -1,0 +1,188 @@
+"""Diagnoses of records whose effect is known, of records without one, and of one from outside."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coupled.errors import InputError
+from coupled.gap.diagnose import diagnose, in_words
+from coupled.gap.effects import BY_NAME, EFFECTS, apply
+from coupled.gap.smooth import smoothed
+from coupled.gap.stages import white
+from coupled.record import Record, read_record, write_record
+from coupled.rig.rigfile import read_rig
+from tests.gap.made import made, nominal_rig
+from tests.reference.test_records import FOUNDERS, RECORDS
+from tests.test_cli import ROOT, coupled
+
+SINGLES: list[tuple[bool, str, dict[str, float]]] = [
+    (False, "coulomb_friction", {"friction_N": 2.0}),
+    (False, "viscous_damping", {"factor": 1.5}),
+    (False, "inertia", {"factor": 1.4}),
+    (False, "gradient_error", {"factor": 1.08}),
+    (False, "cubic_stiffness", {"cubic_N_per_{d}3": 2e5}),
+    (False, "breakout", {"breakout_N": 2.5}),
+    (True, "bob_weight", {"force_N_per_g": 8.0}),
+    (True, "force_offset", {"offset_N": 1.5}),
+    (False, "digital_multiplier", {}),
+    (False, "transport_delay", {"delay_s": 0.03}),
+    (True, "deflection_scale", {"factor": 1.05}),
+    (True, "bend", {"bend_{d}_per_N": 1.6e-4}),
+    (False, "stiffening_bend", {"bend_{d}_per_N": 1.5e-4, "limit_{d}": 4e-3}),
+    (False, "backlash", {"play_{d}": 1e-3}),
+    (False, "servo_lag", {"factor": 0.6}),
+    (False, "servo_rate_limit", {"rate_{d}_per_s": 0.06}),
+    (True, "cable_stretch", {"loss_per_Pa": 4e-5}),
+    (True, "surface_lag", {"lag_s": 0.08}),
+    (True, "surface_rate_limit", {"rate_norm_per_s": 0.4}),
+    (True, "surface_freeplay", {"play_norm": 0.02}),
+    (True, "rigging_offset", {"offset_norm": 0.01}),
+    (False, "pressure_lag", {"lag_s": 0.5}),
+    (False, "pressure_scale", {"factor": 1.06}),
+    (False, "schedule_slope", {"factor": 1.1}),
+]
+
+
+def diagnosed(
+    folder: Path, flown: bool, values: Mapping[str, Mapping[str, float]], seed: int = 4
+) -> dict[str, Any]:
+    nominal = nominal_rig(flown)
+    found, _ = diagnose(nominal, made(folder, nominal, values, seed), "column")
+    json.dumps(found, allow_nan=False)
+    return found
+
+
+@pytest.mark.parametrize(("flown", "name", "values"), SINGLES, ids=[name for _, name, _ in SINGLES])
+def test_a_single_effect_is_named_at_its_stage_and_size(
+    tmp_path: Path, flown: bool, name: str, values: dict[str, float]
+) -> None:
+    found = diagnosed(tmp_path, flown, {name: values})
+    assert [effect["name"] for effect in found["effects"]] == [name], found
+    assert found["verdict"] in ("effect", "ambiguous")
+    guilty = [stage for stage, judged in found["stages"].items() if judged.get("guilty")]
+    assert guilty == [BY_NAME[name].stage]
+    got = found["effects"][0]["parameters"]
+    for key, value in values.items():
+        measured = got[key.format(d="m")]["value"]
+        assert measured == pytest.approx(value, rel=0.06), got
+    assert found["shrink"]["closed"] > 0.95 or name == "digital_multiplier"
+    assert name.replace("_", " ") in in_words(found, "column")
+
+
+def test_two_effects_at_two_stages_are_both_named(tmp_path: Path) -> None:
+    pair = {"inertia": {"factor": 1.4}, "backlash": {"play_{d}": 1e-3}}
+    found = diagnosed(tmp_path, False, pair)
+    assert {effect["name"] for effect in found["effects"]} == set(pair)
+    assert found["verdict"] == "effect"
+
+
+@pytest.mark.parametrize("flown", [False, True])
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_without_an_effect_there_is_no_gap(tmp_path: Path, flown: bool, seed: int) -> None:
+    found = diagnosed(tmp_path, flown, {}, seed)
+    assert found["verdict"] == "no_gap"
+    assert found["effects"] == []
+    assert all(judged["gap"] < 1.15 for judged in found["stages"].values())
+
+
+def test_an_effect_outside_the_library_is_unexplained_at_its_stage(tmp_path: Path) -> None:
+    """A transducer that jumps back and forth by two millimetres now and then."""
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {}, 5)
+    data = record.data.copy()
+    at = record.channels.index("column_deflection_m")
+    data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    found, _ = diagnose(nominal, Record(record.channels, data), "column")
+    assert found["verdict"] == "unexplained"
+    assert [s for s, judged in found["stages"].items() if judged.get("guilty")] == ["linkage"]
+
+
+def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {"backlash": {"play_{d}": 1e-3}}, 6)
+    keep = [name for name in record.channels if name != "column_deflection_m"]
+    data = np.column_stack([record[name] for name in keep])
+    found, _ = diagnose(nominal, Record(tuple(keep), data), "column")
+    assert found["stages"]["linkage"] == {"judged": False, "missing": ["column_deflection_m"]}
+    assert found["verdict"] == "no_gap"
+
+
+@pytest.mark.skipif(not FOUNDERS.is_dir(), reason="the founders' records are not beside the clone")
+@pytest.mark.parametrize("name", RECORDS)
+def test_another_programs_clean_records_have_no_gap(name: str) -> None:
+    rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
+    found, _ = diagnose(rig, read_record(FOUNDERS / "examples" / f"{name}.csv"), "column")
+    assert found["verdict"] == "no_gap", found["stages"]
+
+
+def spoiled(record: Record, **changes: Any) -> Record:
+    data = record.data.copy()
+    for name, change in changes.items():
+        at = record.channels.index(name)
+        data[:, at] = change(data[:, at])
+    return Record(record.channels, data)
+
+
+def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
+    nominal = nominal_rig(False)
+    good = made(tmp_path, nominal, {}, 7)
+    computed = good["column_computed_m"]
+    cases: list[tuple[Record, str]] = [
+        (spoiled(good, column_force_N=lambda f: f / 4.448), "it is in pounds"),
+        (spoiled(good, column_computed_m=lambda x: 0.0 * x), "never changes"),
+        (spoiled(good, column_deflection_m=lambda x: computed), "is a copy of column_computed_m"),
+        (spoiled(good, column_deflection_m=lambda x: x * 1000.0), "another unit"),
+        (spoiled(good, column_force_N=lambda f: np.where(f > 30.0, np.nan, f)), "holds no number"),
+        (spoiled(good, time_s=lambda t: np.where(t > 20.0, t + 1.0, t)), "a gap or a jump after"),
+        (spoiled(good, time_s=lambda t: t * 2.0), "another rig?"),
+        (Record(good.channels, good.data[:600]), "10 s are needed"),
+    ]
+    for record, says in cases:
+        with pytest.raises(InputError, match=says.replace("?", r"\?")) as caught:
+            diagnose(nominal, record, "column", "r.csv")
+        assert str(caught.value).startswith("r.csv: ")
+
+
+def test_effects_are_data_that_leave_the_host_its_belief() -> None:
+    nominal = nominal_rig(False)
+    rig = apply(nominal, "column", [BY_NAME["gradient_error"]], {"gradient_error.factor": 1.1})
+    column = rig.controls["column"]
+    assert column.loader.basic_gradient == pytest.approx(616.0)
+    assert column.compensation.basic_gradient == 560.0
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS) == 26
+
+
+def test_the_smoother_takes_noise_off_and_leaves_edges() -> None:
+    rng = np.random.default_rng(3)
+    t = np.arange(2400) / 120
+    smooth = 20.0 * np.sin(3.0 * t) + 10.0 * np.sin(11.0 * t)
+    left = smoothed(smooth + rng.normal(0.0, 0.15, len(t))) - smooth
+    assert np.std(left) < 0.4 * 0.15
+    assert white(smooth + rng.normal(0.0, 0.15, len(t))) == pytest.approx(0.15, rel=0.1)
+    edge = np.where(t < 10.0, 0.0, 30.0)
+    kept = smoothed(edge + rng.normal(0.0, 0.05, len(t)))
+    assert np.mean(np.abs(kept - edge) > 3.0) < 0.01
+
+
+def test_diagnose_on_the_command_line(tmp_path: Path) -> None:
+    rig = ROOT / "aircraft" / "T37" / "report-column.toml"
+    nominal = read_rig(rig)
+    record = made(tmp_path, nominal, {"backlash": {"play_{d}": 1e-3}}, 8)
+    write_record(record, tmp_path / "r.csv")
+    done = coupled(tmp_path, "diagnose", "r.csv", "--rig", "report-column", "--json", "d.json")
+    assert done.returncode == 0, done.stderr
+    assert "The gap lies in the linkage: backlash" in " ".join(done.stdout.split())
+    found = json.loads((tmp_path / "d.json").read_text())
+    assert found["effects"][0]["parameters"]["play_m"]["value"] == pytest.approx(1e-3, rel=0.05)
+    refused = coupled(tmp_path, "diagnose", "r.csv", "--rig", "bench")
+    assert refused.returncode == 0
+    assert "No gap" not in refused.stdout  # another rig's gradients are a gap
+    wrong = coupled(tmp_path, "diagnose", "r.csv", "--rig", "report-column", "--control", "wheel")
+    assert wrong.returncode == 2
+    assert wrong.stderr.count("\n") == 1
