@@ -16,9 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import jsbsim
+import numpy as np
+from numpy.typing import NDArray
 
 from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
+from coupled.flight.altered import altered
 from coupled.flight.everyframe import motion_reader, stepper
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
@@ -48,6 +51,7 @@ _LATERAL = (
 assert len(_LONGITUDINAL) == len(LONGITUDINAL)
 assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
+ELEVATOR = LONGITUDINAL.index("elevator_rad")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -75,6 +79,7 @@ class _Log(jsbsim.FGLogger):
         """End a message."""
 
 
+Floats = NDArray[np.float64]
 _log = _Log()
 _base: Callable[[], Any] = jsbsim.FGJSBBase  # its debug level is the library's
 
@@ -125,6 +130,8 @@ class JSBSimAirframe:
             node = self._node(_COMMANDS[SURFACES[control]])
             writes.append((node.set_double_value, node.get_double_value()))
         self.step = stepper(self._fdm.run, writes, flight.steps_per_frame)
+        if flight.elevator_effectiveness != 1.0 or flight.pitch_damping != 1.0:
+            self.motion, self.step = altered(self, flight, models, frame_s)
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
@@ -217,6 +224,33 @@ class JSBSimAirframe:
             raise self._fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
+
+    def pitch_moments(self) -> tuple[float, float]:
+        """Return what moves the nose, by finite differences.
+
+        The pitching acceleration per pitch rate, 1/s, and per unit of elevator command,
+        rad/s². Spends this aircraft: it is put back to its initial conditions.
+        """
+        fdm, command = self._fdm, _COMMANDS["elevator"]
+        trim, found = fdm[command], []
+        for rate, step in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02)):
+            fdm["ic/q-rad_sec"], fdm[command] = rate, trim + step
+            fdm.run_ic()
+            found.append(fdm["accelerations/qdot-rad_sec2"])
+        up, down, forth, back = found
+        return (up - down) / 0.04, (forth - back) / 0.04
+
+    def surface_map(self) -> tuple[Floats, Floats]:
+        """Return commands about trim, and where the elevator stands for each, rad.
+
+        Spends this aircraft: it is flown through all of them, a frame each.
+        """
+        commands = np.linspace(-1.5, 1.5, 601)
+        positions = np.empty_like(commands)
+        for i, command in enumerate(commands):
+            self.step((float(command), 0.0, 0.0))
+            positions[i] = self.motion()[ELEVATOR]
+        return commands, positions
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

@@ -2,8 +2,7 @@
 
 The surface's position is taken back to the command that the model's own map needs for it,
 and the model is flown by that from trim. Pitch rate is compared: it is what the elevator
-works on, and drifts least. Only where the gap lies is judged here; no effect of the airframe is
-fitted yet.
+works on, and drifts least. A gust is not tried yet.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from coupled.gap.smooth import smoothed
 from coupled.gap.stages import Output, white
 from coupled.record import Record
 from coupled.resources import aircraft_folder
-from coupled.rig.parameters import Rig
+from coupled.rig.parameters import Flight, Rig
 
 Floats = NDArray[np.float64]
 RATE = "pitch_rate_rad_per_s"
@@ -30,18 +29,31 @@ def airframe_output(rig: Rig, record: Record) -> Output | None:
         return None
     elevator, rate = record["elevator_rad"], record[RATE]
     level, calm = white(elevator), smoothed(elevator)
-    flown = _fly(rig, calm)
+    points = surface_points(rig)  # the surface stands where it stands, whatever it does
+    flown = _fly(rig, calm, points)
     noise = np.random.default_rng(43).normal(0.0, level, len(calm))
-    carried = _fly(rig, smoothed(calm + noise)) - flown
+    carried = _fly(rig, smoothed(calm + noise), points) - flown
     floor = float(np.hypot(white(rate), np.sqrt(np.mean(carried**2))))
-    return Output("airframe", RATE, rate, lambda _: flown, floor)
+    nominal = rig.flight
+    known: list[tuple[Flight, Floats]] = [(nominal, flown)]
+
+    def predict(changed: Rig) -> Floats:
+        # The loader's fits ask with the same aircraft again and again: fly it once.
+        for flight, rates in known:
+            if flight == changed.flight:
+                return rates
+        rates = _fly(changed, calm, points)
+        known[1:] = [(changed.flight or nominal, rates)]
+        return rates
+
+    return Output("airframe", RATE, rate, predict, floor)
 
 
-def _fly(rig: Rig, elevator: Floats) -> Floats:
+def _fly(rig: Rig, elevator: Floats, points: tuple[Floats, Floats]) -> Floats:
     """Return the pitch rate of the model while its elevator stands as given, rad/s."""
     assert rig.flight is not None
     frame_s = 1.0 / rig.frame_rate
-    commands, positions = surface_points(rig)
+    commands, positions = points
     order = np.argsort(positions)
     wanted = np.interp(elevator, positions[order], commands[order])
     airframe = JSBSimAirframe(rig.flight, frame_s, ["column"], [aircraft_folder()])
@@ -57,11 +69,6 @@ def _fly(rig: Rig, elevator: Floats) -> Floats:
 def surface_points(rig: Rig) -> tuple[Floats, Floats]:
     """Return commands about trim, and the elevator's positions that the model gives them, rad."""
     assert rig.flight is not None
-    airframe = JSBSimAirframe(rig.flight, 1.0 / rig.frame_rate, ["column"], [aircraft_folder()])
-    at = LONGITUDINAL.index("elevator_rad")
-    commands = np.linspace(-1.5, 1.5, 601)
-    positions = []
-    for command in commands:
-        airframe.step((float(command), 0.0, 0.0))
-        positions.append(airframe.motion()[at])
-    return commands, np.array(positions)
+    flight = rig.flight.model_copy(update={"elevator_effectiveness": 1.0, "pitch_damping": 1.0})
+    frame_s = 1.0 / rig.frame_rate
+    return JSBSimAirframe(flight, frame_s, ["column"], [aircraft_folder()]).surface_map()

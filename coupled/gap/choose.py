@@ -27,6 +27,8 @@ STRETCH_s = 2.5  # a stretch of the record, fitted or held out
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
 SCREENED = 6
+# A pot is set, and a servo tuned, to a few per cent: less than this is no effect.
+TOLERANCE = {"inertia": 0.03, "viscous_damping": 0.03, "servo_lag": 0.03}
 MOST = 4  # effects in one answer
 
 
@@ -117,9 +119,16 @@ def _round(
     for effect in _screened(nominal, control, outputs, current, candidates):
         chosen = (*current.effects, effect)
         fitted = fit(nominal, control, outputs, chosen, fitted_on, current.values)
-        if not any(key.startswith(effect.name) for key in fitted.at_bound):
+        bound = any(key.startswith(effect.name) for key in fitted.at_bound)
+        if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
     return _ranked(outputs, current, found, ~fitted_on)
+
+
+def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
+    """Tell whether a nominal number moved by no more than its setting can be trusted to."""
+    slack = TOLERANCE.get(effect.name)
+    return slack is not None and abs(fitted.values[f"{effect.name}.factor"] - 1.0) < slack
 
 
 def _ranked(

@@ -40,16 +40,16 @@ def diagnose(
     """
     _check(rig, record, control, file)
     reader = Reader(rig, record, control, surface_points)
-    outputs = reader.outputs()
+    airframe = airframe_output(rig, record) if control == "column" else None
+    outputs = reader.outputs() + ([] if airframe is None else [airframe])
     if not outputs:
         raise InputError(file, "", f"lacks the channels of every stage: {reader.missing()}")
     choice = search(rig, control, outputs)
     if choice.steps:
         # What noise leaves depends on the rig: the improved one has floors of its own.
         improved = replace(reader, rig=choice.fit.rig).outputs()
-        choice = replace(choice, after=gaps(improved, choice.fit.rig))
-    airframe = airframe_output(rig, record) if control == "column" else None
-    stages = _stages(reader, outputs, choice, airframe)
+        choice = replace(choice, after={**choice.after, **gaps(improved, choice.fit.rig)})
+    stages = _stages(reader, outputs, choice)
     diagnosis = {
         "verdict": _verdict(choice, stages),
         "stages": stages,
@@ -118,9 +118,7 @@ def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: obje
         )
 
 
-def _stages(
-    reader: Reader, outputs: Sequence[Output], choice: Choice, airframe: Output | None
-) -> dict[str, Any]:
+def _stages(reader: Reader, outputs: Sequence[Output], choice: Choice) -> dict[str, Any]:
     lacking = reader.missing()
     if reader.rig.flight is None:
         lacking.pop("surface", None)
@@ -146,10 +144,7 @@ def _stages(
     if "compensation" not in lacking:
         gap = compensation_gap(reader)
         found["compensation"] = {"gap": gap, "guilty": gap > CLEAR}
-    if airframe is not None:
-        gap = gaps([airframe], reader.rig)[airframe.channel]
-        found["airframe"] = {"gap": gap, "left": gap, "guilty": gap > CLEAR}
-    elif reader.rig.flight is not None:
+    if reader.rig.flight is not None and "airframe" not in before:
         missing = [name for name in NEEDS if name not in reader.record]
         found["airframe"] = {"judged": False, "missing": missing}
     return found

@@ -21,6 +21,8 @@ Mode = Literal["value", "factor", "added", "switch"]
 class Parameter:
     """One freed number of the rig: `section.field`, and how a fitted value enters it.
 
+    The section is one of the control's, or `flight`.
+
     `value` replaces the nominal one, `factor` multiplies it, `added` is added to it; a
     `switch` has no number, and sets the field to `on`. `{d}` in the name is m, or rad on a wheel.
     """
@@ -125,6 +127,8 @@ EFFECTS: tuple[Effect, ...] = (
         _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.3, 1.0),
     ),
     _one("surface", "surface_freeplay", _added("play_norm", "rigging", "play", 0, 0.5, 0.01)),
+    _one("airframe", "elevator_effectiveness", _factor("flight", "elevator_effectiveness", 0.9)),
+    _one("airframe", "pitch_damping", _factor("flight", "pitch_damping", 1.2)),
     _one("surface", "rigging_offset", _added("offset_norm", "rigging", "offset", -0.5, 0.5, 0.01)),
 )
 BY_NAME = {effect.name: effect for effect in EFFECTS}
@@ -156,7 +160,8 @@ def apply(
     sections: dict[str, dict[str, Any]] = {}
     for effect in effects:
         for p in effect.parameters:
-            nominal = getattr(getattr(data, p.section), p.field)
+            holder = rig.flight if p.section == "flight" else getattr(data, p.section)
+            nominal = getattr(holder, p.field)
             new = _entered(p, nominal, values.get(f"{effect.name}.{p.name}", 0.0))
             sections.setdefault(p.section, {})[p.field] = new
     host = data.compensation
@@ -166,7 +171,11 @@ def apply(
         else host.basic_gradient,
         "breakout": data.loader.breakout if host.breakout is None else host.breakout,
     }
+    flight = sections.pop("flight", None)
     changed = {name: getattr(data, name).model_copy(update=new) for name, new in sections.items()}
     changed["compensation"] = host.model_copy(update=believed)
     controls = {**rig.controls, control: data.model_copy(update=changed)}
-    return rig.model_copy(update={"controls": controls})
+    whole: dict[str, Any] = {"controls": controls}
+    if flight is not None and rig.flight is not None:
+        whole["flight"] = rig.flight.model_copy(update=flight)
+    return rig.model_copy(update=whole)

@@ -29,6 +29,7 @@ TOUCHES = {
     "sensing": ("loader", "multiplier", "linkage"),
     "linkage": ("linkage",),
     "surface": ("surface",),
+    "airframe": ("airframe",),
 }
 
 
@@ -102,7 +103,7 @@ def fit(
     for first in _starts(keys, frees, start):
         x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
         found = least_squares(
-            residual, x0, bounds=(low, high), diff_step=1e-3, xtol=1e-7, ftol=1e-9, max_nfev=25
+            residual, x0, bounds=(low, high), diff_step=1e-3, xtol=1e-5, ftol=1e-7, max_nfev=25
         )
         if best is None or found.cost < best.cost:
             best = found

@@ -37,6 +37,7 @@ from coupled.rig.replay import (
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
+ROUGH = 0.25
 TRIES = 4  # realisations of the input's noise, to carry it through a stage
 
 
@@ -120,8 +121,14 @@ class Reader:
         carried = float(np.sqrt(np.mean(np.square(tries)))) if tries else 0.0
         return Output(stage, name, measured, predict, float(np.hypot(own, carried)))
 
-    def _noise(self, signal: Floats, k: int, level: float) -> Floats:
-        return signal + np.random.default_rng([41, k]).normal(0.0, level, len(signal))
+    def _calmed(self, signal: Floats, k: int, level: float) -> Floats:
+        """Return a signal with a try's noise, smoothed; and a share of it as it came.
+
+        The smoother's own error on a signal that is not quite smooth shows in no try; the
+        share of raw noise stands for it.
+        """
+        noisy = signal + np.random.default_rng([41, k]).normal(0.0, level, len(signal))
+        return smoothed(noisy) + ROUGH * (noisy - signal)
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
@@ -131,7 +138,7 @@ class Reader:
             return replay_schedule(rig, self.control, q)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, smoothed(self._noise(calm, k, level)))
+            return predict(rig, self._calmed(calm, k, level))
 
         made = self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)
         return [made]
@@ -148,7 +155,7 @@ class Reader:
             return scale * replay_loader(rig, self.control, f, gradient, computed, load)[0]
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, smoothed(self._noise(force, k, level)))
+            return predict(rig, self._calmed(force, k, level))
 
         name = self._name("computed")
         return [self._made("loader", name, computed, predict, noisy, white(computed))]
@@ -186,8 +193,8 @@ class Reader:
             return replay_linkage(rig, self.control, c / scale, f)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            c = smoothed(self._noise(calm, k, levels[0]))
-            return predict(rig, c, smoothed(self._noise(calm_force, k + TRIES, levels[1])))
+            c = self._calmed(calm, k, levels[0])
+            return predict(rig, c, self._calmed(calm_force, k + TRIES, levels[1]))
 
         name = self._name("deflection")
         return [self._made("linkage", name, measured, predict, noisy, white(measured))]

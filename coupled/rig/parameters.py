@@ -99,12 +99,14 @@ class Control(Section):
 
 
 class Flight(Section):
-    """The JSBSim model, and where it is trimmed."""
+    """The JSBSim model, where it is trimmed, and factors on two of its pitching moments."""
 
     model: str = quantity("", min_length=1)
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
+    elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
+    pitch_damping: float = quantity("", 1.0, ge=0, le=10)
     properties: dict[str, float] = {}
 
 

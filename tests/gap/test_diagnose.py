@@ -43,6 +43,8 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (True, "surface_rate_limit", {"rate_norm_per_s": 0.4}),
     (True, "surface_freeplay", {"play_norm": 0.02}),
     (True, "rigging_offset", {"offset_norm": 0.01}),
+    (True, "elevator_effectiveness", {"factor": 0.85}),
+    (True, "pitch_damping", {"factor": 1.4}),
     (False, "pressure_lag", {"lag_s": 0.5}),
     (False, "pressure_scale", {"factor": 1.06}),
     (False, "schedule_slope", {"factor": 1.1}),
@@ -155,7 +157,7 @@ def test_effects_are_data_that_leave_the_host_its_belief() -> None:
     column = rig.controls["column"]
     assert column.loader.basic_gradient == pytest.approx(616.0)
     assert column.compensation.basic_gradient == 560.0
-    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS) == 26
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS) == 28
 
 
 def test_the_smoother_takes_noise_off_and_leaves_edges() -> None:
