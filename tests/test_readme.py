@@ -62,7 +62,7 @@ def trimmed(text: str) -> str:
 
 def prepare(folder: Path) -> None:
     """Give a folder the files that the README's commands name."""
-    for source in ("tests/data/typo.toml",):
+    for source in ("tests/data/typo.toml", "tests/data/loose.toml"):
         (folder / Path(source).name).write_bytes((ROOT / source).read_bytes())
 
 
