@@ -206,6 +206,9 @@ def diagnose(
     record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
     rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")],
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    improve: Annotated[
+        Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
+    ] = None,
     json_file: JsonOption = "",
 ) -> None:
     """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
@@ -215,19 +218,29 @@ def diagnose(
     from coupled.record import read_record
     from coupled.resources import find
     from coupled.rig.rigfile import read_rig
+    from coupled.rig.rigwrite import rig_text
     from coupled.tables import print_stages
 
     rig_file = find(rig, shipped_rigs(), "rig")
-    _check_json(json_file, [record, rig_file])
+    inputs = [record, rig_file]
+    if improve is not None:
+        check_target(improve, inputs)
+    _check_json(json_file, [*inputs, *([improve] if improve else [])])
     for name in CONTROL_NAMES:
         if name == control:
-            diagnosis, _ = find_gap(read_rig(rig_file), read_record(record), name, record)
+            nominal = read_rig(rig_file)
+            diagnosis, improved = find_gap(nominal, read_record(record), name, record)
             break
     else:
         raise InputError(record, "--control", f"is {control!r}; one of {', '.join(CONTROL_NAMES)}")
     if json_file != "-":
         out.print(in_words(diagnosis, control), markup=False, highlight=False)
         print_stages(out, diagnosis)
+    if improve is not None:
+        remark = f"{rig_file.name} with what was found in {record.name}:\n"
+        write_text(improve, rig_text(improved, remark + in_words(diagnosis, control)))
+        if json_file != "-":
+            _say(f"improved rig: {improve}")
     _give_json(diagnosis, json_file)
 
 

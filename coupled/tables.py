@@ -90,7 +90,8 @@ def print_stages(console: Console, diagnosis: dict[str, Any]) -> None:
         table.add_column(head, justify="right")
     for stage, found in diagnosis["stages"].items():
         if "gap" not in found:
-            table.add_row(stage, "not judged", "", "lacks " + ", ".join(found["missing"]))
+            lacks = "lacks " + ", ".join(found["missing"])
+            table.add_row(stage, "not judged", "", lacks if found["missing"] else "at rest")
             continue
         left = f"{found['left']:.2f}" if "left" in found else ""
         table.add_row(stage, f"{found['gap']:.2f}", left, "guilty" if found["guilty"] else "")

@@ -137,6 +137,8 @@ def _stages(reader: Reader, outputs: Sequence[Output], choice: Choice) -> dict[s
             found[stage] = {"gap": before[stage], "left": after[stage], "guilty": guilty}
         elif stage in lacking:
             found[stage] = {"judged": False, "missing": lacking[stage]}
+        elif stage == "schedule":  # a gradient that never changes tells nothing of it
+            found[stage] = {"judged": False, "missing": []}
     scale = [choice.before[o.channel] for o in outputs if o.stage in ("loader", "linkage")]
     if scale:
         found["sensing"] = {"gap": max(scale) if "sensing" in blamed else 1.0}

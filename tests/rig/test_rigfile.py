@@ -11,6 +11,7 @@ import pytest
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import change, read_rig, rig_from_table
+from coupled.rig.rigwrite import rig_text
 from tests.rigs import BENCH, bench
 
 LOADER = "controls.column.loader"
@@ -23,6 +24,17 @@ def test_every_shipped_rig_reads(name: str) -> None:
     rig = read_rig(shipped_rigs()[name])
     assert rig.name == name
     assert rig.substeps * rig.frame_rate >= 2000.0
+
+
+@pytest.mark.parametrize("name", list(shipped_rigs()))
+def test_a_rig_written_is_read_back_the_same(name: str, tmp_path: Path) -> None:
+    rig = read_rig(shipped_rigs()[name])
+    path = tmp_path / "again.toml"
+    path.write_text(rig_text(rig, "A copy.\nOf two lines."), encoding="utf-8")
+    assert read_rig(path) == rig
+    noisy = rig.model_copy(update={"noise": {"column_force_N": 0.1}})
+    path.write_text(rig_text(noisy), encoding="utf-8")
+    assert read_rig(path) == noisy
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,62 @@
+"""A rig as the text of a rig file: what `rigfile` reads, written back.
+
+Values at their defaults are left out; floats are written so that they read back the same.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from coupled.channels import unit_of
+from coupled.rig.parameters import Rig
+from coupled.schema import Section, file_keys
+
+
+def rig_text(rig: Rig, remark: str = "") -> str:
+    """Return a rig file's text, with a remark at its head."""
+    lines = [f"# {line}".rstrip() for line in remark.splitlines()]
+    lines += _values(rig, "m")
+    if rig.flight is not None:
+        lines += ["", "[flight]", *_values(rig.flight, "m")]
+        lines += _mapping("flight.properties", rig.flight.properties)
+    lines += _mapping("noise", rig.noise)
+    for name, control in rig.controls.items():
+        lines += _table(f"controls.{name}", control, unit_of(name))
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _table(path: str, section: Section, d: str) -> Iterator[str]:
+    """Yield a section's table, then those within it."""
+    values = list(_values(section, d))
+    if values:
+        yield from ("", f"[{path}]", *values)
+    for key, field in file_keys(type(section), d).items():
+        inner = getattr(section, field)
+        if isinstance(inner, Section):
+            yield from _table(f"{path}.{key}", inner, d)
+
+
+def _values(section: Section, d: str) -> Iterator[str]:
+    """Yield the lines of a section's plain values."""
+    for key, field in file_keys(type(section), d).items():
+        value = getattr(section, field)
+        plain = isinstance(value, (bool, int, float, str, list))
+        if plain and value != type(section).model_fields[field].default:
+            yield f"{key} = {_shown(value)}"
+
+
+def _mapping(path: str, values: dict[str, float]) -> list[str]:
+    lines = [f"{json.dumps(name)} = {_shown(value)}" for name, value in values.items()]
+    return ["", f"[{path}]", *lines] if lines else []
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list):
+        return "[" + ", ".join(_shown(item) for item in value) + "]"
+    return repr(value)
