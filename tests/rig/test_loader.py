@@ -59,14 +59,14 @@ def test_a_control_released_inside_the_friction_band_does_not_creep() -> None:
 
 def test_friction_band_is_twice_the_friction_wide() -> None:
     slow = 40.0
-    rig = bench({**PLAIN, "friction_N": 10.0, "damping_N_s_per_m": 1.0})
+    rig = bench({**PLAIN, "friction_N": 10.0, "damping_N_s_per_m": 0.0})
     x = push(rig, lambda t: 40.0 * np.sin(2 * np.pi * t / slow), 1.25 * slow)
     t = times(x)
     force = 40.0 * np.sin(2 * np.pi * t / slow)
     up = (t > slow * 0.76) & (np.abs(x) < 0.02)
     down = (t > slow * 0.26) & (t < slow * 0.74) & (np.abs(x) < 0.02)
     loop = np.mean(force[up] - K * x[up]) - np.mean(force[down] - K * x[down])
-    assert loop == pytest.approx(20.0, rel=1e-2)
+    assert loop == pytest.approx(20.0, rel=1e-3)
 
 
 def test_coulomb_friction_takes_the_same_amplitude_from_every_half_swing() -> None:
@@ -78,8 +78,8 @@ def test_coulomb_friction_takes_the_same_amplitude_from_every_half_swing() -> No
     peaks = np.abs(free[turns])
     peaks = peaks[peaks > 6 * friction / K][:5]
     assert np.diff(peaks) == pytest.approx(-2 * friction / K, rel=1e-3)
-    half_swing = np.diff(turns)[:3] / RATE
-    assert half_swing == pytest.approx(math.pi * math.sqrt(M / K), rel=2e-3)
+    swings = (turns[4] - turns[0]) / 4 / RATE
+    assert swings == pytest.approx(math.pi * math.sqrt(M / K), rel=1e-3)
 
 
 def test_it_breaks_away_at_the_breakaway_and_runs_at_the_running_friction() -> None:
@@ -107,6 +107,8 @@ def test_free_mass_meets_the_stop_in_time_and_stays_there() -> None:
     x = push(rig, lambda t: np.where(t < 1.5, 8.0, -8.0), 2.2, gradient=0.0)
     t = times(x)
     at = math.sqrt(2 * 0.1778 * M / 8.0)
+    free = t < at
+    assert x[free] == pytest.approx(8.0 / M * t[free] ** 2 / 2, abs=1e-12)
     assert t[np.argmax(x >= 0.1778)] == pytest.approx(at, abs=1.0 / RATE)
     assert np.all(x[(t > at + 1e-3) & (t < 1.5)] == 0.1778)
     left = t > 1.501
