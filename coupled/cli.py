@@ -6,17 +6,11 @@ cannot be used (one line says why, and nothing is written).
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from typer.exceptions import TyperException
 
@@ -24,6 +18,7 @@ from coupled import __version__
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
+from coupled.terminal import check_json, err, give_json, out, progress, say, say_error
 
 if TYPE_CHECKING:
     from coupled.authority import Flight
@@ -36,8 +31,6 @@ app = typer.Typer(
     help="Fly a JSBSim aircraft through a compliant control loader.",
     epilog="[dim]First steps: coupled compare · coupled runs · coupled fly pull-up-t37[/]",
 )
-out = Console()
-err = Console(stderr=True)
 
 RunArgument = Annotated[
     str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
@@ -52,10 +45,10 @@ def main() -> None:
     try:
         code = app(standalone_mode=False)
     except InputError as error:
-        _say_error(str(error))
+        say_error(str(error))
         code = 2
     except TyperException as error:  # a word of the command line that it does not know
-        _say_error(" ".join(str(error).split()) + " (coupled --help shows what there is)")
+        say_error(" ".join(str(error).split()) + " (coupled --help shows what there is)")
         code = 2
     except (typer.Abort, KeyboardInterrupt):
         code = 130
@@ -63,15 +56,6 @@ def main() -> None:
         sys.stderr.close()
         code = 1
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _say(text: str) -> None:
-    """Print a line that may name a file, as it is."""
-    out.print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-def _say_error(text: str) -> None:
-    err.print(f"[red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
 
 
 def _version(wanted: bool) -> None:
@@ -114,8 +98,8 @@ def compare(
 
         check_format(path)
         check_target(path, inputs)
-    _check_json(json_file, [*inputs, path])
-    with _progress() as advance:
+    check_json(json_file, [*inputs, path])
+    with progress() as advance:
         flights = compare_flights(scenarios, advance)
     if json_file != "-":
         print_comparison(out, flights)
@@ -124,8 +108,8 @@ def compare(
 
         save(draw_comparison(flights), path)
         if json_file != "-":
-            _say(f"figure: {path}")
-    _give_json([flight.outcome.as_dict() for flight in flights], json_file)
+            say(f"figure: {path}")
+    give_json([flight.outcome.as_dict() for flight in flights], json_file)
     _end(flights)
 
 
@@ -166,17 +150,17 @@ def fly(
     inputs = input_files(scenario)
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
-    _check_json(json_file, [*inputs, path, manifest_path(path)])
-    with _progress() as advance:
+    check_json(json_file, [*inputs, path, manifest_path(path)])
+    with progress() as advance:
         record = fly_scenario(scenario, lambda done, total: advance(scenario.label, done, total))
     write_record(record, path)
     outcome = judge(scenario, configuration or "as the rig file says", record)
     if json_file != "-":
-        _say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
-        _say(f"manifest: {manifest_path(path)}")
+        say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
+        say(f"manifest: {manifest_path(path)}")
         for control, when in record.manifest["stop_first_met_s"].items():
             out.print(f"the {control} met its stop, first at {when:.2f} s")
-    _give_json(outcome.as_dict(), json_file)
+    give_json(outcome.as_dict(), json_file)
     if outcome.ended_early:
         err.print(f"[yellow]ended early:[/] {outcome.ended_early}; the record so far is kept")
         raise typer.Exit(1)
@@ -198,7 +182,7 @@ def plot(
     check_format(path)
     check_target(path, [record])
     save(draw_record(read_record(record), record.stem), path)
-    _say(f"figure: {path}")
+    say(f"figure: {path}")
 
 
 @app.command(epilog="[dim]Example: coupled diagnose out/737.csv --rig 737 --json out/737.json[/]")
@@ -225,7 +209,7 @@ def diagnose(
     inputs = [record, rig_file]
     if improve is not None:
         check_target(improve, inputs)
-    _check_json(json_file, [*inputs, *([improve] if improve else [])])
+    check_json(json_file, [*inputs, *([improve] if improve else [])])
     for name in CONTROL_NAMES:
         if name == control:
             nominal = read_rig(rig_file)
@@ -240,8 +224,8 @@ def diagnose(
         remark = f"{rig_file.name} with what was found in {record.name}:\n"
         write_text(improve, rig_text(improved, remark + in_words(diagnosis, control)))
         if json_file != "-":
-            _say(f"improved rig: {improve}")
-    _give_json(diagnosis, json_file)
+            say(f"improved rig: {improve}")
+    give_json(diagnosis, json_file)
 
 
 @app.command()
@@ -249,7 +233,7 @@ def runs(json_file: JsonOption = "") -> None:
     """List the shipped run files, what each shows, and the shipped rigs."""
     from coupled.schema import load_toml
 
-    _check_json(json_file, [])
+    check_json(json_file, [])
     cards = {name: load_toml(path) for name, path in shipped_runs().items()}
     if json_file != "-":
         table = Table("run", "rig", "what it shows", box=None, pad_edge=False)
@@ -260,44 +244,12 @@ def runs(json_file: JsonOption = "") -> None:
     rows = [
         {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()
     ]
-    _give_json(rows, json_file)
+    give_json(rows, json_file)
 
 
 def _sentence(card: str) -> str:
     """Return the first sentence of a card."""
     return " ".join(card.split()).partition(". ")[0].rstrip(".") + "."
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress on the terminal while work goes on; nothing where there is none."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        task = bar.add_task("starting (the first start compiles the physics)", total=None)
-
-        def advance(label: str, done: int, total: int) -> None:
-            bar.update(task, description=escape(label), completed=done, total=total)
-
-        yield advance
-
-
-def _check_json(target: str, others: list[Path]) -> None:
-    """Refuse a JSON file that could not be written, or that is one of the others."""
-    if target and target != "-":
-        path = Path(target)
-        check_target(path, others)
-        if path.absolute() in [other.absolute() for other in others]:
-            raise InputError(path, "--json", "is another file of this command")
-
-
-def _give_json(table: Any, target: str) -> None:
-    if not target:
-        return
-    text = json.dumps(table, indent=2, ensure_ascii=False) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-    else:
-        write_text(Path(target), text)
 
 
 def _end(flights: list[Flight]) -> None:

@@ -30,7 +30,7 @@ ORDER = [
     "record",
     "flight",
 ]
-ORDER += ["authority", "gap", "plots", "tables", "cli"]
+ORDER += ["authority", "gap", "plots", "tables", "terminal", "cli"]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 
 

@@ -43,7 +43,8 @@ def diagnose(
     airframe = airframe_output(rig, record) if control == "column" else None
     outputs = reader.outputs() + ([] if airframe is None else [airframe])
     if not outputs:
-        raise InputError(file, "", f"lacks the channels of every stage: {reader.missing()}")
+        lacking = sorted({name for names in reader.missing().values() for name in names})
+        raise InputError(file, "", "lets no stage be judged; it lacks " + ", ".join(lacking))
     choice = search(rig, control, outputs)
     if choice.steps:
         # What noise leaves depends on the rig: the improved one has floors of its own.
@@ -92,6 +93,10 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
         for other in present[:i]:
             if np.array_equal(record[name], record[other]):
                 raise InputError(file, name, f"is a copy of {other}")
+    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
+    told = gradient in record and pressure in record
+    if told and np.ptp(record[pressure]) == 0.0 and np.ptp(record[gradient]) > 0.0:
+        raise InputError(file, pressure, f"never changes, while {gradient} does: it is stuck")
     data = rig.controls[control]
     for name in present[1:] if names[0] in present else present:
         most = float(np.max(np.abs(record[name])))
@@ -120,18 +125,20 @@ def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: obje
 
 def _stages(reader: Reader, outputs: Sequence[Output], choice: Choice) -> dict[str, Any]:
     lacking = reader.missing()
+    lacking.pop("multiplier", None)
     if reader.rig.flight is None:
         lacking.pop("surface", None)
     before: dict[str, float] = {}
     after: dict[str, float] = {}
     for output in outputs:
+        # F_mod alone says nothing of the loader's motion.
         stage = "loader" if output.stage == "multiplier" else output.stage
         before[stage] = max(before.get(stage, 0.0), choice.before[output.channel])
         after[stage] = max(after.get(stage, 0.0), choice.after[output.channel])
     blamed = {step.effect.stage for step in choice.steps}
     found: dict[str, Any] = {}
     for stage in STAGES:
-        if stage in before:
+        if stage in before and stage not in lacking:
             left = not _closed(before[stage], after[stage])
             guilty = stage in blamed or (before[stage] > CLEAR and left)
             found[stage] = {"gap": before[stage], "left": after[stage], "guilty": guilty}
@@ -231,7 +238,10 @@ def in_words(diagnosis: dict[str, Any], control: str) -> str:
     verdict, effects = diagnosis["verdict"], diagnosis["effects"]
     guilty = [stage for stage, found in diagnosis["stages"].items() if found.get("guilty")]
     if verdict == "no_gap":
-        return f"No gap: every stage of the {control} that could be judged stays within its noise."
+        unjudged = [stage for stage, found in diagnosis["stages"].items() if "gap" not in found]
+        but = f" Not judged: {', '.join(unjudged)}." if unjudged else ""
+        within = "every stage that could be judged stays within its noise"
+        return f"No gap in the {control}: {within}.{but}"
     named = "; ".join(_one_in_words(effect) for effect in effects)
     shrink = diagnosis["shrink"]
     share = f" It closes {100 * shrink['closed']:.0f} % of the gap." if "closed" in shrink else ""

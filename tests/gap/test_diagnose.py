@@ -113,6 +113,11 @@ def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:
     found, _ = diagnose(nominal, Record(tuple(keep), data), "column")
     assert found["stages"]["linkage"] == {"judged": False, "missing": ["column_deflection_m"]}
     assert found["verdict"] == "no_gap"
+    keep.remove("column_force_N")
+    data = np.column_stack([record[name] for name in keep])
+    found, _ = diagnose(nominal, Record(tuple(keep), data), "column")
+    assert found["stages"]["loader"] == {"judged": False, "missing": ["column_force_N"]}
+    assert "Not judged: loader, linkage, compensation" in in_words(found, "column")
 
 
 @pytest.mark.parametrize("name", available())
@@ -147,6 +152,7 @@ def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
         (spoiled(good, column_deflection_m=lambda x: x * 1000.0), "another unit"),
         (spoiled(good, column_force_N=lambda f: np.where(f > 30.0, np.nan, f)), "holds no number"),
         (spoiled(good, time_s=lambda t: np.where(t > 20.0, t + 1.0, t)), "a gap or a jump after"),
+        (spoiled(good, dynamic_pressure_Pa=lambda q: 0.0 * q), "it is stuck"),
         (spoiled(good, time_s=lambda t: t * 2.0), "another rig?"),
         (Record(good.channels, good.data[:600]), "10 s are needed"),
     ]
