@@ -12,7 +12,8 @@ import polars as pl
 import pytest
 
 from coupled.channels import record_channels
-from coupled.plots import draw_record, save
+from coupled.plots.flights import draw_record
+from coupled.plots.saving import save
 from coupled.record import read_record
 
 ROOT = Path(__file__).parents[1]

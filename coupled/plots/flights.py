@@ -1,21 +1,17 @@
-"""Figures: the only module that imports matplotlib. Angles are drawn in degrees."""
+"""Figures of flights and their comparison."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from coupled.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.errors import InputError
-from coupled.files import write_whole
 from coupled.record import Record
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.statics import specified_force
@@ -24,7 +20,6 @@ from coupled.units import DEGREE_rad
 if TYPE_CHECKING:
     from coupled.authority import Flight
 
-FORMATS = (".png", ".pdf", ".svg")
 _STYLE = {
     "rigid": ("black", (0, (1, 1)), 2.2),
     "uncompensated": ("#d55e00", "solid", 1.6),
@@ -34,22 +29,6 @@ _STYLE = {
 }
 _RATE = {"column": "pitch_rate", "wheel": "roll_rate", "pedals": "yaw_rate"}
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.")
-
-
-def check_format(path: Path) -> None:
-    """Refuse a figure's path whose extension names no format."""
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(path, "", f"a figure ends in {', '.join(FORMATS)}")
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure, whole; the same figure gives the same bytes."""
-    check_format(path)
-    FigureCanvasAgg(figure)
-    kind = path.suffix.lower()[1:]
-    no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
-    with rc_context({"svg.hashsalt": "coupled"}):
-        write_whole(path, lambda part: figure.savefig(part, dpi=130, format=kind, metadata=no_date))
 
 
 def draw_comparison(flights: Sequence[Flight]) -> Figure:

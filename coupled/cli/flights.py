@@ -1,76 +1,21 @@
-"""The command line: parses, calls, prints.
-
-Exit code 0 when all went well, 1 when a flight ended before its time, 2 for input that
-cannot be used (one line says why, and nothing is written).
-"""
+"""The commands that fly: compare, fly, plot, runs."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
-from typer.exceptions import TyperException
 
-from coupled import __version__
+from coupled.cli.app import JsonOption, RunArgument, app
 from coupled.errors import InputError
-from coupled.files import check_target, write_text
+from coupled.files import check_target
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
-from coupled.terminal import check_json, err, give_json, out, progress, say, say_error
+from coupled.terminal import check_json, err, give_json, out, progress, say
 
 if TYPE_CHECKING:
     from coupled.authority import Flight
-
-app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    help="Fly a JSBSim aircraft through a compliant control loader.",
-    epilog="[dim]First steps: coupled compare · coupled runs · coupled fly pull-up-t37[/]",
-)
-
-RunArgument = Annotated[
-    str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
-]
-JsonOption = Annotated[
-    str, typer.Option("--json", metavar="FILE", help="Write the table as JSON; - prints it.")
-]
-
-
-def main() -> None:
-    """Run the command line; every fault of input is one line and exit code 2."""
-    try:
-        code = app(standalone_mode=False)
-    except InputError as error:
-        say_error(str(error))
-        code = 2
-    except TyperException as error:  # a word of the command line that it does not know
-        say_error(" ".join(str(error).split()) + " (coupled --help shows what there is)")
-        code = 2
-    except (typer.Abort, KeyboardInterrupt):
-        code = 130
-    except BrokenPipeError:
-        sys.stderr.close()
-        code = 1
-    sys.exit(code if isinstance(code, int) else 0)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        out.print(f"coupled {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
-    ] = False,
-) -> None:
-    """Fly a JSBSim aircraft through a compliant control loader."""
 
 
 @app.command(
@@ -88,13 +33,13 @@ def compare(
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority import compare as compare_flights
     from coupled.flight.scenario import read_run
-    from coupled.tables import print_comparison
+    from coupled.tables.flights import print_comparison
 
     scenarios = read_run(run)
     path = figure or Path("out") / f"{scenarios[0].run.name}.png"
     inputs = [scenarios[0].file, *(scenario.rig_file for scenario in scenarios)]
     if not no_figure:
-        from coupled.plots import check_format
+        from coupled.plots.saving import check_format
 
         check_format(path)
         check_target(path, inputs)
@@ -104,7 +49,8 @@ def compare(
     if json_file != "-":
         print_comparison(out, flights)
     if not no_figure:
-        from coupled.plots import draw_comparison, save
+        from coupled.plots.flights import draw_comparison
+        from coupled.plots.saving import save
 
         save(draw_comparison(flights), path)
         if json_file != "-":
@@ -174,7 +120,8 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a record."""
-    from coupled.plots import check_format, draw_record, save
+    from coupled.plots.flights import draw_record
+    from coupled.plots.saving import check_format, save
     from coupled.record import check_suffix, read_record
 
     check_suffix(record)
@@ -183,49 +130,6 @@ def plot(
     check_target(path, [record])
     save(draw_record(read_record(record), record.stem), path)
     say(f"figure: {path}")
-
-
-@app.command(epilog="[dim]Example: coupled diagnose out/737.csv --rig 737 --json out/737.json[/]")
-def diagnose(
-    record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
-    rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")],
-    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
-    improve: Annotated[
-        Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
-    ] = None,
-    json_file: JsonOption = "",
-) -> None:
-    """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
-    from coupled.channels import CONTROL_NAMES
-    from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.gap.diagnose import in_words
-    from coupled.record import read_record
-    from coupled.resources import find
-    from coupled.rig.rigfile import read_rig
-    from coupled.rig.rigwrite import rig_text
-    from coupled.tables import print_stages
-
-    rig_file = find(rig, shipped_rigs(), "rig")
-    inputs = [record, rig_file]
-    if improve is not None:
-        check_target(improve, inputs)
-    check_json(json_file, [*inputs, *([improve] if improve else [])])
-    for name in CONTROL_NAMES:
-        if name == control:
-            nominal = read_rig(rig_file)
-            diagnosis, improved = find_gap(nominal, read_record(record), name, record)
-            break
-    else:
-        raise InputError(record, "--control", f"is {control!r}; one of {', '.join(CONTROL_NAMES)}")
-    if json_file != "-":
-        out.print(in_words(diagnosis, control), markup=False, highlight=False)
-        print_stages(out, diagnosis)
-    if improve is not None:
-        remark = f"{rig_file.name} with what was found in {record.name}:\n"
-        write_text(improve, rig_text(improved, remark + in_words(diagnosis, control)))
-        if json_file != "-":
-            say(f"improved rig: {improve}")
-    give_json(diagnosis, json_file)
 
 
 @app.command()
