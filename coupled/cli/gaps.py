@@ -27,7 +27,7 @@ def diagnose(
     """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
     from coupled.channels import CONTROL_NAMES
     from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.gap.diagnose import in_words
+    from coupled.gap.words import in_words
     from coupled.record import read_record
     from coupled.resources import find
     from coupled.rig.rigfile import read_rig
@@ -42,7 +42,8 @@ def diagnose(
     for name in CONTROL_NAMES:
         if name == control:
             nominal = read_rig(rig_file)
-            diagnosis, improved = find_gap(nominal, read_record(record), name, record)
+            whole = find_gap(nominal, {str(record): read_record(record)}, name)
+            diagnosis, improved = whole.found, whole.improved
             break
     else:
         raise InputError(record, "--control", f"is {control!r}; one of {', '.join(CONTROL_NAMES)}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.flight.altered import altered
 from coupled.flight.everyframe import motion_reader, stepper
+from coupled.flight.gusts import blown, dryden
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 
@@ -52,6 +53,7 @@ assert len(_LONGITUDINAL) == len(LONGITUDINAL)
 assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
+SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -100,7 +102,8 @@ class JSBSimAirframe:
     Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of
     the rig in its order; `models`, folders of models of our own, searched first; `file`,
     where the rig was described, for faults; `record`, further properties to read each
-    frame, asked for in `record_file`.
+    frame, asked for in `record_file`; `seed`, of the gusts; `air_m_per_s`, instead of
+    them, how fast the air rises over each frame.
     """
 
     def __init__(
@@ -112,6 +115,8 @@ class JSBSimAirframe:
         file: object = "rig",
         record: Sequence[str] = (),
         record_file: object = "run",
+        seed: int = 0,
+        air_m_per_s: Iterable[float] | None = None,
     ) -> None:
         self._file, self._record_file = file, record_file
         self._flight = flight
@@ -132,6 +137,11 @@ class JSBSimAirframe:
         self.step = stepper(self._fdm.run, writes, flight.steps_per_frame)
         if flight.elevator_effectiveness != 1.0 or flight.pitch_damping != 1.0:
             self.motion, self.step = altered(self, flight, models, frame_s)
+        if air_m_per_s is None and flight.gust_rms > 0.0:
+            speed = self.motion()[SPEED]
+            air_m_per_s = dryden(flight.gust_rms, flight.gust_length, speed, frame_s, seed)
+        if air_m_per_s is not None:
+            self.step = blown(self.step, self._air(), iter(air_m_per_s))
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
@@ -224,6 +234,15 @@ class JSBSimAirframe:
             raise self._fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
+
+    def _air(self) -> Callable[[float], None]:
+        """Return what sets the air's upward speed, m/s."""
+        down_fps = self._node("atmosphere/wind-down-fps").set_double_value
+
+        def set_air(up_m_per_s: float) -> None:
+            down_fps(-up_m_per_s / FOOT_m)
+
+        return set_air
 
     def pitch_moments(self) -> tuple[float, float]:
         """Return what moves the nose, by finite differences.

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Motion = Callable[[], tuple[float, ...]]
 Step = Callable[[tuple[float, float, float]], None]
+# The model as it comes, in still air.
+UNALTERED = {"elevator_effectiveness": 1.0, "pitch_damping": 1.0, "gust_rms": 0.0}
 _ELEVATOR = LONGITUDINAL.index("elevator_rad")
 _RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
 _SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
@@ -35,7 +37,7 @@ def altered(
     airframe: JSBSimAirframe, flight: Flight, models: Sequence[Path], frame_s: float
 ) -> tuple[Motion, Step]:
     """Return the reading and stepping of an airframe with the factors of `flight`."""
-    plain = flight.model_copy(update={"elevator_effectiveness": 1.0, "pitch_damping": 1.0})
+    plain = flight.model_copy(update=UNALTERED)
     spare = type(airframe)(plain, frame_s, ["column"], models)
     per_rate, per_command = spare.pitch_moments()
     commands_at, positions = spare.surface_map()

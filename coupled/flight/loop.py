@@ -117,6 +117,7 @@ def make_airframe(scenario: Scenario) -> Airframe:
     try:
         check_direct_controls(rig.flight, frame_s, controls, **where)
         asked: dict[str, Any] = {"record": run.record_properties, "record_file": scenario.file}
+        asked["seed"] = run.seed
         return JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
     except InputError as error:
         if error.key not in scenario.changes:

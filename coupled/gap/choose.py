@@ -8,28 +8,35 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.channels import ControlName
 from coupled.gap.effects import EFFECTS, Effect, apply
-from coupled.gap.fit import Fit, fit, memory, shows_in, touched
-from coupled.gap.stages import Output
+from coupled.gap.fit import Fit, fit, shows_in, touched
+from coupled.gap.output import Output, memory, stage_gaps
 from coupled.rig.parameters import Rig
 
-Floats = NDArray[np.float64]
-
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
-STRETCH_s = 2.5  # a stretch of the record, fitted or held out
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
 SCREENED = 6
+LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
 # A pot is set, and a servo tuned, to a few per cent: less than this is no effect.
 TOLERANCE = {"inertia": 0.03, "viscous_damping": 0.03, "servo_lag": 0.03}
 MOST = 4  # effects in one answer
+Tell = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect fitted beside those found so far, and its gain on held-out stretches."""
+
+    gain: float
+    effect: Effect
+    fit: Fit
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,7 @@ class Step:
     effect: Effect
     gain: float
     probability: float
-    rivals: tuple[str, ...]
+    rivals: tuple[Candidate, ...]
 
 
 @dataclass(frozen=True)
@@ -48,56 +55,51 @@ class Choice:
 
     steps: tuple[Step, ...]
     fit: Fit
-    before: dict[str, float]
-    after: dict[str, float]
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
 
 
-def gaps(outputs: Sequence[Output], rig: Rig) -> dict[str, float]:
-    """Return each output's rms residual over its floor."""
-    return {o.channel: float(np.sqrt(np.mean(o.residual(rig) ** 2))) for o in outputs}
-
-
-def stretches(frames: int, frame_rate_Hz: float) -> NDArray[np.intp]:
-    """Return the number of the stretch that each frame lies in."""
-    return np.arange(frames) // max(1, round(STRETCH_s * frame_rate_Hz))
-
-
-def search(nominal: Rig, control: ControlName, outputs: Sequence[Output]) -> Choice:
+def search(
+    nominal: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    library: Sequence[Effect] = EFFECTS,
+    tell: Tell | None = None,
+) -> Choice:
     """Return the effects that explain a record's gap, each earning its place in turn."""
-    frames = len(outputs[0].measured)
-    fitted_on = stretches(frames, nominal.frame_rate) % 2 == 0
-    everything = np.ones(frames, dtype=bool)
-    current = fit(nominal, control, outputs, (), everything)
-    before = gaps(outputs, nominal)
+    current = fit(nominal, control, outputs, ())
     steps: list[Step] = []
     tried: dict[str, float] = {}
     while len(steps) < MOST:
-        ranked = _round(nominal, control, outputs, current, fitted_on)
-        tried = tried or {effect.name: gain for gain, effect, _ in ranked}
-        if not ranked or ranked[0][0] < LEAST_GAIN:
+        ranked = _round(nominal, control, outputs, current, library, tell)
+        tried = tried or {candidate.effect.name: candidate.gain for candidate in ranked}
+        if not ranked or ranked[0].gain < LEAST_GAIN:
             break
-        gain, effect, found = _simplest(ranked)
-        close = [
-            e.name
-            for g, e, _ in ranked
-            if e is not effect and g > gain - RIVAL and len(e.free) <= len(effect.free)
-        ]
-        weights = np.exp(np.array([min(g - gain, 0.0) for g, _, _ in ranked]))
-        wider = [len(e.free) > len(effect.free) for _, e, _ in ranked]
-        weights[wider] = 0.0  # what holds the effect as a special case is no rival of it
-        steps.append(Step(effect, gain, float(1.0 / weights.sum()), tuple(close)))
-        chosen = (*current.effects, effect)
-        current = fit(nominal, control, outputs, chosen, everything, found.values)
-    return Choice(tuple(steps), current, before, gaps(outputs, current.rig), tried)
+        best = _simplest(ranked)
+        steps.append(_step(best, ranked))
+        chosen = (*current.effects, best.effect)
+        current = fit(nominal, control, outputs, chosen, start=best.fit.values)
+    return Choice(tuple(steps), current, tried)
 
 
-def _simplest(ranked: Sequence[tuple[float, Effect, Fit]]) -> tuple[float, Effect, Fit]:
+def _step(best: Candidate, ranked: Sequence[Candidate]) -> Step:
+    """Return a found effect with its rivals; what holds it as a special case is none."""
+    others = [
+        other
+        for other in ranked
+        if other is not best and len(other.effect.free) <= len(best.effect.free)
+    ]
+    rivals = tuple(other for other in others if other.gain > best.gain - RIVAL)
+    weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
+    return Step(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
+
+
+def _simplest(ranked: Sequence[Candidate]) -> Candidate:
     """Return the best candidate, or one with fewer numbers that is as good."""
     best = ranked[0]
-    for item in ranked[1:]:
-        if len(item[1].free) < len(best[1].free) and item[0] > ranked[0][0] - RIVAL:
-            best = item
+    for other in ranked[1:]:
+        fewer = len(other.effect.free) < len(best.effect.free)
+        if fewer and other.gain > ranked[0].gain - RIVAL:
+            best = other
     return best
 
 
@@ -106,23 +108,27 @@ def _round(
     control: ControlName,
     outputs: Sequence[Output],
     current: Fit,
-    fitted_on: NDArray[np.bool_],
-) -> list[tuple[float, Effect, Fit]]:
+    library: Sequence[Effect],
+    tell: Tell | None,
+) -> list[Candidate]:
     """Return the candidates by their held-out gain over the current effects, best first."""
-    guilty = {o.stage for o in outputs if gaps([o], current.rig)[o.channel] > CLEAR}
+    guilty = {stage for stage, gap in stage_gaps(outputs, current.rig).items() if gap > CLEAR}
     candidates = [
         effect
-        for effect in EFFECTS
+        for effect in library
         if effect not in current.effects and guilty & set(shows_in(effect))
     ]
     found = []
-    for effect in _screened(nominal, control, outputs, current, candidates):
+    screened = _screened(nominal, control, outputs, current, candidates)
+    for i, effect in enumerate(screened):
+        if tell is not None:
+            tell(f"fitting {effect.name}", i, len(screened))
         chosen = (*current.effects, effect)
-        fitted = fit(nominal, control, outputs, chosen, fitted_on, current.values)
+        fitted = fit(nominal, control, outputs, chosen, "fitted", current.values)
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
-    return _ranked(outputs, current, found, ~fitted_on)
+    return _ranked(outputs, current, found)
 
 
 def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
@@ -132,29 +138,26 @@ def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
 
 
 def _ranked(
-    outputs: Sequence[Output],
-    current: Fit,
-    found: Sequence[tuple[Effect, Fit]],
-    rows: NDArray[np.bool_],
-) -> list[tuple[float, Effect, Fit]]:
+    outputs: Sequence[Output], current: Fit, found: Sequence[tuple[Effect, Fit]]
+) -> list[Candidate]:
     """Return fitted candidates by the held-out log-likelihood that they gain, best first.
 
     A sample counts as the best candidate's residual lets it, the same for all: a worse one's
     longer memory is its own fault, and no reason to weigh its misfit less.
     """
-    before = [float(np.mean(o.residual(current.rig)[rows] ** 2)) for o in outputs]
-    lefts = [[o.residual(fitted.rig)[rows] for o in outputs] for _, fitted in found]
-    squares = [[float(np.mean(left**2)) for left in each] for each in lefts]
     if not found:
         return []
+    before = [float(np.mean(o.residual(current.rig, "held") ** 2)) + LITTLE for o in outputs]
+    lefts = [[o.residual(fitted.rig, "held") for o in outputs] for _, fitted in found]
+    squares = [[float(np.mean(left**2)) + LITTLE for left in each] for each in lefts]
     best = min(range(len(found)), key=lambda i: float(np.sum(np.log(squares[i]))))
     counts = [0.5 * len(left) / memory(left) for left in lefts[best]]
-    gains = [
-        float(sum(n * np.log(b / a) for n, b, a in zip(counts, before, after, strict=True)))
-        for after in squares
-    ]
-    ranked = [(gain, *pair) for gain, pair in zip(gains, found, strict=True)]
-    return sorted(ranked, key=lambda item: -item[0])
+    ranked = []
+    for (effect, fitted), after in zip(found, squares, strict=True):
+        terms = zip(counts, before, after, strict=True)
+        gain = float(sum(n * np.log(b / a) for n, b, a in terms))
+        ranked.append(Candidate(gain, effect, fitted))
+    return sorted(ranked, key=lambda candidate: -candidate.gain)
 
 
 def _screened(

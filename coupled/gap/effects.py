@@ -129,6 +129,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one("surface", "surface_freeplay", _added("play_norm", "rigging", "play", 0, 0.5, 0.01)),
     _one("airframe", "elevator_effectiveness", _factor("flight", "elevator_effectiveness", 0.9)),
     _one("airframe", "pitch_damping", _factor("flight", "pitch_damping", 1.2)),
+    _one("airframe", "vertical_gust", _value("rms_m_per_s", "flight", "gust_rms", 0, 30, 0.5)),
     _one("surface", "rigging_offset", _added("offset_norm", "rigging", "offset", -0.5, 0.5, 0.01)),
 )
 BY_NAME = {effect.name: effect for effect in EFFECTS}

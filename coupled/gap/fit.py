@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from coupled.channels import ControlName
 from coupled.gap.effects import Effect, Parameter, apply
-from coupled.gap.stages import Output
+from coupled.gap.output import Output, Part, memory
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]
@@ -56,28 +56,15 @@ def touched(outputs: Sequence[Output], effects: Sequence[Effect]) -> list[Output
     return [output for output in outputs if output.stage in stages]
 
 
-def memory(residual: Floats) -> float:
-    """Return the residual's integrated autocorrelation time in frames, at least 1."""
-    x = residual - residual.mean()
-    power = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
-    correlation = np.fft.irfft(power)[: len(x) // 4]
-    if correlation[0] <= 0.0:
-        return 1.0
-    correlation /= correlation[0]
-    negative = np.flatnonzero(correlation < 0.05)
-    end = int(negative[0]) if negative.size else len(correlation)
-    return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
-
-
 def fit(
     nominal: Rig,
     control: ControlName,
     outputs: Sequence[Output],
     effects: Sequence[Effect],
-    rows: NDArray[np.bool_],
+    part: Part = "all",
     start: Mapping[str, float] | None = None,
 ) -> Fit:
-    """Return the effects fitted to the chosen rows of the outputs that they touch.
+    """Return the effects fitted to a part of the outputs that they touch.
 
     Starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best.
@@ -92,7 +79,7 @@ def fit(
 
     def residual(scaled: Floats) -> Floats:
         rig = rig_of(scaled * scale)
-        return np.concatenate([output.residual(rig)[rows] for output in ours])
+        return np.concatenate([output.residual(rig, part) for output in ours])
 
     if not keys:
         return Fit(tuple(effects), {}, {}, {}, (), rig_of(np.array([])))

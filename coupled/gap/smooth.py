@@ -14,8 +14,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 Floats = NDArray[np.float64]
+
+
+def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
+    """Return the rate of change of a smooth signal a second, same shape."""
+    frames = np.arange(len(signal))
+    return np.asarray(CubicSpline(frames, signal).derivative()(frames) * frame_rate_Hz)
 
 
 def smoothed(signal: Floats) -> Floats:

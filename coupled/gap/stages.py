@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.channels import ControlName, channel
-from coupled.gap.smooth import smoothed
+from coupled.gap.output import Output, Predict, white
+from coupled.gap.smooth import rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
@@ -36,32 +37,12 @@ from coupled.rig.replay import (
 )
 
 Floats = NDArray[np.float64]
-Predict = Callable[[Rig], Floats]
 ROUGH = 0.25
+SHARED = 0.5  # of q̄'s noise in G_T, from which the host is taken to have made it of q̄ as recorded
+ROUNDING = 1e-6  # of a channel's span
+SLOW_s = 5.0  # a loader whose own period is longer drifts, and is replayed in short windows
+WINDOW_s = 0.25
 TRIES = 4  # realisations of the input's noise, to carry it through a stage
-
-
-@dataclass(frozen=True)
-class Output:
-    """One measured output of a stage, and how a rig predicts it from the measured input.
-
-    `floor` is the rms that noise alone leaves, in the channel's unit.
-    """
-
-    stage: str
-    channel: str
-    measured: Floats
-    predict: Predict
-    floor: float
-
-    def residual(self, rig: Rig) -> Floats:
-        """Return measured less predicted, in floors, shape (frames,)."""
-        return (self.measured - self.predict(rig)) / self.floor
-
-
-def white(signal: Floats) -> float:
-    """Return the white noise in a smooth signal, by its fourth differences."""
-    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
 
 
 @dataclass(frozen=True)
@@ -72,6 +53,7 @@ class Reader:
     record: Record
     control: ControlName
     surface_points: Callable[[Rig], tuple[Floats, Floats]]  # the model's own command map
+    number: int = 0  # of the record, where there are several
 
     def signal(self, quantity: str) -> Floats:
         """Return a control's channel."""
@@ -81,8 +63,9 @@ class Reader:
         """Return the channels that each stage would need and the record lacks."""
         needs = {
             "schedule": ["dynamic_pressure_Pa", self._name("gradient")],
-            "loader": [self._name(q) for q in ("force", "gradient", "computed")],
-            "multiplier": [self._name(q) for q in ("computed", "gradient", "modifying_force")],
+            "loader": [self._name(q) for q in ("force", "computed")] + self._gradient_from(),
+            "multiplier": [self._name(q) for q in ("computed", "modifying_force")]
+            + self._gradient_from(),
             "linkage": [self._name(q) for q in ("computed", "force", "deflection")],
             "compensation": [self._name(q) for q in ("computed", "force", "estimate")],
             "surface": [self._name("estimate"), "dynamic_pressure_Pa", "elevator_rad"],
@@ -92,6 +75,18 @@ class Reader:
 
     def _name(self, quantity: str) -> str:
         return channel(self.control, quantity)
+
+    def _gradient_from(self) -> list[str]:
+        """Return the channel that tells G_T: its own, or q̄ where the record lacks it."""
+        own, pressure = self._name("gradient"), "dynamic_pressure_Pa"
+        return [pressure if own not in self.record and pressure in self.record else own]
+
+    def gradient(self) -> Floats:
+        """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""
+        if self._gradient_from() == [self._name("gradient")]:
+            return self.signal("gradient")
+        pressure = self.record["dynamic_pressure_Pa"]
+        return replay_schedule(self.rig, self.control, smoothed(pressure))
 
     def outputs(self) -> list[Output]:
         """Return every output that the record lets judge, in the order of the chain."""
@@ -119,7 +114,14 @@ class Reader:
         base = predict(self.rig)
         tries = [noisy(self.rig, k) - base for k in range(TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries)))) if tries else 0.0
-        return Output(stage, name, measured, predict, float(np.hypot(own, carried)))
+        floor = float(np.hypot(own, carried))
+        return self._output(stage, name, measured, predict, floor)
+
+    def _output(
+        self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
+    ) -> Output:
+        rate = self.rig.frame_rate
+        return Output(stage, name, measured, predict, floor, rate, self.number)
 
     def _calmed(self, signal: Floats, k: int, level: float) -> Floats:
         """Return a signal with a try's noise, smoothed; and a share of it as it came.
@@ -137,28 +139,49 @@ class Reader:
         def predict(rig: Rig, q: Floats = calm) -> Floats:
             return replay_schedule(rig, self.control, q)
 
+        made = predict(self.rig, pressure)
+        if own > SHARED * white(made):
+            # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
+            def echoed(rig: Rig) -> Floats:
+                return predict(rig, pressure)
+
+            floor = max(white(gradient - made), ROUNDING * float(np.ptp(gradient)))
+            return [self._output("schedule", self._name("gradient"), gradient, echoed, floor)]
+
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, self._calmed(calm, k, level))
 
-        made = self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)
-        return [made]
+        return [self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
-        noisy_force, gradient = self.signal("force"), self.signal("gradient")
+        noisy_force, gradient = self.signal("force"), self.gradient()
         force, level = smoothed(noisy_force), white(noisy_force)
         computed = self.signal("computed")
         flown = "load_factor" in self.record
         load = smoothed(self.record["load_factor"]) if flown else None
+        calm, own = smoothed(computed), white(computed)
+        every = round(WINDOW_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
-        def predict(rig: Rig, f: Floats = force) -> Floats:
+        def predict(rig: Rig, f: Floats = force, seen: Floats = calm) -> Floats:
             scale = rig.controls[self.control].sensing.deflection_scale
-            return scale * replay_loader(rig, self.control, f, gradient, computed, load)[0]
+            rate = rate_of(seen, rig.frame_rate) if every else seen
+            restart = (every, seen / scale, rate / scale)
+            replayed = replay_loader(
+                rig, self.control, f, gradient, computed, load, restart=restart
+            )
+            return scale * replayed[0]
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, self._calmed(force, k, level))
+            seen = self._calmed(calm, k + TRIES, own)
+            return predict(rig, self._calmed(force, k, level), seen)
 
-        name = self._name("computed")
-        return [self._made("loader", name, computed, predict, noisy, white(computed))]
+        return [self._made("loader", self._name("computed"), computed, predict, noisy, own)]
+
+    def _drifts(self, gradient: Floats) -> bool:
+        """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
+        loader = self.rig.controls[self.control].loader
+        softest = float(np.min(np.maximum(gradient, 0.0)))
+        return softest * SLOW_s**2 < 4.0 * np.pi**2 * loader.mass
 
     def _multiplier(self) -> list[Output]:
         """Return F_mod against the product it should be: of δc itself, or of δc as read.
@@ -167,7 +190,7 @@ class Reader:
         does not know of it; a wrong scale is in the one and not in the other.
         """
         computed, product = self.signal("computed"), self.signal("modifying_force")
-        gradient, calm = self.signal("gradient"), smoothed(computed)
+        gradient, calm = self.gradient(), smoothed(computed)
 
         def predict(rig: Rig) -> Floats:
             data = rig.controls[self.control]
@@ -177,7 +200,7 @@ class Reader:
             return replay_product(rig, self.control, read, gradient)
 
         own = white(product)
-        return [Output("multiplier", self._name("modifying_force"), product, predict, own)]
+        return [self._output("multiplier", self._name("modifying_force"), product, predict, own)]
 
     def _linkage(self) -> list[Output]:
         computed, force = self.signal("computed"), self.signal("force")
@@ -217,7 +240,7 @@ class Reader:
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
         left = measured - position(np.concatenate(([0.0], command[:-1])))
-        return [Output("surface", "elevator_rad", measured, predict, white(left))]
+        return [self._output("surface", "elevator_rad", measured, predict, white(left))]
 
 
 def compensation_gap(reader: Reader) -> float:

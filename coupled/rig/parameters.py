@@ -99,7 +99,7 @@ class Control(Section):
 
 
 class Flight(Section):
-    """The JSBSim model, where it is trimmed, and factors on two of its pitching moments."""
+    """The JSBSim model, where it is trimmed, what its elevator and damping do, and the air."""
 
     model: str = quantity("", min_length=1)
     altitude: float = quantity("m")
@@ -107,6 +107,8 @@ class Flight(Section):
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
+    gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
+    gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
 
 

@@ -25,6 +25,8 @@ from coupled.rig.sensing import converted
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
+# Frames between restarts, and δc in d and its rate in d/s at every frame.
+Restart = tuple[int, Floats, Floats]
 
 
 def replay_schedule(rig: Rig, control: str, pressure_Pa: Floats) -> Floats:
@@ -41,15 +43,17 @@ def replay_loader(
     computed: Floats,
     load_factor: Floats | None = None,
     second: Floats | None = None,
+    restart: Restart | None = None,
 ) -> tuple[Floats, Floats]:
     """Return δc in d and F_mod in N at each frame.
 
     `gradient` is G_T in N/d as the schedule gave it (`second` that beyond the break, where
     there is one), `computed` the measured δc, from which a digital multiplier makes its
-    product. The loader starts at rest at neutral.
+    product. The loader starts at rest at neutral; with `restart`, it is put back to a measured
+    state now and then.
     """
     nodes, _ = _on_nodes(rig, force_N)
-    return drive_loader(rig, control, nodes, gradient, computed, load_factor, second)
+    return drive_loader(rig, control, nodes, gradient, computed, load_factor, second, restart)
 
 
 def drive_loader(
@@ -60,6 +64,7 @@ def drive_loader(
     computed: Floats,
     load_factor: Floats | None = None,
     second: Floats | None = None,
+    restart: Restart | None = None,
 ) -> tuple[Floats, Floats]:
     """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
 
@@ -67,10 +72,12 @@ def drive_loader(
     """
     p, s = _one(rig, control)
     level = np.ones_like(computed) if load_factor is None else load_factor
-    both = np.stack((gradient, gradient if second is None else second))
     out = np.empty((2, len(computed)))
     h = 1.0 / (rig.frame_rate * rig.substeps)
-    _loader(p, s, nodes_N, both, computed, level, rig.substeps, h, out)
+    every, position, rate = (0, computed, computed) if restart is None else restart
+    both = (gradient, gradient if second is None else second)
+    told = np.stack((*both, computed, level, position, rate))
+    _loader(p, s, nodes_N, told, every, rig.substeps, h, out)
     return out[0], out[1]
 
 
@@ -128,18 +135,21 @@ def _loader(
     parameters: Any,
     states: Any,
     force: Floats,
-    gradient: Floats,
-    computed: Floats,
-    level: Floats,
+    told: Floats,
+    every: int,
     substeps: int,
     h: float,
     out: Floats,
 ) -> None:
+    """Run the loader; `told`, shape (6, frames): G_T twice, δc, load factor, restarts."""
     p, s = parameters[0], states[0]
+    gradient, computed, level, position, rate = told[:2], told[2], told[3], told[4], told[5]
     start_delay(p.loader, s.loader, force[0])
     frames = len(computed)
     for k in range(frames):
         m = s.modification
+        if every > 0 and k % every == 0:
+            s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         if p.modification.digital:
             product = modifying_force(m, computed[k])

@@ -21,9 +21,9 @@ def test_a_60_s_record_is_diagnosed_in_under_10_s(
     nominal = made.nominal_rig(True)
     record = made.made(tmp_path, nominal, {"inertia": {"factor": 1.4}}, 21)
     assert record.time_s[-1] > 59.0
-    diagnose(nominal, record.between(0.0, 12.0), "column")
+    diagnose(nominal, {"r": record.between(0.0, 12.0)}, "column")
     start = time.perf_counter()
-    found, _ = diagnose(nominal, record, "column")
+    found = diagnose(nominal, {"r": record}, "column").found
     taken = time.perf_counter() - start
     print(f"\na 60 s record against every effect: {taken:.1f} s, {found['verdict']}")
     assert [effect["name"] for effect in found["effects"]] == ["inertia"]
@@ -35,7 +35,8 @@ def test_false_alarms_on_records_without_an_effect(tmp_path: Path) -> None:
     for seed in range(100, 110):
         for flown in (False, True):
             nominal = made.nominal_rig(flown)
-            found, _ = diagnose(nominal, made.made(tmp_path, nominal, {}, seed), "column")
+            record = made.made(tmp_path, nominal, {}, seed)
+            found = diagnose(nominal, {"r": record}, "column").found
             alarms += found["verdict"] != "no_gap"
     print(f"\nfalse alarms: {alarms} of 20")
     assert alarms == 0

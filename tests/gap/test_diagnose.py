@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.gap.diagnose import diagnose, in_words
+from coupled.gap.diagnose import diagnose
 from coupled.gap.effects import BY_NAME, EFFECTS, apply
+from coupled.gap.output import white
 from coupled.gap.smooth import smoothed
-from coupled.gap.stages import white
+from coupled.gap.words import in_words
 from coupled.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from tests.gap.made import made, nominal_rig
@@ -45,6 +46,7 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (True, "rigging_offset", {"offset_norm": 0.01}),
     (True, "elevator_effectiveness", {"factor": 0.85}),
     (True, "pitch_damping", {"factor": 1.4}),
+    (True, "vertical_gust", {"rms_m_per_s": 0.5}),
     (False, "pressure_lag", {"lag_s": 0.5}),
     (False, "pressure_scale", {"factor": 1.06}),
     (False, "schedule_slope", {"factor": 1.1}),
@@ -55,7 +57,7 @@ def diagnosed(
     folder: Path, flown: bool, values: Mapping[str, Mapping[str, float]], seed: int = 4
 ) -> dict[str, Any]:
     nominal = nominal_rig(flown)
-    found, _ = diagnose(nominal, made(folder, nominal, values, seed), "column")
+    found = diagnose(nominal, {"r.csv": made(folder, nominal, values, seed)}, "column").found
     json.dumps(found, allow_nan=False)
     return found
 
@@ -100,7 +102,7 @@ def test_an_effect_outside_the_library_is_unexplained_at_its_stage(tmp_path: Pat
     data = record.data.copy()
     at = record.channels.index("column_deflection_m")
     data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
-    found, _ = diagnose(nominal, Record(record.channels, data), "column")
+    found = diagnose(nominal, {"r.csv": Record(record.channels, data)}, "column").found
     assert found["verdict"] == "unexplained"
     assert [s for s, judged in found["stages"].items() if judged.get("guilty")] == ["linkage"]
 
@@ -110,12 +112,12 @@ def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:
     record = made(tmp_path, nominal, {"backlash": {"play_{d}": 1e-3}}, 6)
     keep = [name for name in record.channels if name != "column_deflection_m"]
     data = np.column_stack([record[name] for name in keep])
-    found, _ = diagnose(nominal, Record(tuple(keep), data), "column")
+    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column").found
     assert found["stages"]["linkage"] == {"judged": False, "missing": ["column_deflection_m"]}
     assert found["verdict"] == "no_gap"
     keep.remove("column_force_N")
     data = np.column_stack([record[name] for name in keep])
-    found, _ = diagnose(nominal, Record(tuple(keep), data), "column")
+    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column").found
     assert found["stages"]["loader"] == {"judged": False, "missing": ["column_force_N"]}
     assert "Not judged: loader, linkage, compensation" in in_words(found, "column")
 
@@ -129,7 +131,7 @@ def test_clean_records_have_no_gap(name: str, tmp_path: Path) -> None:
     else:
         rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
         record = read_record(FOUNDERS / "examples" / f"{name}.csv")
-    found, _ = diagnose(rig, record, "column")
+    found = diagnose(rig, {"r.csv": record}, "column").found
     assert found["verdict"] == "no_gap", found["stages"]
 
 
@@ -158,7 +160,7 @@ def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
     ]
     for record, says in cases:
         with pytest.raises(InputError, match=says.replace("?", r"\?")) as caught:
-            diagnose(nominal, record, "column", "r.csv")
+            diagnose(nominal, {"r.csv": record}, "column")
         assert str(caught.value).startswith("r.csv: ")
 
 
@@ -168,7 +170,7 @@ def test_effects_are_data_that_leave_the_host_its_belief() -> None:
     column = rig.controls["column"]
     assert column.loader.basic_gradient == pytest.approx(616.0)
     assert column.compensation.basic_gradient == 560.0
-    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS) == 28
+    assert len({effect.name for effect in EFFECTS}) == len(EFFECTS) == 29
 
 
 def test_the_smoother_takes_noise_off_and_leaves_edges() -> None:

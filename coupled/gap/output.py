@@ -1,0 +1,88 @@
+"""One measured output of a stage, against what a rig makes of the stage's measured input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.parameters import Rig
+
+Floats = NDArray[np.float64]
+Predict = Callable[[Rig], Floats]
+Part = Literal["all", "fitted", "held"]
+STRETCH_s = 2.5  # a stretch of the record, fitted or held out
+_KEPT = 4  # predictions remembered
+
+
+@dataclass(frozen=True)
+class Output:
+    """One measured output of a stage, and how a rig predicts it from the measured input.
+
+    `floor` is the rms that noise alone leaves, in the channel's unit. `record` numbers the
+    record that it is of.
+    """
+
+    stage: str
+    channel: str
+    measured: Floats
+    predict: Predict
+    floor: float
+    frame_rate_Hz: float
+    record: int = 0
+    _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
+
+    def residual(self, rig: Rig, part: Part = "all") -> Floats:
+        """Return measured less predicted, in floors, shape (frames,), of a part's stretches."""
+        key = (rig.controls, rig.flight)
+        left = next((left for known, left in self._known if known == key), None)
+        if left is None:
+            left = (self.measured - self.predict(rig)) / self.floor
+            self._known[:] = [*self._known[1 - _KEPT :], (key, left)]
+        return left if part == "all" else left[self.rows(part)]
+
+    @property
+    def stretches(self) -> NDArray[np.intp]:
+        """The number of the stretch that each frame lies in."""
+        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
+        return np.arange(len(self.measured)) // frames
+
+    def rows(self, part: Part) -> NDArray[np.bool_]:
+        """Return which frames are of a part: every other stretch is fitted, those between held."""
+        number = self.stretches
+        if part == "all":
+            return np.ones(len(number), dtype=bool)
+        return np.asarray(number % 2 == (0 if part == "fitted" else 1))
+
+    def gap(self, rig: Rig) -> float:
+        """Return the rms residual over the floor."""
+        return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
+
+
+def white(signal: Floats) -> float:
+    """Return the white noise in a smooth signal, by its fourth differences (gain √70)."""
+    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+
+
+def memory(residual: Floats) -> float:
+    """Return the residual's integrated autocorrelation time in frames, at least 1."""
+    x = residual - residual.mean()
+    power = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+    correlation = np.fft.irfft(power)[: len(x) // 4]
+    if correlation[0] <= 0.0:
+        return 1.0
+    correlation /= correlation[0]
+    negative = np.flatnonzero(correlation < 0.05)
+    end = int(negative[0]) if negative.size else len(correlation)
+    return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
+
+
+def stage_gaps(outputs: Sequence[Output], rig: Rig) -> dict[str, float]:
+    """Return each stage's gap: the largest of its outputs', over all records."""
+    found: dict[str, float] = {}
+    for output in outputs:
+        found[output.stage] = max(found.get(output.stage, 0.0), output.gap(rig))
+    return found

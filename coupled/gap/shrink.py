@@ -1,0 +1,53 @@
+"""How far the gap shrinks: on stretches used neither to fit nor to choose, and in closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from coupled.channels import ControlName
+from coupled.gap.choose import Choice
+from coupled.gap.fit import fit, touched
+from coupled.gap.output import Output
+from coupled.rig.parameters import Rig
+
+BOOTSTRAPS = 400
+FEW = 8  # blocks under which a bootstrap interval is not to be relied on
+
+
+def shrink(
+    rig: Rig, control: ControlName, outputs: Sequence[Output], choice: Choice
+) -> dict[str, Any]:
+    """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
+    effects = choice.fit.effects
+    found = fit(rig, control, outputs, effects, "fitted", choice.fit.values).rig
+    pool = touched(outputs, effects) if effects else list(outputs)
+    widest = max(pool, key=lambda output: output.gap(rig))
+    result = _of(widest, rig, found, bool(effects))
+    return result | {"channels": [_of(output, rig, found, bool(effects)) for output in pool]}
+
+
+def _of(output: Output, rig: Rig, found: Rig, improved: bool) -> dict[str, Any]:
+    """Return one channel's rms residual before and after, and its floor, in its own unit."""
+    number = output.stretches[output.rows("held")]
+    held = np.unique(number)
+    old, new = output.residual(rig, "held") ** 2, output.residual(found, "held") ** 2
+    means = np.array([[old[number == b].mean(), new[number == b].mean()] for b in held])
+    before, after = np.sqrt(means.mean(axis=0))
+    result: dict[str, Any] = {
+        "channel": output.channel,
+        "before": float(before * output.floor),
+        "after": float(after * output.floor),
+        "floor": output.floor,
+        "blocks": len(held),
+    }
+    if improved and before > 1.0:
+        picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
+        drawn = np.sqrt(means[picks].mean(axis=1))
+        closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - 1.0, 1e-9)
+        result["closed"] = float((before - after) / (before - 1.0))
+        result["low"], result["high"] = np.percentile(closed, [2.5, 97.5]).tolist()
+        result["reliable"] = len(held) >= FEW
+    return result
