@@ -52,6 +52,7 @@ assert len(_LONGITUDINAL) == len(LONGITUDINAL)
 assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
+_WIND_DOWN = "atmosphere/wind-down-fps"
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -251,6 +252,10 @@ class JSBSimAirframe:
             self.step((float(command), 0.0, 0.0))
             positions[i] = self.motion()[ELEVATOR]
         return commands, positions
+
+    def set_vertical_wind(self, up_m_per_s: float) -> None:
+        """Let the air rise at this speed from the next step on."""
+        self._fdm[_WIND_DOWN] = -up_m_per_s / FOOT_m
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""
