@@ -1,1 +1,1 @@
-"""Blind trials: sealed records from an independent twin of the rig, and scores of their diagnoses."""
+"""Blind trials: sealed records of an independent twin of the rig, and their scores."""

@@ -131,7 +131,7 @@ def _gust(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 def dryden(
     frames: int, frame_rate_Hz: float, rms: float, time_s: float, seed: int
 ) -> NDArray[np.float64]:
-    """Return vertical speed of the air, m/s, shape (frames,): white noise through
+    """Return the air's vertical speed, m/s, shape (frames,): white noise through a filter.
 
     H(s) = (1 + √3·T·s)/(1 + T·s)², T = L/V, made discrete by the bilinear rule.
     """

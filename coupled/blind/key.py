@@ -52,6 +52,8 @@ def check_seal(key: Path, seal: Path) -> None:
     except OSError as error:
         raise InputError(seal, "", f"cannot be read: {error.strerror or error}") from None
     except ValueError:
-        raise InputError(seal, "", "is not valid TOML; the seal of coupled blind make is wanted") from None
+        raise InputError(
+            seal, "", "is not valid TOML; the seal of coupled blind make is wanted"
+        ) from None
     if sealed != hashlib.sha256(key.read_bytes()).hexdigest():
         raise InputError(key, "", f"is not the key that {seal} seals: one of them was changed")

@@ -1,4 +1,4 @@
-"""What a trial may put into a real rig: the shape of an entry, and what its size is held against."""
+"""What a trial may put into a real rig: an entry, and what its size is held against."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ class Kind:
         column = rig.controls["column"]
         if self.flown and rig.flight is None:
             return False
-        if self.name == "arc_geometry":
-            return column.length > 0.0
+        if self.name == "arc_geometry":  # in flight the deflections are too small to show it
+            return column.length > 0.0 and rig.flight is None
         if self.stage == "schedule" and rig.flight is not None:
             return _sloped(rig)
         return True

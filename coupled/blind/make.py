@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from coupled.blind.key import SEAL, key_text, seal_text
-from coupled.blind.rigs import random_rig, shipped_pool
+from coupled.blind.rigs import DRAWN, random_rig, shipped_pool
 from coupled.blind.setting import csv_text
 from coupled.blind.trial import Plan, draw_trial, plans
 from coupled.errors import InputError
@@ -59,14 +59,12 @@ def rig_pool(seed: int, rigs: int) -> dict[str, Rig]:
     pool = shipped_pool()
     rng = np.random.default_rng([seed, 0])
     for i in range(rigs):
-        name = f"rig-{i + 1:02d}"
+        name = f"{DRAWN}{i + 1:02d}"
         pool[name] = random_rig(rng, name)
     return pool
 
 
-def _begin(
-    folder: Path, key: Path, parts: Path, seed: int | None, records: int, rigs: int
-) -> int:
+def _begin(folder: Path, key: Path, parts: Path, seed: int | None, records: int, rigs: int) -> int:
     """Check the target and return the seed: that of an interrupted make, given, or drawn."""
     note = parts / "make.json"
     if note.is_file():

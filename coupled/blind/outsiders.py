@@ -1,4 +1,4 @@
-"""What real rigs do and the library has no word for: a diagnosis is to say so, and at which stage."""
+"""What real rigs do and the library has no word for: a diagnosis is to say so, and where."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nominal rigs of a trial: the shipped ones by the column alone, and others of believable numbers.
+"""The nominal rigs of a trial: the shipped ones, column only, and others of believable numbers.
 
 All keep to the description of the rig that diagnoses are judged by: one gradient at a time and
 F_mod = ΔG·δc, so neither the second segment of the schedule nor the preload's term in F_mod.
@@ -23,6 +23,7 @@ VARIANTS = {
     "compensated": (True, True, True),
     "uncompensated": (False, False, True),
 }
+DRAWN = "rig-"  # how the name of a rig that was drawn begins
 MOST_BENT = 0.6  # K·G_T at the most
 
 
@@ -59,8 +60,8 @@ def random_rig(rng: np.random.Generator, name: str) -> Rig:
 def _varied(rig: Rig, name: str, deflection: bool, gradient: bool, bends: bool) -> Rig:
     column = rig.controls["column"]
     bend = column.loader.bend if bends else 0.0
-    host = {"deflection": deflection, "gradient": gradient, "bend": bend}
-    host |= {"breakout_term": "printed"}
+    host: dict[str, Any] = {"deflection": deflection, "gradient": gradient, "bend": bend}
+    host["breakout_term"] = "printed"
     parts = {
         "loader": column.loader.model_copy(update={"bend": bend}),
         "compensation": column.compensation.model_copy(update=host),
@@ -79,7 +80,7 @@ def _moved_column(rng: np.random.Generator, column: Control) -> Control:
     bend = 0.0
     if loader.bend > 0.0:
         bend = _short(min(_log(rng, 2e-5, 2.5e-4), MOST_BENT / max(gradients)))
-    numbers = {
+    numbers: dict[str, float] = {
         "mass": _short(loader.mass * _log(rng, 0.6, 1.7)),
         "damping": _short(loader.damping * _log(rng, 0.6, 1.7)),
         "basic_gradient": _short(loader.basic_gradient * _log(rng, 0.7, 1.4)),
@@ -101,7 +102,6 @@ def _moved_column(rng: np.random.Generator, column: Control) -> Control:
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
 
 
 def _short(value: float) -> float:

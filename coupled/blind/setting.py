@@ -1,4 +1,4 @@
-"""The setting of a trial: rig, pilot, noise; and the records flown in it, with and without a kind."""
+"""The setting of a trial: rig, pilot, noise; and the records flown in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.blind.excitation import pilot_force, pilot_shape, told_pressure
 from coupled.blind.kinds import Clean, Draw, Kind
-from coupled.blind.twin import RIG_CHANNELS, Lost, fly_twin, nominal_twin
+from coupled.blind.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
 from coupled.channels import LONGITUDINAL
 from coupled.record import Record
 from coupled.rig.parameters import Rig
@@ -66,7 +66,7 @@ class Setting:
         """Return the record as a logger writes it, and the parameters of the kinds put in.
 
         `kinds` are put in with their sizes; `off` are factors on the twin's own numbers, which
-        are a setting's tolerance and no effect. Raises Lost where the aircraft is.
+        are a setting's tolerance and no effect. Raises LostError where the aircraft is.
         """
         twin = nominal_twin(self.rig, self.bristle_J)
         for name, factor in (off or {}).items():
@@ -118,7 +118,7 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
     for _ in range(TRIES):
         try:
             record, _ = setting.fly()
-        except Lost:
+        except LostError:
             setting = setting.gentler()
             continue
         return setting, Clean(setting.rig, record, setting.bristle_J)

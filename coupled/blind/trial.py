@@ -13,8 +13,9 @@ from coupled.blind.effects import EFFECTS
 from coupled.blind.kinds import Clean, Draw, Kind
 from coupled.blind.measure import stage_gaps
 from coupled.blind.outsiders import OUTSIDERS
+from coupled.blind.rigs import DRAWN
 from coupled.blind.setting import Setting, draw_setting, fly_clean
-from coupled.blind.twin import Lost
+from coupled.blind.twin import LostError
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 
@@ -29,7 +30,6 @@ SIZINGS = 5
 GROUPS = (
     ("column_deflection_m",),
     ("column_gradient_N_per_m",),
-    ("column_modifying_force_N",),
     ("column_estimate_m",),
     ("elevator_rad",),
 )
@@ -54,9 +54,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class _Sized:
+    """A kind at the size it was given, and the gap that it makes alone."""
+
+    kind: Kind
     size: float
-    parameters: dict[str, float]
-    record: Record
+    draw: Draw
     gap: float
 
 
@@ -116,15 +118,9 @@ def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig
     suited = [name for name, rig in pool.items() if all(kind.suits(rig) for kind in kinds)]
     shipped = rng.uniform() < 2.0 / 3.0
     benches = rng.uniform() < 0.25
-    for test in (
-        lambda n: n.startswith("rig-") != shipped and (pool[n].flight is None) == benches,
-        lambda n: n.startswith("rig-") != shipped,
-        lambda n: True,
-    ):
-        found = [name for name in suited if test(name)]
-        if found:
-            return pool[str(rng.choice(found))]
-    return None
+    of_kind = [name for name in suited if name.startswith(DRAWN) != shipped] or suited
+    found = [name for name in of_kind if (pool[name].flight is None) == benches] or of_kind
+    return pool[str(rng.choice(found))] if found else None
 
 
 def _flown(
@@ -133,45 +129,46 @@ def _flown(
     """Return the trial in its setting, or None where its kinds cannot be made as wide as wanted."""
     if plan.kind == "none":
         return _without(rng, setting)
-    clear = plan.kind in ("pair", "outsider")
     bare = stage_gaps(clean.rig, clean.record, any(k.stage == "airframe" for k in kinds))
     parts = []
     for kind in kinds:
-        if kind.stage not in bare:  # a gradient that never changes tells nothing of its schedule
+        part = _part(rng, plan, kind, setting, clean, bare)
+        if part is None:
             return None
-        low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
-        wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        draw = Draw(
-            float(rng.choice([-1.0, 1.0])),
-            (float(rng.uniform()), float(rng.uniform()), float(rng.uniform())),
-            int(rng.integers(2**31)),
-        )
-        sized = _sized(setting, clean, kind, draw, wanted, bare[kind.stage])
-        if sized is None or (clear and sized.gap < CLEAR):
-            return None
-        if plan.kind == "outsider" and sized.gap > CLEAREST:
-            return None
-        parts.append((kind, sized, draw))
-    record, found = parts[0][1].record, [part[1].parameters for part in parts]
-    if len(parts) > 1:
-        try:
-            record, found = setting.fly(clean, [(k, s.size, d) for k, s, d in parts])
-        except Lost:
-            return None
-    gaps = stage_gaps(setting.rig, record)
-    truth = _truth(setting, plan.kind, gaps) | {
+        parts.append(part)
+    try:
+        record, found = setting.fly(clean, [(p.kind, p.size, p.draw) for p in parts])
+    except LostError:
+        return None
+    truth = _truth(setting, plan.kind, stage_gaps(setting.rig, record)) | {
         "effects": [
-            {"name": kind.name, "stage": kind.stage, "parameters": values}
-            for (kind, _, _), values in zip(parts, found, strict=True)
+            {"name": part.kind.name, "stage": part.kind.stage, "parameters": values}
+            for part, values in zip(parts, found, strict=True)
         ],
         "stages": sorted({kind.stage for kind in kinds}),
         "clean_gap": {kind.stage: bare[kind.stage] for kind in kinds},
-        "alone": [sized.gap for _, sized, _ in parts],
-        "ratio": min(sized.gap / bare[kind.stage] for kind, sized, _ in parts),
+        "alone": [part.gap for part in parts],
+        "ratio": min(part.gap / bare[part.kind.stage] for part in parts),
     }
-    if plan.kind == "lacking":
-        return _lacking(rng, Trial(setting.rig, record, truth))
-    return Trial(setting.rig, record, truth)
+    trial = Trial(setting.rig, record, truth)
+    return _lacking(rng, trial) if plan.kind == "lacking" else trial
+
+
+def _part(
+    rng: Rng, plan: Plan, kind: Kind, setting: Setting, clean: Clean, bare: Mapping[str, float]
+) -> _Sized | None:
+    """Return a kind at a size that makes it as wide as its class wants, or None."""
+    if kind.stage not in bare:  # a gradient that never changes tells nothing of its schedule
+        return None
+    clear = plan.kind in ("pair", "outsider")
+    low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
+    wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    shares = (float(rng.uniform()), float(rng.uniform()), float(rng.uniform()))
+    draw = Draw(float(rng.choice([-1.0, 1.0])), shares, int(rng.integers(2**31)))
+    sized = _sized(setting, clean, kind, draw, wanted, bare[kind.stage])
+    if sized is None or (clear and not CLEAR <= sized.gap <= CLEAREST):
+        return None
+    return sized
 
 
 def _without(rng: Rng, setting: Setting) -> Trial | None:
@@ -182,7 +179,7 @@ def _without(rng: Rng, setting: Setting) -> Trial | None:
         off = {name: 1.0 + float(rng.normal(0.0, TOLERANCE)) for name in names}
     try:
         record, _ = setting.fly(off=off)
-    except Lost:
+    except LostError:
         return None
     truth = _truth(setting, "none", stage_gaps(setting.rig, record))
     return Trial(setting.rig, record, truth | {"effects": [], "stages": [], "tolerance": off})
@@ -212,16 +209,19 @@ def _sized(
     size, best, miss = math.sqrt(kind.least * kind.most), None, math.inf
     for _ in range(SIZINGS):
         try:
-            record, [values] = setting.fly(clean, [(kind, size, draw)])
-        except Lost:
+            record, _ = setting.fly(clean, [(kind, size, draw)])
+        except LostError:
             size = max(kind.least, 0.4 * size)
             continue
         gap = stage_gaps(setting.rig, record, kind.stage == "airframe")[kind.stage]
         excess = math.sqrt(max(gap**2 - bare**2, 0.01))
         off = abs(math.log(wanted / excess))
         if off < miss:
-            best, miss = _Sized(size, values, record, gap), off
-        last, size = size, min(max(size * min(max(wanted / excess, 0.02), 50.0), kind.least), kind.most)
+            best, miss = _Sized(kind, size, draw, gap), off
+        last, size = (
+            size,
+            min(max(size * min(max(wanted / excess, 0.02), 50.0), kind.least), kind.most),
+        )
         if off < 0.4 or size == last:
             break
     return best

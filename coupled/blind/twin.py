@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.blind.kernel import KNOTS, TWIN_PARAMETERS, TWIN_STATE, twin_frame
+from coupled.blind.kernel import twin_frame
+from coupled.blind.numbers import KNOTS, TWIN_PARAMETERS, TWIN_STATE
 from coupled.channels import BENCH_MOTION, LONGITUDINAL
 from coupled.flight.airframe import ALTITUDE, ELEVATOR, JSBSimAirframe
 from coupled.record import Record
@@ -124,7 +125,7 @@ def set_friction(
     twin.set(bristle_damping=0.3 * math.sqrt(stiffness * twin.get("mass")))
 
 
-class Lost(RuntimeError):
+class LostError(RuntimeError):
     """The aircraft left the envelope in which a trial means something."""
 
 
@@ -137,7 +138,7 @@ def fly_twin(
     nodes   the pilot's force, shape (frames·NODES + 1,), N
     told    q̄ of a bench, shape (frames,), Pa; None where the rig flies
     noise   shape (frames, channels without time), standard deviations applied
-    Raises Lost where the aircraft leaves the envelope.
+    Raises LostError where the aircraft leaves the envelope.
     """
     rows = noise[:, :7].copy()
     state = np.zeros(1, TWIN_STATE)
@@ -182,9 +183,9 @@ def _fly(
     for k in range(len(rows)):
         motion = craft.motion()
         if abs(motion[LOAD] - 1.0) > 2.0 or not motion[ALTITUDE] > craft.safe_altitude_m:
-            raise Lost
+            raise LostError
         if abs(motion[ALPHA] - start[ALPHA]) > 0.22 or motion[SPEED] < 0.7 * start[SPEED]:
-            raise Lost
+            raise LostError
         motions.append(motion)
         command = kernel(twin.numbers, state, nodes, rows[k], k, motion[0], motion[LOAD])
         commands[k] = command
