@@ -98,7 +98,7 @@ def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
     factors = factors * np.ones(len(names))
     sigma = np.array([NOISE[name][0] for name in names]) * factors
     noise = rng.standard_normal((frames, len(names))) * sigma
-    bristle = float(np.exp(rng.uniform(np.log(1e-6), np.log(8e-6))))
+    bristle = float(np.exp(rng.uniform(np.log(3e-7), np.log(1.5e-6))))
     about = {
         "duration_s": frames / rig.frame_rate,
         "excitation": shapes,

@@ -70,7 +70,7 @@ def first_order(lag_s: float, step_s: float) -> float:
     return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0
 
 
-def nominal_twin(rig: Rig, bristle_J: float = 2e-6) -> Twin:
+def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
     """Return a twin of the rig's column without any effect; K̂, G_B and F_BO are believed right.
 
     `bristle_J` is friction times the bristles' length: what a reversal gives back, J.
