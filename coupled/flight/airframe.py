@@ -54,6 +54,7 @@ assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
 SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
+_WIND_DOWN = "atmosphere/wind-down-fps"
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 
 
@@ -141,7 +142,7 @@ class JSBSimAirframe:
             speed = self.motion()[SPEED]
             air_m_per_s = dryden(flight.gust_rms, flight.gust_length, speed, frame_s, seed)
         if air_m_per_s is not None:
-            self.step = blown(self.step, self._air(), iter(air_m_per_s))
+            self.step = blown(self.step, self.set_vertical_wind, iter(air_m_per_s))
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
@@ -235,15 +236,6 @@ class JSBSimAirframe:
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
-    def _air(self) -> Callable[[float], None]:
-        """Return what sets the air's upward speed, m/s."""
-        down_fps = self._node("atmosphere/wind-down-fps").set_double_value
-
-        def set_air(up_m_per_s: float) -> None:
-            down_fps(-up_m_per_s / FOOT_m)
-
-        return set_air
-
     def pitch_moments(self) -> tuple[float, float]:
         """Return what moves the nose, by finite differences.
 
@@ -270,6 +262,10 @@ class JSBSimAirframe:
             self.step((float(command), 0.0, 0.0))
             positions[i] = self.motion()[ELEVATOR]
         return commands, positions
+
+    def set_vertical_wind(self, up_m_per_s: float) -> None:
+        """Let the air rise at this speed from the next step on."""
+        self._fdm[_WIND_DOWN] = -up_m_per_s / FOOT_m
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

@@ -4,7 +4,7 @@ Two decorators: `stage` for a function that other kernels call, `entry` for one
 that Python calls and whose machine code is kept on disk. numba looks only at an
 entry's own file to tell whether its cache is stale, which would fly old physics
 after an edit of a stage; so the cache lies in a folder named by a hash of all
-sources in `coupled/rig`.
+sources in `coupled/rig`, and of those beside the entry.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def stage(function: F) -> F:
 def entry(function: F) -> F:
     """Compile a function that Python calls, and keep the result on disk."""
     chosen = config.CACHE_DIR
-    config.CACHE_DIR = _cache_folder(chosen)
+    config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
         return cast(F, numba.njit(cache=True)(function))
     finally:
@@ -52,11 +52,11 @@ def bound(kernel: F, *arguments: Any) -> F:
     return cast(F, dispatcher.get_overload(types))
 
 
-def _cache_folder(chosen: str) -> str:
+def _cache_folder(chosen: str, beside: Path) -> str:
     """Folder for this version of the physics, or numba's own choice if ours is read-only."""
     here = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in sorted(here.glob("*.py")):
+    for source in sorted({*here.glob("*.py"), *beside.glob("*.py")}):
         digest.update(source.read_bytes())
     folder = Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
     try:

@@ -1,0 +1,1 @@
+"""Blind trials: sealed records of an independent twin of the rig, and their scores."""

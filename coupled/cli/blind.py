@@ -1,0 +1,84 @@
+"""The commands of blind trials: make, score."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupled.cli.app import JsonOption, app
+from coupled.errors import InputError
+from coupled.files import check_target
+from coupled.terminal import check_json, give_json, out, progress, say
+
+blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score their diagnoses.")
+app.add_typer(blind, name="blind")
+
+
+@blind.command(epilog="[dim]Example: coupled blind make out/trials --records 60 --key key.json[/]")
+def make(
+    folder: Annotated[Path, typer.Argument(help="A new folder for records, rigs and seal.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The key.  [default: DIR.key.json]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="For the same bytes again.  [default: drawn]")
+    ] = None,
+    records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
+    rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the shipped ones.")] = 24,
+) -> None:
+    """Write sealed records of an independent twin, with and without effects; the key apart."""
+    from coupled.blind.make import make as make_trials
+
+    path = key or folder.with_name(folder.name + ".key.json")
+    if folder.is_file():
+        raise InputError(folder, "", "is a file; give a new folder")
+    with progress() as advance:
+        make_trials(folder, path, seed, records, rigs, advance)
+    say(f"records: {folder / 'records'}  ({records}, with their rigs in {folder / 'records.toml'})")
+    say(f"seal: {folder / 'seal.toml'}")
+    say(f"key: {path}  (not to be opened before the diagnoses are made)")
+
+
+@blind.command(
+    epilog="[dim]Example: coupled blind score out/diagnoses --key out/trials.key.json[/]"
+)
+def score(
+    diagnoses: Annotated[Path, typer.Argument(help="A folder of diagnoses, rNNN.json each.")],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="The key of the trials.")],
+    seal: Annotated[
+        Path | None, typer.Option(help="Its seal.  [default: seal.toml of DIR for DIR.key.json]")
+    ] = None,
+    json_file: JsonOption = "",
+    figure: Annotated[
+        Path | None, typer.Option(help="Power and reliability: PNG, PDF or SVG.")
+    ] = None,
+) -> None:
+    """Score diagnoses of sealed trials against their key, each share with its exact interval."""
+    from coupled.blind.answers import read_answers
+    from coupled.blind.key import SEAL, check_seal, read_key
+    from coupled.blind.score import score as score_answers
+    from coupled.tables.trials import print_score
+
+    sealed = seal or key.with_name(key.name.removesuffix(".json").removesuffix(".key")) / SEAL
+    inputs = [key, sealed, *diagnoses.glob("*.json")]
+    if figure is not None:
+        from coupled.plots.saving import check_format
+
+        check_format(figure)
+        check_target(figure, inputs)
+    check_json(json_file, [*inputs, *([figure] if figure else [])])
+    truth = read_key(key)
+    check_seal(key, sealed)
+    found = score_answers(read_answers(diagnoses, truth))
+    if json_file != "-":
+        print_score(out, found)
+    if figure is not None:
+        from coupled.plots.saving import save
+        from coupled.plots.trials import draw_score
+
+        save(draw_score(found), figure)
+        if json_file != "-":
+            say(f"figure: {figure}")
+    give_json(found, json_file)

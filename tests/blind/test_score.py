@@ -1,0 +1,220 @@
+"""The score of diagnoses made by hand, whose score is known."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coupled.blind.answers import read_answers
+from coupled.blind.key import key_text, seal_text
+from coupled.blind.score import score, share
+from coupled.errors import InputError
+from tests.test_cli import coupled, files
+
+Table = dict[str, Any]
+FACTOR = {
+    "inertia": {"factor": 1.4},
+    "viscous_damping": {"factor": 1.2},
+    "bend": {"bend_m_per_N": 9e-5},
+}
+STAGE = {"inertia": "loader", "viscous_damping": "loader", "bend": "linkage", "cogging": "loader"}
+
+
+def truth(kind: str, *names: str, ratio: float = 5.0, missing: tuple[str, ...] = ()) -> Table:
+    effects = [{"name": n, "stage": STAGE[n], "parameters": FACTOR.get(n, {})} for n in names]
+    stages = sorted({STAGE[n] for n in names})
+    found = {"class": kind, "rig": "x", "effects": effects, "stages": stages, "gap": {}}
+    return {**found, "missing": list(missing), **({"ratio": ratio} if names else {})}
+
+
+def told(verdict: str, *names: str, off: float = 0.0, rivals: Any = (), **more: Any) -> Table:
+    effects = []
+    for name in names:
+        values = {
+            key: {"value": v * (1 + off), "low": v * (0.99 + off), "high": v * (1.01 + off)}
+            for key, v in FACTOR.get(name, {}).items()
+        }
+        effects.append(
+            {"name": name, "stage": STAGE[name], "probability": 0.9, "parameters": values}
+        )
+    stages: Table = {stage: {"gap": 1.0, "guilty": False} for stage in ("loader", "linkage")}
+    for name in names:
+        stages[STAGE[name]]["guilty"] = True
+    for stage in more.get("guilty", ()):
+        stages[stage]["guilty"] = True
+    if "missing" in more:
+        stages["surface"] = {"judged": False, "missing": more["missing"]}
+    return {
+        "verdict": verdict,
+        "effects": effects,
+        "stages": stages,
+        "rivals": list(rivals),
+        "shrink": {"closed": more.get("closed", 0.99)},
+    }
+
+
+CASES: list[tuple[Table, Table | None]] = [
+    (truth("single", "inertia"), told("effect", "inertia")),
+    (truth("single", "inertia"), told("effect", "inertia", off=0.1, closed=0.9)),
+    (
+        truth("single", "inertia"),
+        told("ambiguous", "viscous_damping", rivals=[["viscous_damping", "inertia"]]),
+    ),
+    (truth("single", "inertia"), told("effect", "viscous_damping")),
+    (truth("single", "bend", ratio=1.2), told("no_gap")),
+    (truth("single", "bend", ratio=1.2), told("effect", "inertia")),
+    (truth("single", "bend", ratio=1.2), told("unexplained", guilty=["linkage"])),
+    (truth("single", "bend"), None),
+    (truth("none"), told("no_gap")),
+    (truth("none"), told("effect", "bend")),
+    (truth("outsider", "cogging"), told("unexplained", guilty=["loader"])),
+    (truth("outsider", "cogging"), told("effect", "inertia")),
+    (truth("pair", "inertia", "bend"), told("effect", "bend", "inertia")),
+    (truth("pair", "inertia", "bend"), told("effect", "bend")),
+    (truth("pair", "inertia", "bend"), told("unexplained", "bend", "inertia")),
+    (
+        truth("lacking", "bend", missing=("elevator_rad",)),
+        told("effect", "bend", missing=["elevator_rad"]),
+    ),
+    (truth("lacking", "bend", missing=("elevator_rad",)), told("effect", "bend")),
+]
+
+
+@pytest.fixture
+def trials(tmp_path: Path) -> Path:
+    """Return a folder with key, seal and diagnoses."""
+    names = [f"r{i + 1:03d}" for i in range(len(CASES))]
+    text = key_text("salt", 1, {n: t for n, (t, _) in zip(names, CASES, strict=True)})
+    (tmp_path / "set.key.json").write_text(text)
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "seal.toml").write_text(seal_text(text))
+    (tmp_path / "told").mkdir()
+    for name, (_, diagnosis) in zip(names, CASES, strict=True):
+        if diagnosis is not None:
+            (tmp_path / "told" / f"{name}.json").write_text(json.dumps(diagnosis))
+    return tmp_path
+
+
+def test_every_share_is_the_one_made(trials: Path) -> None:
+    key = json.loads((trials / "set.key.json").read_text())
+    found = score(read_answers(trials / "told", key))
+    shares = {
+        (group, name): (value["right"], value["of"])
+        for group in found
+        if isinstance(found[group], dict)
+        for name, value in found[group].items()
+        if isinstance(value, dict) and "share" in value
+    }
+    assert shares == {
+        ("clear_singles", "named"): (2, 5),
+        ("clear_singles", "named_or_in_the_set"): (3, 5),
+        ("clear_singles", "stage"): (4, 5),
+        ("clear_singles", "wrong"): (1, 5),
+        ("faint_singles", "right"): (0, 3),
+        ("faint_singles", "no_gap"): (1, 3),
+        ("faint_singles", "undecided"): (1, 3),
+        ("faint_singles", "wrong"): (1, 3),
+        ("no_gap", "false_alarms"): (1, 2),
+        ("outsiders", "unexplained"): (1, 2),
+        ("outsiders", "stage"): (2, 2),
+        ("outsiders", "false_attributions"): (1, 2),
+        ("pairs", "whole"): (1, 3),
+        ("pairs", "whole_or_in_the_set"): (1, 3),
+        ("pairs", "stages"): (2, 3),
+        ("lacking", "lack_said"): (1, 2),
+        ("intervals", "covered"): (3, 4),
+    }
+    assert (found["closed"]["right"], found["closed"]["of"]) == (2, 3)
+    assert (found["records"], found["missing"]) == (17, 1)
+    probabilities = found["probabilities"]
+    true, false = 9, 6  # effects found that are there, and that are not
+    assert probabilities["effects"] == true + false - 1
+    assert found["effects"]["inertia"]["instead"] == {
+        "ambiguous: viscous_damping": 1,
+        "effect: viscous_damping": 1,
+    }
+    assert sum(row["of"] for row in found["power"]) == 8
+    assert found["power"][-1]["right"] == 2
+
+
+def test_brier_and_reliability_by_hand(tmp_path: Path) -> None:
+    key = {"records": {"r001": truth("single", "inertia"), "r002": truth("none")}}
+    for name in key["records"]:
+        (tmp_path / f"{name}.json").write_text(json.dumps(told("effect", "inertia")))
+    found = score(read_answers(tmp_path, key))["probabilities"]
+    assert found["brier"] == pytest.approx(0.5 * (0.1**2 + 0.9**2))
+    [only] = found["bins"]
+    assert (only["told"], only["share"]) == (pytest.approx(0.9), 0.5)
+
+
+def test_intervals_of_shares_are_exact() -> None:
+    # Clopper and Pearson, Biometrika 26, 1934: 0 of n leaves 1 − (α/2)^(1/n).
+    assert share(0, 60)["high"] == pytest.approx(1 - 0.025 ** (1 / 60))
+    assert share(60, 60)["low"] == pytest.approx(0.025 ** (1 / 60))
+    half = share(5, 10)
+    assert (half["low"], half["high"]) == (
+        pytest.approx(0.1871, abs=1e-4),
+        pytest.approx(0.8129, abs=1e-4),
+    )
+    assert share(0, 0)["share"] is None
+
+
+def test_the_command_prints_draws_and_writes(trials: Path) -> None:
+    words = [
+        "blind",
+        "score",
+        "told",
+        "--key",
+        "set.key.json",
+        "--json",
+        "s.json",
+        "--figure",
+        "s.png",
+    ]
+    done = coupled(trials, *words)
+    assert done.returncode == 0, done.stderr
+    assert "false alarms" in done.stdout
+    assert "without a diagnosis: 1 of 17" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert json.loads((trials / "s.json").read_text())["records"] == 17
+    assert (trials / "s.png").stat().st_size > 10_000
+
+
+def test_a_changed_key_or_a_bad_diagnosis_scores_nothing(trials: Path) -> None:
+    before = files(trials)
+    words = ["blind", "score", "told", "--key", "set.key.json", "--json", "s.json"]
+    (trials / "told" / "r001.json").write_text('{"verdict": "perhaps"}')
+    done = coupled(trials, *words)
+    assert done.returncode == 2
+    assert "verdict" in done.stderr
+    key = (trials / "set.key.json").read_text()
+    (trials / "set.key.json").write_text(key.replace("1.4", "1.5"))
+    done = coupled(trials, *words)
+    assert done.returncode == 2
+    assert "is not the key" in done.stderr
+    assert files(trials) == before
+
+
+def test_other_faults_of_diagnoses(trials: Path, tmp_path: Path) -> None:
+    key = json.loads((trials / "set.key.json").read_text())
+    (tmp_path / "empty").mkdir()
+    for folder, word in ((tmp_path / "none", "no folder"), (tmp_path / "empty", "no diagnosis")):
+        with pytest.raises(InputError, match=word):
+            read_answers(folder, key)
+    for text in (
+        "{",
+        '{"verdict": "effect", "effects": [{}], "stages": {}}',
+        '{"verdict": "effect"}',
+    ):
+        (trials / "told" / "r001.json").write_text(text)
+        with pytest.raises(InputError):
+            read_answers(trials / "told", key)
+
+
+def test_the_seal_is_the_hash_of_the_key() -> None:
+    text = key_text("s", 1, {})
+    assert hashlib.sha256(text.encode()).hexdigest() in seal_text(text)
