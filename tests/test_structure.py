@@ -28,6 +28,7 @@ ORDER = [
     "channels",
     "rig",
     "record",
+    "logs",
     "flight",
 ]
 ORDER += ["authority", "calibration", "gap", "blind", "plots", "tables", "terminal", "cli"]
