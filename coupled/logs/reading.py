@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from coupled.csvfile import numbers
 from coupled.errors import InputError, nearest
+from coupled.logs.apart import read_apart
 from coupled.logs.mapping import Layout
-from coupled.logs.matlab import read_matlab
 
 Floats = NDArray[np.float64]
 Lines = NDArray[np.int64]
@@ -103,21 +103,7 @@ def read_log(path: Path, layout: Layout) -> Log:
         raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
     if kind == "csv":
         return _read_csv(path, content, layout)
-    if kind == "parquet":
-        return Log(path, _read_parquet(path, content))
-    arrays = read_matlab(path, content, layout.matrix, layout.names)
-    return Log(path, {name: pl.Series(name, values) for name, values in arrays.items()})
-
-
-def _read_parquet(path: Path, content: bytes) -> dict[str, pl.Series]:
-    # A damaged file makes the reader panic, aloud, if its frame is not seen to be whole first.
-    if len(content) < 12 or content[:4] != b"PAR1" or content[-4:] != b"PAR1":
-        raise InputError(path, "", "is not a Parquet file, or is cut off")
-    try:
-        table = pl.read_parquet(io.BytesIO(content))
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        raise InputError(path, "", f"is not a table: {_first_line(error)}") from None
-    return {name: table[name] for name in table.columns}
+    return Log(path, read_apart(path, content, kind, layout))
 
 
 def _first_line(error: BaseException) -> str:

@@ -391,7 +391,11 @@ LOGS: dict[str, tuple[str, str | bytes, str]] = {
     "half a packed mat": ("log.mat", damaged("packed", lambda b: b[:4000]), "log.mat"),
     "turned mat": ("log.mat", damaged("packed", lambda b: b[:300] + b[299::-1]), "log.mat"),
     "no parquet": ("log.parquet", JUNK, "is not a Parquet file"),
-    "half a parquet": ("log.parquet", damaged("parquet", lambda b: b[:4000]), "is not a Parquet"),
+    "half a parquet": (
+        "log.parquet",
+        damaged("parquet", lambda b: b[:4000]),
+        "is not a Parquet file",
+    ),
     "bad parquet": (
         "log.parquet",
         damaged("parquet", lambda b: b[:60] + bytes(len(b) - 120) + b[-60:]),
@@ -529,3 +533,24 @@ def test_words_that_lead_nowhere_write_nothing(
     with pytest.raises(InputError):
         app(["import", *words], standalone_mode=False)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+
+
+def test_the_map_of_the_manual_reads_the_log_that_it_describes(tmp_path: Path) -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    log_map = manual.partition("## Map of a log")[2].partition("```toml\n")[2].partition("```")[0]
+    time = np.arange(1200) / 120.0
+    late = np.sin(time - 0.004)
+    lines = ["# test 7", "TIME;FORCE_LB;COL_IN;GRIP;QBAR;NOTE", "ms;lbf;in;;psf;"]
+    for k, t in enumerate(time):
+        counts = 2048 + 409.6 * np.sin(t)
+        pressure = "" if k % 10 and k != len(time) - 1 else "20.9"
+        row = f"{1000 * t:.3f};{-late[k]:.9f};{np.sin(t):.9f};{counts:.6f};{pressure};ok"
+        lines.append(row.replace(".", ","))
+    record, account = imported(tmp_path, "\r\n".join(lines), log_map)
+    signal = np.sin(record.time_s)
+    np.testing.assert_allclose(record["column_force_N"], 4.4482216152605 * signal, atol=2e-4)
+    np.testing.assert_allclose(record["column_computed_m"], 0.0254 * signal, atol=1e-9)
+    np.testing.assert_allclose(record["column_deflection_m"], 0.0254 * signal, atol=1e-8)
+    np.testing.assert_allclose(record["dynamic_pressure_Pa"], 20.9 * 47.88025898)
+    assert account["unmapped"] == ["NOTE"]
+    assert account["channels"]["dynamic_pressure_Pa"]["filled_cells"] > 1000
