@@ -84,7 +84,7 @@ def _between(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dic
         if moved:
             force = channel(control, "force")
             if force in record and plausible.against(record[force], record[moved[0]]):
-                _add(doubts, force, f"moves against {moved[0]}: sign?")
+                _add(doubts, force, "moves against the deflection: sign?")
             _add(doubts, force, _force(record, control, moved[0], data))
     pulled = next((n for n in ("column_computed_m", "column_deflection_m") if n in record), None)
     elevator = record.get("elevator_rad")

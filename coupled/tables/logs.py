@@ -43,4 +43,5 @@ def clock_in_words(clock: dict[str, Any]) -> str:
         how = f"{steps} apart, interpolated (PCHIP)"
     else:
         how = "even, taken as they are"
-    return f"clock: {rows}, {how}; {clock['frames']} frames at {clock['frame_rate_Hz']:g} Hz"
+    frames = f"{clock['frames']} frames at {clock['frame_rate_Hz']:g} Hz"
+    return f"clock: {rows}, {how};\n       {frames}"

@@ -276,7 +276,7 @@ def test_doubts_name_what_is_wrong(tmp_path: Path) -> None:
     ]
     wrong = MAP.replace("sign = -1\n", "")
     assert doubts(tmp_path, log_map=wrong)["column_force_N"] == [
-        "moves against column_computed_m: sign?"
+        "moves against the deflection: sign?"
     ]
     bad = inches.copy()
     bad[77] += 1.0
