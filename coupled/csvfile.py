@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -34,23 +35,39 @@ def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
     doubled = [name for name in table.columns if "_duplicated_" in name]
     if doubled:
         raise InputError(path, doubled[0].partition("_duplicated_")[0], "stands there twice")
-    return {name: _numbers(path, name, table[name], gaps) for name in table.columns}
+    return {name: numbers(path, name, table[name], gaps) for name in table.columns}
 
 
-def _numbers(path: Path, name: str, column: pl.Series, gaps: bool) -> Floats:
+def numbers(
+    path: Path,
+    name: str,
+    column: pl.Series,
+    gaps: bool,
+    line: Callable[[int], int] = lambda row: row + 2,
+    largest: float = LARGEST,
+) -> Floats:
+    """Return a column as doubles, shape (rows,).
+
+    Text is read as numbers; an empty cell is NaN where `gaps` are allowed. `line` tells
+    where a row, counted from 0, stands in the file; no number may exceed `largest`.
+    """
     if column.dtype == pl.String:
         column = column.str.strip_chars()
         column = column.set(column == "", None)
-    numbers = column.cast(pl.Float64, strict=False)
-    text = np.flatnonzero(numbers.is_null().to_numpy() & column.is_not_null().to_numpy())
+    doubles = column.cast(pl.Float64, strict=False)
+    text = np.flatnonzero(doubles.is_null().to_numpy() & column.is_not_null().to_numpy())
     if text.size:
         row = int(text[0])
-        raise InputError(path, name, f"row {row + 2} holds {column[row]!r}, which is no number")
-    values = numbers.to_numpy().astype(np.float64)
-    bad = np.isinf(values) | (np.abs(values) > LARGEST)
+        problem = f"row {line(row)} holds {column[row]!r}, which is no number"
+        raise InputError(path, name, problem)
+    values = doubles.to_numpy().astype(np.float64)
+    bad = np.isinf(values) | (np.abs(values) > largest)
     if not gaps:
         bad |= np.isnan(values)
     if bad.any():
         row = int(np.argmax(bad))
-        raise InputError(path, name, f"row {row + 2} holds no finite number; a table has no gaps")
+        what = "no finite number; a table has no gaps"
+        if np.isfinite(values[row]):
+            what = f"{values[row]:.3g}, larger than any real one"
+        raise InputError(path, name, f"row {line(row)} holds {what}")
     return values

@@ -32,13 +32,20 @@ def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
     return Field(default, json_schema_extra={"unit": unit}, **bounds)
 
 
+def named(key: str, default: Any = ..., **bounds: Any) -> Any:
+    """Declare a field whose key in a file is a word that Python keeps for itself."""
+    return Field(default, json_schema_extra={"key": key}, **bounds)
+
+
 def file_keys(section: type[Section], d: str) -> dict[str, str]:
     """Return {key in a file: field} of a section, for deflections in unit `d`."""
     keys = {}
     for name, info in section.model_fields.items():
         extra = info.json_schema_extra
-        unit = str(extra["unit"]).format(d=d) if isinstance(extra, dict) and "unit" in extra else ""
-        keys[f"{name}_{unit}" if unit else name] = name
+        told = extra if isinstance(extra, dict) else {}
+        unit = str(told.get("unit", "")).format(d=d)
+        key = str(told.get("key", name))
+        keys[f"{key}_{unit}" if unit else key] = name
     return keys
 
 

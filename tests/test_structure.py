@@ -11,6 +11,7 @@ import pytest
 from coupled import channels
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Measure, RunFile
+from coupled.logs.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
 from coupled.schema import Section, file_keys
 
@@ -28,6 +29,7 @@ ORDER = [
     "channels",
     "rig",
     "record",
+    "logs",
     "flight",
 ]
 ORDER += ["authority", "calibration", "gap", "blind", "plots", "tables", "terminal", "cli"]
@@ -90,12 +92,15 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Rigging, RunFile, Bench, Measure]
-    sections += list(PILOTS.values())
+    sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
             if key in ("controls", "flight", "loader", "schedule", "compensation", "sensing"):
                 continue
             if key in ("rigging", "noise", "measure", "bench", "case", "kind"):
+                continue
+            if section is LogMap:
+                assert f"[{key}" in text, key
                 continue
             assert f"`{key}`" in text, (section.__name__, key)
     for name in channels.record_channels(["column"], flown=True)[1:]:

@@ -1,0 +1,104 @@
+"""The vectors of a MATLAB file, by name: variables, fields of structs, columns of a matrix.
+
+Only numbers are taken. Objects, function handles and cells are looked at as data and passed
+over; nothing that a file holds is ever run.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import io as scipy_io
+
+from coupled.errors import InputError
+
+Floats = NDArray[np.float64]
+DEEPEST = 6  # structs within structs
+MOST_FIELDS = 10_000
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def read_matlab(
+    path: Path, content: bytes, matrix: str = "", names: list[str] | str = "signals"
+) -> dict[str, Floats]:
+    """Return {name: values, shape (rows,)} of a MATLAB file, v4 to v7.2.
+
+    A field of a struct is `struct.field`, of an array of structs `struct(1).field`. With
+    `matrix` the columns of that variable are taken too, by `names`: a list, or the variable
+    that holds them.
+    """
+    if content[:8] == HDF5 or content[512:520] == HDF5 or content[:19] == b"MATLAB 7.3 MAT-file":
+        raise InputError(path, "", "is a MATLAB file of v7.3; save it with -v7")
+    variables = _load(path, content)
+    found: dict[str, Floats] = {}
+    for name, value in variables.items():
+        _collect(found, name, value, 0)
+    if matrix:
+        found.update(_matrix(path, variables, matrix, names))
+    if not found:
+        raise InputError(path, "", "holds no vector of numbers")
+    return found
+
+
+def _load(path: Path, content: bytes) -> dict[str, Any]:
+    try:
+        listed = [name for name, _, _ in scipy_io.whosmat(io.BytesIO(content))]
+        doubled = sorted({name for name in listed if listed.count(name) > 1})
+        if doubled:
+            raise InputError(path, doubled[0], "stands there twice")
+        wanted = [name for name in listed if not name.startswith("__")]
+        loaded = scipy_io.loadmat(
+            io.BytesIO(content), variable_names=wanted, verify_compressed_data_integrity=True
+        )
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails wherever its first wrong byte leads
+        kind = type(error).__name__
+        raise InputError(path, "", f"is not a MATLAB file, or is damaged ({kind})") from None
+    return {name: value for name, value in loaded.items() if not name.startswith("__")}
+
+
+def _collect(found: dict[str, Floats], name: str, value: Any, depth: int) -> None:
+    """Add to `found` the vectors in a variable, field by field."""
+    if not isinstance(value, np.ndarray) or depth > DEEPEST or len(found) >= MOST_FIELDS:
+        return
+    if value.dtype.names is not None:
+        for place, element in enumerate(value.flat):
+            own = name if value.size == 1 else f"{name}({place + 1})"
+            for field in value.dtype.names:
+                _collect(found, f"{own}.{field}", element[field], depth + 1)
+    elif value.dtype.kind in "biuf" and value.ndim == 2 and 1 in value.shape and value.size > 1:
+        found[name] = value.reshape(-1).astype(np.float64)
+
+
+def _matrix(
+    path: Path, variables: dict[str, Any], matrix: str, names: list[str] | str
+) -> dict[str, Floats]:
+    table = variables.get(matrix)
+    if not isinstance(table, np.ndarray) or table.ndim != 2 or table.dtype.kind not in "biuf":
+        raise InputError(path, matrix, "is no matrix of numbers; log.matrix names one")
+    words = names if isinstance(names, list) else _words(variables.get(names))
+    if not words:
+        problem = "holds no names; log.names is a list of them or the variable that holds them"
+        raise InputError(path, str(names), problem)
+    if len(words) != table.shape[1]:
+        problem = f"has {table.shape[1]} columns, and {len(words)} names"
+        raise InputError(path, matrix, problem)
+    if len(set(words)) < len(words):
+        raise InputError(path, matrix, "two of its columns have one name")
+    return {word: table[:, i].astype(np.float64) for i, word in enumerate(words)}
+
+
+def _words(value: Any) -> list[str]:
+    """Return the words of a char matrix or of a cell of them."""
+    if not isinstance(value, np.ndarray):
+        return []
+    if value.dtype.kind == "U":
+        return [str(word).strip() for word in value.flat]
+    if value.dtype.kind == "O":
+        return [word for cell in value.flat for word in _words(cell)[:1]]
+    return []
