@@ -8,26 +8,63 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from coupled.channels import ControlName
-from coupled.gap.effects import EFFECTS, Effect, apply
+from coupled.gap.effects import EFFECTS, SETTINGS, TOLERANCE, Effect, apply
 from coupled.gap.fit import Fit, fit, shows_in, touched
-from coupled.gap.output import Output, memory, stage_gaps
+from coupled.gap.output import Output, Part, memory, stage_gaps
 from coupled.rig.parameters import Rig
 
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
 SCREENED = 6
+SETTLE = 1.05  # gap from which a stage's settings are worth fitting
 LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
-# A pot is set, and a servo tuned, to a few per cent: less than this is no effect.
-TOLERANCE = {"inertia": 0.03, "viscous_damping": 0.03, "servo_lag": 0.03}
+MISMATCH = 0.05  # share of a gap that the physics of a right effect may leave
+SPARE = 4.0  # an effect that others have made needless: it would be missed by less
 MOST = 4  # effects in one answer
 Tell = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the search works on: a nominal rig, and the outputs of its records."""
+
+    nominal: Rig
+    control: ControlName
+    outputs: Sequence[Output]
+    tell: Tell | None
+
+    @property
+    def settings(self) -> tuple[Effect, ...]:
+        """The nominal rig's settings that the outputs tell of: nuisances of every fit."""
+        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE}
+        return tuple(s for s in SETTINGS.values() if s.stage in stages)
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """The settings as the rig file has them."""
+        return {f"{setting.name}.factor": 1.0 for setting in SETTINGS.values()}
+
+    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the settings whose number none of these effects frees."""
+        freed = {SETTINGS[effect.name].name for effect in effects if effect.name in SETTINGS}
+        return [setting for setting in self.settings if setting.name not in freed]
+
+    def fit(
+        self,
+        effects: Sequence[Effect],
+        part: Part = "all",
+        start: Mapping[str, float] | None = None,
+    ) -> Fit:
+        """Return the effects fitted, with the settings free within their tolerance."""
+        free = self.nuisances(effects)
+        return fit(self.nominal, self.control, self.outputs, effects, free, part, start)
 
 
 @dataclass(frozen=True)
@@ -51,10 +88,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Choice:
-    """What the search found: its steps, the final fit on all of the record, and what is left."""
+    """What the search found: its steps, and the final fit on all of the record.
+
+    `settled` has the nominal rig's settings moved within their tolerance, and no effect.
+    """
 
     steps: tuple[Step, ...]
     fit: Fit
+    settled: Fit
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
 
 
@@ -66,19 +107,59 @@ def search(
     tell: Tell | None = None,
 ) -> Choice:
     """Return the effects that explain a record's gap, each earning its place in turn."""
-    current = fit(nominal, control, outputs, ())
+    case = Case(nominal, control, outputs, tell)
+    settled = current = case.fit(())
     steps: list[Step] = []
     tried: dict[str, float] = {}
     while len(steps) < MOST:
-        ranked = _round(nominal, control, outputs, current, library, tell)
+        ranked = _round(case, settled, current, library)
         tried = tried or {candidate.effect.name: candidate.gain for candidate in ranked}
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(ranked)
         steps.append(_step(best, ranked))
-        chosen = (*current.effects, best.effect)
-        current = fit(nominal, control, outputs, chosen, start=best.fit.values)
-    return Choice(tuple(steps), current, tried)
+        current = case.fit((*current.effects, best.effect), start=best.fit.values)
+        needless = _needless(case, current)
+        if needless is not None:
+            steps = [step for step in steps if step.effect is not needless]
+            rest = tuple(effect for effect in current.effects if effect is not needless)
+            current = case.fit(rest, start=current.values)
+            if needless is best.effect:
+                break
+    steps = [_again(case, current, step) if len(steps) > 1 else step for step in steps]
+    return Choice(tuple(steps), current, settled, tried)
+
+
+def _again(case: Case, current: Fit, step: Step) -> Step:
+    """Return a step whose rivals are tried again, now that the other effects are known."""
+    if not step.rivals:
+        return step
+    rest = tuple(effect for effect in current.effects if effect is not step.effect)
+    without = case.fit(rest, "fitted", current.values)
+    tries = [step.effect, *(rival.effect for rival in step.rivals)]
+    found = [
+        (effect, case.fit((*rest, effect), "fitted", current.values))
+        for effect in tries
+        if effect not in rest
+    ]
+    ranked = _ranked(case.outputs, without, found)
+    own = next(candidate for candidate in ranked if candidate.effect is step.effect)
+    return _step(own, ranked)
+
+
+def _needless(case: Case, current: Fit) -> Effect | None:
+    """Return the effect found earlier that those found since have made needless, if any."""
+    if len(current.effects) < 2:
+        return None
+    whole = case.fit(current.effects, "fitted", current.values)
+    spare: tuple[float, Effect] | None = None
+    for effect in current.effects[:-1]:
+        rest = tuple(other for other in current.effects if other is not effect)
+        without = case.fit(rest, "fitted", current.values)
+        missed = _ranked(case.outputs, without, [(effect, whole)])[0].gain
+        if missed < SPARE and (spare is None or missed < spare[0]):
+            spare = (missed, effect)
+    return None if spare is None else spare[1]
 
 
 def _step(best: Candidate, ranked: Sequence[Candidate]) -> Step:
@@ -103,32 +184,31 @@ def _simplest(ranked: Sequence[Candidate]) -> Candidate:
     return best
 
 
-def _round(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    current: Fit,
-    library: Sequence[Effect],
-    tell: Tell | None,
-) -> list[Candidate]:
+def bar(before: float) -> float:
+    """Return the gap up to which a stage is explained, by its gap without any effect."""
+    return max(CLEAR, 1.0 + MISMATCH * (before - 1.0))
+
+
+def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
     """Return the candidates by their held-out gain over the current effects, best first."""
-    guilty = {stage for stage, gap in stage_gaps(outputs, current.rig).items() if gap > CLEAR}
+    first = stage_gaps(case.outputs, settled.rig)
+    now = stage_gaps(case.outputs, current.rig)
+    guilty = {stage for stage, gap in now.items() if gap > bar(first[stage])}
     candidates = [
         effect
         for effect in library
         if effect not in current.effects and guilty & set(shows_in(effect))
     ]
     found = []
-    screened = _screened(nominal, control, outputs, current, candidates)
+    screened = _screened(case, current, candidates)
     for i, effect in enumerate(screened):
-        if tell is not None:
-            tell(f"fitting {effect.name}", i, len(screened))
-        chosen = (*current.effects, effect)
-        fitted = fit(nominal, control, outputs, chosen, "fitted", current.values)
+        if case.tell is not None:
+            case.tell(f"fitting {effect.name}", i, len(screened))
+        fitted = case.fit((*current.effects, effect), "fitted", current.values)
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
-    return _ranked(outputs, current, found)
+    return _ranked(case.outputs, current, found)
 
 
 def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
@@ -160,15 +240,10 @@ def _ranked(
     return sorted(ranked, key=lambda candidate: -candidate.gain)
 
 
-def _screened(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    current: Fit,
-    candidates: Sequence[Effect],
-) -> list[Effect]:
+def _screened(case: Case, current: Fit, candidates: Sequence[Effect]) -> list[Effect]:
     """Return the candidates whose signature takes most of the residual, by projection."""
     scores = []
+    outputs = case.outputs
     for effect in candidates:
         ours = touched(outputs, [effect])
         now = np.concatenate([o.residual(current.rig) for o in ours])
@@ -177,7 +252,9 @@ def _screened(
             values = dict(current.values)
             for p in effect.free:
                 values[f"{effect.name}.{p.name}"] = p.starts[min(i, len(p.starts) - 1)]
-            rig = apply(nominal, control, (*current.effects, effect), values)
+            chosen = (*current.effects, effect)
+            every = (*chosen, *case.nuisances(chosen))
+            rig = apply(case.nominal, case.control, every, {**case.neutral, **values})
             sign = now - np.concatenate([o.residual(rig) for o in ours])
             size = float(sign @ sign)
             best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)

@@ -16,15 +16,13 @@ from coupled.channels import ControlName
 from coupled.errors import InputError
 from coupled.gap.airframe import NEEDS, airframe_outputs, can_tell_air, surface_points
 from coupled.gap.checks import check_record
-from coupled.gap.choose import CLEAR, Choice, Tell, search
+from coupled.gap.choose import CLEAR, Choice, Tell, bar, search
 from coupled.gap.effects import EFFECTS, STAGES, parameter_name
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
 from coupled.record import Record
 from coupled.rig.parameters import Rig
-
-CLOSED = 0.95  # share of the excess residual that an explanation must take
 
 
 @dataclass(frozen=True)
@@ -66,9 +64,9 @@ def diagnose(
     improved = [replace(reader, rig=choice.fit.rig) for reader in readers] if choice.steps else []
     after = stage_gaps(outputs, choice.fit.rig)
     if improved:
-        floors = _outputs(improved)
-        after |= stage_gaps(floors, choice.fit.rig)
-    stages = _stages(readers, stage_gaps(outputs, rig), after, choice)
+        floors = stage_gaps(_outputs(improved), choice.fit.rig)
+        after = {stage: min(gap, floors.get(stage, gap)) for stage, gap in after.items()}
+    stages = _stages(readers, outputs, after, choice)
     found = {
         "verdict": _verdict(choice, stages),
         "stages": stages,
@@ -102,19 +100,21 @@ def _lacking(readers: Sequence[Reader]) -> dict[str, list[str]]:
 
 def _stages(
     readers: Sequence[Reader],
-    first: Mapping[str, float],
+    outputs: Sequence[Output],
     last: Mapping[str, float],
     choice: Choice,
 ) -> dict[str, Any]:
     lacking = _lacking(readers)
-    before, after = _joined(first), _joined(last)
+    before = _joined(stage_gaps(outputs, readers[0].rig))
+    settled = _joined(stage_gaps(outputs, choice.settled.rig))
+    after = _joined(last)
     blamed = {step.effect.stage for step in choice.steps}
     found: dict[str, Any] = {}
     for stage in STAGES:
         if stage in before and stage not in lacking:
-            left = not closed(before[stage], after[stage])
-            guilty = stage in blamed or (before[stage] > CLEAR and left)
-            found[stage] = {"gap": before[stage], "left": after[stage], "guilty": guilty}
+            guilty = stage in blamed or after[stage] > bar(settled[stage])
+            found[stage] = {"gap": before[stage], "settled": settled[stage]}
+            found[stage] |= {"left": after[stage], "guilty": guilty}
         elif stage in lacking:
             found[stage] = {"judged": False, "missing": lacking[stage]}
         elif stage == "schedule":  # a gradient that never changes tells nothing of it
@@ -141,18 +141,13 @@ def _joined(gaps: Mapping[str, float]) -> dict[str, float]:
     return joined
 
 
-def closed(before: float, after: float) -> bool:
-    """Tell whether an explanation takes the gap: to its floor, or all but a twentieth of it."""
-    return after <= CLEAR or (before > 1.0 and (before - after) / (before - 1.0) >= CLOSED)
-
-
 def _verdict(choice: Choice, stages: dict[str, Any]) -> str:
     blamed = {step.effect.stage for step in choice.steps}
     left = [
         stage
         for stage, found in stages.items()
         if found.get("guilty")
-        and (stage not in blamed or not closed(found["gap"], found.get("left", 1.0)))
+        and (stage not in blamed or found["left"] > bar(found["settled"]))
         and stage != "sensing"
     ]
     if left:

@@ -88,6 +88,7 @@ EFFECTS: tuple[Effect, ...] = (
         (
             _added("friction_N", "loader", "friction", 0, 60, 1.0),
             _value("breakaway_N", "loader", "breakaway", 0, 120, 3.0),
+            _value("stribeck_{d}_per_s", "loader", "stribeck_rate", 2e-4, 0.05, 2e-3),
         ),
     ),
     _one("loader", "viscous_damping", _factor("loader", "damping", 1.2)),
@@ -132,6 +133,22 @@ EFFECTS: tuple[Effect, ...] = (
     _one("airframe", "vertical_gust", _value("rms_m_per_s", "flight", "gust_rms", 0, 30, 0.5)),
     _one("surface", "rigging_offset", _added("offset_norm", "rigging", "offset", -0.5, 0.5, 0.01)),
 )
+# A pot is set, and a servo tuned, to a few per cent: no effect, but a nuisance that fits profile
+# out. {the effect that frees the same number: the setting}
+TOLERANCE = {"inertia": 0.02, "viscous_damping": 0.02, "servo_lag": 0.03}
+
+
+def _setting(effect: str, name: str, field: str) -> Effect:
+    stage = "linkage" if field == "servo_frequency" else "loader"
+    low, high = 1.0 - TOLERANCE[effect], 1.0 + TOLERANCE[effect]
+    return _one(stage, name, _factor("loader", field, 1.0, low, high))
+
+
+SETTINGS: dict[str, Effect] = {
+    "inertia": _setting("inertia", "mass_setting", "mass"),
+    "viscous_damping": _setting("viscous_damping", "damping_setting", "damping"),
+    "servo_lag": _setting("servo_lag", "servo_setting", "servo_frequency"),
+}
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 STAGES = ("schedule", "loader", "sensing", "linkage", "compensation", "surface", "airframe")
 

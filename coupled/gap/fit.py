@@ -7,7 +7,7 @@ of them stand at a bound, and the residuals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,8 @@ from coupled.gap.output import Output, Part, memory
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]
+CHANGE = 0.3  # floors by which a difference should move the residual
+TRIES = 40  # iterations of a fit
 # The outputs in which an effect of a stage shows.
 TOUCHES = {
     "schedule": ("schedule",),
@@ -61,21 +63,23 @@ def fit(
     control: ControlName,
     outputs: Sequence[Output],
     effects: Sequence[Effect],
+    nuisances: Sequence[Effect] = (),
     part: Part = "all",
     start: Mapping[str, float] | None = None,
 ) -> Fit:
     """Return the effects fitted to a part of the outputs that they touch.
 
     Starts from each parameter's own starts, or from `start` where it has a value, and keeps
-    the best.
+    the best. `nuisances` are settings, free within their tolerance: fitted, but nothing found.
     """
-    ours = touched(outputs, effects)
-    keys, frees = _free(effects)
+    every = [*effects, *nuisances]
+    ours = touched(outputs, every)
+    keys, frees = _free(every)
     start = start or {}
 
     def rig_of(x: Floats) -> Rig:
         values = dict(zip(keys, np.asarray(x, dtype=float).tolist(), strict=True))
-        return apply(nominal, control, effects, values)
+        return apply(nominal, control, every, values)
 
     def residual(scaled: Floats) -> Floats:
         rig = rig_of(scaled * scale)
@@ -89,8 +93,9 @@ def fit(
     best = None
     for first in _starts(keys, frees, start):
         x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
+        slopes = _Slopes(residual, low, high)
         found = least_squares(
-            residual, x0, bounds=(low, high), diff_step=1e-3, xtol=1e-5, ftol=1e-7, max_nfev=25
+            residual, x0, slopes, bounds=(low, high), xtol=1e-5, ftol=1e-6, max_nfev=TRIES
         )
         if best is None or found.cost < best.cost:
             best = found
@@ -106,6 +111,33 @@ def fit(
         tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
         rig_of(values),
     )
+
+
+class _Slopes:
+    """Derivatives by differences, over steps that change the residual by about a third of a floor.
+
+    Friction, breakout and play move the residual in small jumps: a difference over less than
+    those tells nothing of where the fit should go, nor of how well it knows.
+    """
+
+    def __init__(self, residual: Callable[[Floats], Floats], low: Floats, high: Floats) -> None:
+        self._residual, self._low, self._high = residual, low, high
+        self._step = np.full(len(low), 0.01)
+
+    def __call__(self, x: Floats) -> Floats:
+        here = self._residual(x)
+        columns = []
+        for i, value in enumerate(x):
+            room = max(self._high[i] - value, value - self._low[i])
+            step = min(self._step[i], 0.5 * room)
+            there = x.copy()
+            there[i] = value + (step if self._high[i] - value > step else -step)
+            change = self._residual(there) - here
+            columns.append(change / (there[i] - value))
+            size = float(np.sqrt(np.mean(change**2)))
+            growth = np.clip(CHANGE / max(size, 1e-9), 0.1, 10.0)
+            self._step[i] = float(np.clip(step * growth, 1e-4, 0.1))
+        return np.column_stack(columns)
 
 
 def _half_width(found: Any, outputs: int) -> Floats:

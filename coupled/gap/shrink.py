@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from coupled.channels import ControlName
-from coupled.gap.choose import Choice
-from coupled.gap.fit import fit, touched
+from coupled.gap.choose import Case, Choice
+from coupled.gap.fit import touched
 from coupled.gap.output import Output
 from coupled.rig.parameters import Rig
 
@@ -22,7 +22,7 @@ def shrink(
 ) -> dict[str, Any]:
     """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
     effects = choice.fit.effects
-    found = fit(rig, control, outputs, effects, "fitted", choice.fit.values).rig
+    found = Case(rig, control, outputs, None).fit(effects, "fitted", choice.fit.values).rig
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
     result = _of(widest, rig, found, bool(effects))

@@ -39,6 +39,7 @@ from coupled.rig.replay import (
 Floats = NDArray[np.float64]
 ROUGH = 0.25
 SHARED = 0.5  # of q̄'s noise in G_T, from which the host is taken to have made it of q̄ as recorded
+NEUTRAL = 8.0  # of a channel's noise: so near to neutral its side is not sure
 ROUNDING = 1e-6  # of a channel's span
 SLOW_s = 5.0  # a loader whose own period is longer drifts, and is replayed in short windows
 WINDOW_s = 0.25
@@ -87,6 +88,15 @@ class Reader:
             return self.signal("gradient")
         pressure = self.record["dynamic_pressure_Pa"]
         return replay_schedule(self.rig, self.control, smoothed(pressure))
+
+    def second(self) -> Floats | None:
+        """Return G_T beyond the break, which no record holds: what the schedule makes of q̄."""
+        pressure = "dynamic_pressure_Pa"
+        two = self.rig.controls[self.control].schedule.second_gradient is not None
+        if not two or pressure not in self.record:
+            return None
+        calm = smoothed(self.record[pressure])
+        return replay_schedule(self.rig, self.control, calm, beyond=True)
 
     def outputs(self) -> list[Output]:
         """Return every output that the record lets judge, in the order of the chain."""
@@ -156,7 +166,7 @@ class Reader:
     def _loader(self) -> list[Output]:
         noisy_force, gradient = self.signal("force"), self.gradient()
         force, level = smoothed(noisy_force), white(noisy_force)
-        computed = self.signal("computed")
+        computed, second = self.signal("computed"), self.second()
         flown = "load_factor" in self.record
         load = smoothed(self.record["load_factor"]) if flown else None
         calm, own = smoothed(computed), white(computed)
@@ -167,7 +177,7 @@ class Reader:
             rate = rate_of(seen, rig.frame_rate) if every else seen
             restart = (every, seen / scale, rate / scale)
             replayed = replay_loader(
-                rig, self.control, f, gradient, computed, load, restart=restart
+                rig, self.control, f, gradient, computed, load, second, restart
             )
             return scale * replayed[0]
 
@@ -190,17 +200,28 @@ class Reader:
         does not know of it; a wrong scale is in the one and not in the other.
         """
         computed, product = self.signal("computed"), self.signal("modifying_force")
-        gradient, calm = self.gradient(), smoothed(computed)
+        gradient, second, calm = self.gradient(), self.second(), smoothed(computed)
+        level = white(computed)
 
-        def predict(rig: Rig) -> Floats:
+        def made(rig: Rig, read: Floats) -> Floats:
+            return replay_product(rig, self.control, read, gradient, second)
+
+        # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
+        jump = made(self.rig, 0.0 * calm + level) - made(self.rig, 0.0 * calm - level)
+        near = np.abs(calm) < NEUTRAL * level
+        unsure = near & (np.abs(jump) > NEUTRAL * white(product))
+
+        def predict(rig: Rig, seen: Floats = calm) -> Floats:
             data = rig.controls[self.control]
-            read = computed if data.loader.multiplier == "digital" else calm
-            if data.loader.multiplier == "hybrid":
-                read = read / data.sensing.deflection_scale
-            return replay_product(rig, self.control, read, gradient)
+            digital = data.loader.multiplier == "digital"
+            read = computed if digital else seen / data.sensing.deflection_scale
+            return np.where(unsure, product, made(rig, read))
 
-        own = white(product)
-        return [self._output("multiplier", self._name("modifying_force"), product, predict, own)]
+        def noisy(rig: Rig, k: int) -> Floats:
+            return predict(rig, self._calmed(calm, k, level))
+
+        name = self._name("modifying_force")
+        return [self._made("multiplier", name, product, predict, noisy, white(product))]
 
     def _linkage(self) -> list[Output]:
         computed, force = self.signal("computed"), self.signal("force")

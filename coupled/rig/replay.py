@@ -29,10 +29,14 @@ Floats = NDArray[np.float64]
 Restart = tuple[int, Floats, Floats]
 
 
-def replay_schedule(rig: Rig, control: str, pressure_Pa: Floats) -> Floats:
-    """Return G_T in N/d for the dynamic pressure that the host had at each frame."""
+def replay_schedule(rig: Rig, control: str, pressure_Pa: Floats, beyond: bool = False) -> Floats:
+    """Return G_T in N/d for the dynamic pressure that the host had at each frame.
+
+    `beyond` asks for that beyond the break, on a rig of two segments.
+    """
     p, s = _one(rig, control)
-    return _schedule(p, s, pressure_Pa, np.empty_like(pressure_Pa))
+    both = _schedule(p, s, pressure_Pa, np.empty((2, len(pressure_Pa))))
+    return np.asarray(both[int(beyond)])
 
 
 def replay_loader(
@@ -81,10 +85,13 @@ def drive_loader(
     return out[0], out[1]
 
 
-def replay_product(rig: Rig, control: str, computed: Floats, gradient: Floats) -> Floats:
-    """Return F_mod in N for δc in d at each frame and G_T in N/d, on a rig of one segment."""
+def replay_product(
+    rig: Rig, control: str, computed: Floats, gradient: Floats, second: Floats | None = None
+) -> Floats:
+    """Return F_mod in N for δc in d at each frame and G_T in N/d."""
     p, s = _one(rig, control)
-    return _product(p, s, computed, gradient, np.empty_like(computed))
+    both = np.stack((gradient, gradient if second is None else second))
+    return _product(p, s, computed, both, np.empty_like(computed))
 
 
 def replay_linkage(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
@@ -124,9 +131,9 @@ def _on_nodes(rig: Rig, samples: Floats) -> tuple[Floats, float]:
 
 @entry
 def _schedule(p: Any, s: Any, pressure: Floats, out: Floats) -> Floats:
-    for k in range(len(out)):
+    for k in range(len(pressure)):
         read = read_pressure(p[0].schedule, s[0].schedule, pressure[k])
-        out[k] = gradients(p[0].schedule, read)[0]
+        out[0, k], out[1, k] = gradients(p[0].schedule, read)
     return out
 
 
@@ -168,7 +175,7 @@ def _loader(
 def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) -> Floats:
     m = s[0].modification
     for k in range(len(out)):
-        set_gradients(p[0].modification, m, gradient[k], gradient[k])
+        set_gradients(p[0].modification, m, gradient[0, k], gradient[1, k])
         out[k] = modifying_force(m, computed[k])
     return out
 
