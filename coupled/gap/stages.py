@@ -28,9 +28,10 @@ from coupled.gap.smooth import rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
+    drive_linkage,
+    drive_loader,
+    on_nodes,
     replay_compensation,
-    replay_linkage,
-    replay_loader,
     replay_product,
     replay_schedule,
     replay_surface,
@@ -172,19 +173,24 @@ class Reader:
         calm, own = smoothed(computed), white(computed)
         every = round(WINDOW_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
-        def predict(rig: Rig, f: Floats = force, seen: Floats = calm) -> Floats:
-            scale = rig.controls[self.control].sensing.deflection_scale
-            rate = rate_of(seen, rig.frame_rate) if every else seen
-            restart = (every, seen / scale, rate / scale)
-            replayed = replay_loader(
-                rig, self.control, f, gradient, computed, load, second, restart
-            )
-            return scale * replayed[0]
+        def driven(f: Floats, seen: Floats) -> Predict:
+            """Return the prediction for a force and the δc at which windows start."""
+            nodes = on_nodes(self.rig, f)
+            rate = rate_of(seen, self.rig.frame_rate) if every else seen
+
+            def predict(rig: Rig) -> Floats:
+                scale = rig.controls[self.control].sensing.deflection_scale
+                restart = (every, seen / scale, rate / scale)
+                told = (nodes, gradient, computed, load, second, restart)
+                return scale * drive_loader(rig, self.control, *told)[0]
+
+            return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = self._calmed(calm, k + TRIES, own)
-            return predict(rig, self._calmed(force, k, level), seen)
+            return driven(self._calmed(force, k, level), seen)(rig)
 
+        predict = driven(force, calm)
         return [self._made("loader", self._name("computed"), computed, predict, noisy, own)]
 
     def _drifts(self, gradient: Floats) -> bool:
@@ -232,15 +238,20 @@ class Reader:
             smoothed(force),
         )
 
-        def predict(rig: Rig, c: Floats = calm, f: Floats = calm_force) -> Floats:
-            scale = rig.controls[self.control].sensing.deflection_scale
-            return replay_linkage(rig, self.control, c / scale, f)
+        def driven(c: Floats, f: Floats) -> Predict:
+            nodes = on_nodes(self.rig, c)
+
+            def predict(rig: Rig) -> Floats:
+                scale = rig.controls[self.control].sensing.deflection_scale
+                return drive_linkage(rig, self.control, nodes / scale, f)
+
+            return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
             c = self._calmed(calm, k, levels[0])
-            return predict(rig, c, self._calmed(calm_force, k + TRIES, levels[1]))
+            return driven(c, self._calmed(calm_force, k + TRIES, levels[1]))(rig)
 
-        name = self._name("deflection")
+        name, predict = self._name("deflection"), driven(calm, calm_force)
         return [self._made("linkage", name, measured, predict, noisy, white(measured))]
 
     def _surface(self) -> list[Output]:

@@ -11,14 +11,16 @@ stable at any frequency and second-order in δc.
 
 from __future__ import annotations
 
+import cmath
 import math
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from coupled.rig.compiled import TINY, layout, stage
+
+SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
 
 
 class LinkageParameters(Protocol):
@@ -49,15 +51,22 @@ def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDA
     """Return the servo's exact one-substep map, shape (2, 4).
 
     Rows give (x, x') after h seconds from (x, x', δc before, δc after), δc running
-    straight between. From the exponential of the servo augmented by its input's ramp.
+    straight between. Behind a ramp u₀ + s·t the servo settles at x = u₀ + s·t − 2ζs/ω, x' = s,
+    and what it starts away from that fades as the free servo does.
     """
     w, z = omega_rad_per_s, damping_ratio
-    a = np.zeros((4, 4))
-    a[0, 1] = 1.0
-    a[1] = (-w * w, -2.0 * z * w, w * w, 0.0)
-    a[2, 3] = 1.0 / h
-    e = expm(a * h)[:2]
-    return np.column_stack((e[:, 0], e[:, 1], e[:, 2] - e[:, 3], e[:, 3]))
+    turn = cmath.sqrt(complex(1.0 - z * z)) * w  # imaginary where the servo is overdamped
+    ahead, behind = (cmath.exp((-z * w + side * turn) * h) for side in (1j, -1j))
+    wave = 0.5 * (ahead + behind).real
+    swing = math.exp(-z * w * h) * h  # the limit at critical damping
+    if abs(turn) * h > SMALL:
+        swing = ((ahead - behind) / (2j * turn)).real
+    free = np.array([[wave + z * w * swing, swing], [-w * w * swing, wave - z * w * swing]])
+    lag = 2.0 * z / w
+    # Columns: what u₀ and what s do to (x, x').
+    level = np.array([1.0, 0.0]) - free[:, 0]
+    ramp = np.array([h - lag, 1.0]) - free @ np.array([-lag, 1.0])
+    return np.column_stack((free, level - ramp / h, ramp / h))
 
 
 @stage

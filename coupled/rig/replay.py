@@ -56,7 +56,7 @@ def replay_loader(
     product. The loader starts at rest at neutral; with `restart`, it is put back to a measured
     state now and then.
     """
-    nodes, _ = _on_nodes(rig, force_N)
+    nodes = on_nodes(rig, force_N)
     return drive_loader(rig, control, nodes, gradient, computed, load_factor, second, restart)
 
 
@@ -96,9 +96,14 @@ def replay_product(
 
 def replay_linkage(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
     """Return what the transducer at the grip reads, d, for δc in d and F in N."""
+    return drive_linkage(rig, control, on_nodes(rig, computed), force_N)
+
+
+def drive_linkage(rig: Rig, control: str, nodes: Floats, force_N: Floats) -> Floats:
+    """Do as `replay_linkage`, with δc given on the loader's nodes."""
     p, s = _one(rig, control)
-    nodes, h = _on_nodes(rig, computed)
-    s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = computed[0]
+    h = 1.0 / (rig.frame_rate * rig.substeps)
+    s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = nodes[0]
     return _linkage(p, s, nodes, force_N, rig.substeps, h, np.empty_like(force_N))
 
 
@@ -121,12 +126,11 @@ def _one(rig: Rig, control: str) -> tuple[Any, Any]:
     return packed["parameters"].copy(), packed["state"].copy()
 
 
-def _on_nodes(rig: Rig, samples: Floats) -> tuple[Floats, float]:
-    """Return a signal on the loader's nodes, and the substep in s."""
-    substeps = rig.substeps
+def on_nodes(rig: Rig, samples: Floats) -> Floats:
+    """Return a signal on the loader's nodes: `rig.substeps` a frame, and the last."""
     frames = np.arange(len(samples))
-    nodes = np.arange((len(samples) - 1) * substeps + 1) / substeps
-    return CubicSpline(frames, samples)(nodes), 1.0 / (rig.frame_rate * substeps)
+    nodes = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
+    return np.asarray(CubicSpline(frames, samples)(nodes))
 
 
 @entry
