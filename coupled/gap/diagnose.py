@@ -21,6 +21,7 @@ from coupled.gap.effects import EFFECTS, STAGES, parameter_name
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
+from coupled.gap.where import where
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 
@@ -67,6 +68,7 @@ def diagnose(
         floors = stage_gaps(_outputs(improved), choice.fit.rig)
         after = {stage: min(gap, floors.get(stage, gap)) for stage, gap in after.items()}
     stages = _stages(readers, outputs, after, choice)
+    _tell_where(stages, readers, outputs, choice)
     found = {
         "verdict": _verdict(choice, stages),
         "stages": stages,
@@ -130,6 +132,19 @@ def _stages(
         missing = [name for name in NEEDS if name not in readers[0].record]
         found["airframe"] = {"judged": False, "missing": missing}
     return found
+
+
+def _tell_where(
+    stages: dict[str, Any], readers: Sequence[Reader], outputs: Sequence[Output], choice: Choice
+) -> None:
+    """Add to each guilty stage where in it the gap lies, by the output where it is widest."""
+    shown = {"sensing": ("loader", "linkage", "multiplier"), "loader": ("loader", "multiplier")}
+    for stage, found in stages.items():
+        ours = [o for o in outputs if o.stage in shown.get(stage, (stage,))]
+        if found.get("guilty") and ours:
+            widest = max(ours, key=lambda o: o.gap(choice.settled.rig))
+            reader = readers[widest.record]
+            found["where"] = where(widest, choice.settled.rig, reader.record, reader.control)
 
 
 def _joined(gaps: Mapping[str, float]) -> dict[str, float]:
