@@ -153,6 +153,21 @@ def _error_of_air(rig: Rig, record: Record, air: Floats, rng: np.random.Generato
     return smoothed(air + hiss) - air + ROUGH * hiss
 
 
+def spread_of_air(record: Record, frame_s: float) -> float:
+    """Return the relative standard error of the gusts' rms, from how few of them a record meets.
+
+    The variance of a Gaussian process is told by N/(Σρ²) independent samples (Bartlett).
+    """
+    air = vertical_air(record, frame_s)
+    if air is None:
+        return 0.0
+    x = air - air.mean()
+    power = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+    correlation = np.fft.irfft(power)[: len(x) // 4] / float(x @ x)
+    independent = len(x) / (1.0 + 2.0 * float(np.sum(correlation[1:] ** 2)))
+    return float(np.sqrt(0.5 / max(independent, 1.0)))
+
+
 def can_tell_air(records: Sequence[Record]) -> bool:
     """Tell whether the records have what the kinematics of the air need."""
     return all(name in record for record in records for name in AIR_NEEDS)

@@ -12,9 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from coupled.channels import ControlName
 from coupled.errors import InputError
-from coupled.gap.airframe import NEEDS, airframe_outputs, can_tell_air, surface_points
+from coupled.gap.airframe import (
+    NEEDS,
+    airframe_outputs,
+    can_tell_air,
+    spread_of_air,
+    surface_points,
+)
 from coupled.gap.checks import check_record
 from coupled.gap.choose import CLEAR, Choice, Tell, bar, search
 from coupled.gap.effects import EFFECTS, STAGES, parameter_name
@@ -72,7 +80,7 @@ def diagnose(
     found = {
         "verdict": _verdict(choice, stages),
         "stages": stages,
-        "effects": _effects(choice, control),
+        "effects": _effects(choice, control, _spread_of_air(readers, choice)),
         "rivals": [
             [s.effect.name, *(r.effect.name for r in s.rivals)] for s in choice.steps if s.rivals
         ],
@@ -162,8 +170,8 @@ def _verdict(choice: Choice, stages: dict[str, Any]) -> str:
         stage
         for stage, found in stages.items()
         if found.get("guilty")
-        and (stage not in blamed or found["left"] > bar(found["settled"]))
         and stage != "sensing"
+        and (stage not in blamed or found["left"] > bar(found["settled"]))
     ]
     if left:
         return "unexplained"
@@ -172,15 +180,26 @@ def _verdict(choice: Choice, stages: dict[str, Any]) -> str:
     return "ambiguous" if any(step.rivals for step in choice.steps) else "effect"
 
 
-def _effects(choice: Choice, control: ControlName) -> list[dict[str, Any]]:
+def _spread_of_air(readers: Sequence[Reader], choice: Choice) -> float:
+    """Return the relative standard error of the rms of the gusts, where they were found."""
+    if all(effect.name != "vertical_gust" for effect in choice.fit.effects):
+        return 0.0
+    each = [spread_of_air(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    return float(np.sqrt(np.sum(np.square(each)))) / len(each)
+
+
+def _effects(choice: Choice, control: ControlName, air: float) -> list[dict[str, Any]]:
     found = []
     for step in sorted(choice.steps, key=lambda s: -s.gain):
         effect, values = step.effect, {}
         for p in effect.free:
             key = f"{effect.name}.{p.name}"
-            low, high = choice.fit.low[key], choice.fit.high[key]
+            value, low, high = choice.fit.values[key], choice.fit.low[key], choice.fit.high[key]
+            if effect.name == "vertical_gust":  # a record meets a sample of the gusts
+                low = value - math.hypot(value - low, 1.96 * air * value)
+                high = value + math.hypot(high - value, 1.96 * air * value)
             values[parameter_name(p, control)] = {
-                "value": choice.fit.values[key],
+                "value": value,
                 "low": low if math.isfinite(low) else None,
                 "high": high if math.isfinite(high) else None,
             }

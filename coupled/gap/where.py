@@ -7,6 +7,7 @@ second whose residual stands clear of the floor and is followed by more.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,9 @@ TOLD = 0.05  # least share of the variance that is worth telling
 
 
 def where(output: Output, rig: Rig, record: Record, control: ControlName) -> dict[str, Any]:
-    """Return where an output's residual lies: `follows`, `peak_Hz`, `onset_s`, `loud`, `by_pressure`.
+    """Return what an output's residual `follows`, its `peak_Hz`, `onset_s`, and more.
 
+    `loud` is the share of time that shows it, `by_pressure` its gap in each third of the q̄ met.
     Slopes are in the channel's unit per the signal's.
     """
     left = output.residual(rig)
@@ -64,9 +66,12 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
             found[f"{quantity}_rate_sign"] = _sign(rate)
             found[f"{quantity}_cubed_{unit}3"] = calm**3
             found[f"{quantity}_sign"] = _sign(calm)
-    common = {"airframe": ("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad")}
-    common["loader"], common["schedule"] = ("load_factor",), ("dynamic_pressure_Pa",)
-    common["surface"] = ("dynamic_pressure_Pa",)
+    common: dict[str, tuple[str, ...]] = {
+        "loader": ("load_factor",),
+        "schedule": ("dynamic_pressure_Pa",),
+        "surface": ("dynamic_pressure_Pa",),
+        "airframe": ("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
+    }
     for name in common.get(stage, ()):
         if name in record:
             found[name] = smoothed(record[name])
@@ -87,7 +92,9 @@ def _follows(
     """Return what the residual follows, the largest share first; `constant` is its mean."""
     power = float(np.mean(left**2))
     mean = float(np.mean(left))
-    told = [{"signal": "constant", "share": mean**2 / power, "per_unit": mean * output.floor}]
+    told: list[dict[str, Any]] = [
+        {"signal": "constant", "share": mean**2 / power, "per_unit": mean * output.floor}
+    ]
     spread = left - mean
     for name, signal in signals(output.stage, record, control, output.frame_rate_Hz).items():
         moved = signal - signal.mean()
@@ -97,8 +104,8 @@ def _follows(
         slope = float(spread @ moved) / size
         share = slope**2 * size / (len(left) * power)
         told.append({"signal": name, "share": share, "per_unit": slope * output.floor})
-    told.sort(key=lambda item: -float(item["share"]))
-    return [item for item in told if float(item["share"]) >= TOLD][:4]
+    told.sort(key=lambda item: -item["share"])
+    return [item for item in told if item["share"] >= TOLD][:4]
 
 
 def _in_time(left: Floats, time_s: Floats, rate_Hz: float) -> dict[str, Any]:
@@ -118,9 +125,9 @@ def _by(left: Floats, pressure: Floats) -> list[dict[str, float]]:
     """Return the gap in the lower, middle and upper third of the record's q̄."""
     edges = np.linspace(pressure.min(), pressure.max(), 4)
     found = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges.tolist()):
         rows = (pressure >= low) & (pressure <= high)
         if rows.any():
             gap = float(np.sqrt(np.mean(left[rows] ** 2)))
-            found.append({"from_Pa": float(low), "to_Pa": float(high), "gap": gap})
+            found.append({"from_Pa": low, "to_Pa": high, "gap": gap})
     return found
