@@ -42,7 +42,7 @@ def blown(step: Step, set_air: Callable[[float], None], air_m_per_s: Iterator[fl
     """Return a stepping in which the air over each frame moves up as told."""
 
     def run(commands: tuple[float, float, float], /) -> None:
-        set_air(next(air_m_per_s))
+        set_air(next(air_m_per_s, 0.0))
         step(commands)
 
     return run

@@ -36,14 +36,17 @@ Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
 
 
-def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
+def fly(
+    scenario: Scenario, progress: Progress | None = None, air_m_per_s: Sequence[float] | None = None
+) -> Record:
     """Fly a scenario and return its record, SI, one row a frame.
 
     `progress` is called now and then with frames done and frames in all. The manifest says
     what went in, and under `ended_early` why and when a flight ended before its time.
+    `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame.
     """
     run, rig = scenario.run, scenario.rig
-    airframe = make_airframe(scenario)
+    airframe = make_airframe(scenario, air_m_per_s)
     frames, substeps = scenario.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
     pressure_Pa = airframe.motion()[0]
@@ -105,7 +108,7 @@ def fly(scenario: Scenario, progress: Progress | None = None) -> Record:
     return Record(channels, data, _manifest(scenario, channels, data, ended))
 
 
-def make_airframe(scenario: Scenario) -> Airframe:
+def make_airframe(scenario: Scenario, air_m_per_s: Sequence[float] | None = None) -> Airframe:
     """Return the scenario's aircraft, trimmed and checked, or its bench."""
     rig, run = scenario.rig, scenario.run
     if rig.flight is None:
@@ -117,7 +120,7 @@ def make_airframe(scenario: Scenario) -> Airframe:
     try:
         check_direct_controls(rig.flight, frame_s, controls, **where)
         asked: dict[str, Any] = {"record": run.record_properties, "record_file": scenario.file}
-        asked["seed"] = run.seed
+        asked |= {"seed": run.seed, "air_m_per_s": air_m_per_s}
         return JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
     except InputError as error:
         if error.key not in scenario.changes:
@@ -188,7 +191,9 @@ def _manifest(
         "rows": len(data),
         "ended_early": ended,
         "stop_first_met_s": stops,
-        "inputs_sha256": {path.name: sha256(path) for path in input_files(scenario)},
+        "inputs_sha256": {
+            path.name: sha256(path) for path in input_files(scenario) if path.is_file()
+        },
         "versions": {
             "coupled": version("coupled"),
             "python": platform.python_version(),

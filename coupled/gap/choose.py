@@ -142,7 +142,7 @@ def _again(case: Case, current: Fit, step: Step) -> Step:
         for effect in tries
         if effect not in rest
     ]
-    ranked = _ranked(case.outputs, without, found)
+    ranked = ranked_by_gain(case.outputs, without, found)
     own = next(candidate for candidate in ranked if candidate.effect is step.effect)
     return _step(own, ranked)
 
@@ -156,7 +156,7 @@ def _needless(case: Case, current: Fit) -> Effect | None:
     for effect in current.effects[:-1]:
         rest = tuple(other for other in current.effects if other is not effect)
         without = case.fit(rest, "fitted", current.values)
-        missed = _ranked(case.outputs, without, [(effect, whole)])[0].gain
+        missed = ranked_by_gain(case.outputs, without, [(effect, whole)])[0].gain
         if missed < SPARE and (spare is None or missed < spare[0]):
             spare = (missed, effect)
     return None if spare is None else spare[1]
@@ -208,7 +208,7 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
-    return _ranked(case.outputs, current, found)
+    return ranked_by_gain(case.outputs, current, found)
 
 
 def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
@@ -217,7 +217,7 @@ def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
     return slack is not None and abs(fitted.values[f"{effect.name}.factor"] - 1.0) < slack
 
 
-def _ranked(
+def ranked_by_gain(
     outputs: Sequence[Output], current: Fit, found: Sequence[tuple[Effect, Fit]]
 ) -> list[Candidate]:
     """Return fitted candidates by the held-out log-likelihood that they gain, best first.

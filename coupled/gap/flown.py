@@ -1,0 +1,110 @@
+"""Flying a rig with the pilot of a record, and making the record of a test not flown yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import ControlName, channel
+from coupled.errors import InputError
+from coupled.flight.loop import fly
+from coupled.flight.pilot import Action, Pilot
+from coupled.flight.scenario import Bench, RunFile, Scenario
+from coupled.gap.airframe import vertical_air
+from coupled.gap.smooth import smoothed
+from coupled.record import Record
+from coupled.rig.parameters import Control, Rig
+
+Floats = NDArray[np.float64]
+COMPARED = ("deflection", "computed")  # of the control, and of the motion:
+MOTION = ("elevator_rad", "pitch_rate_rad_per_s", "load_factor", "pitch_rad")
+TOLD_EVERY = 12  # frames between the points at which a bench is told q̄
+
+
+class Recorded(Pilot):
+    """Repeats a force, N, given at times in s."""
+
+    kind: Literal["recorded"] = "recorded"
+    times: list[float]
+    forces: list[float]
+
+    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+        """Return the recorded force, straight between its samples."""
+        times, forces = np.array(self.times), np.array(self.forces)
+        return Action(force=lambda t: np.interp(t, times, forces))
+
+
+def fly_force(
+    rig: Rig,
+    control: ControlName,
+    force_N: Floats,
+    pressure_Pa: Floats | None = None,
+    air_m_per_s: Floats | None = None,
+    seed: int = 0,
+) -> Record:
+    """Return the record of a rig under a force given at each frame, shape (frames,).
+
+    `pressure_Pa` is what a bench is told, at each frame; `air_m_per_s` how fast the air rises.
+    """
+    times = np.arange(len(force_N)) / rig.frame_rate
+    pilot = Recorded(times=times.tolist(), forces=force_N.tolist())
+    bench = None
+    if rig.flight is None:
+        assert pressure_Pa is not None
+        told = slice(None, None, TOLD_EVERY)
+        bench = Bench(time=times[told].tolist(), dynamic_pressure=pressure_Pa[told].tolist())
+    duration = len(force_N) / rig.frame_rate
+    run = RunFile(
+        name="again", card="again", rig="again", duration=duration, seed=seed, bench=bench
+    )
+    nowhere = Path()
+    scenario = Scenario(run, nowhere, rig, nowhere, {control: pilot}, "again")
+    air = None if air_m_per_s is None else air_m_per_s[1:].tolist()
+    return fly(scenario, air_m_per_s=air)
+
+
+def closed_loop(
+    nominal: Rig, improved: Rig, control: ControlName, record: Record
+) -> dict[str, Any] | None:
+    """Return how far the flights of both rigs, with the record's pilot, stay from the record.
+
+    rms differences by channel, in its unit: {channel: {"before", "after"}}. None where the
+    record lacks the force, or a bench's q̄, or where the rig cannot be flown so.
+    """
+    force, pressure = channel(control, "force"), "dynamic_pressure_Pa"
+    if force not in record or (nominal.flight is None and pressure not in record):
+        return None
+    names = [channel(control, quantity) for quantity in COMPARED]
+    names = [name for name in [*names, *MOTION] if name in record]
+    told = smoothed(record[pressure]) if pressure in record else None
+    left: dict[str, dict[str, float]] = {name: {} for name in names}
+    for when, rig in (("before", nominal), ("after", improved)):
+        gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
+        air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
+        quiet = rig.model_copy(update={"noise": {}})
+        try:
+            flown = fly_force(quiet, control, smoothed(record[force]), told, air)
+        except InputError:
+            return None
+        rows = min(len(flown), len(record))
+        for name in names:
+            difference = flown[name][:rows] - record[name][:rows]
+            left[name][when] = float(np.sqrt(np.mean(difference**2)))
+        left_seconds = rows / rig.frame_rate
+        for name in names:
+            left[name][f"{when}_s"] = left_seconds
+    return _worth(left)
+
+
+def _worth(left: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """Return the differences; the time flown only where it is not the same for both."""
+    found: dict[str, Any] = {}
+    for name, item in left.items():
+        found[name] = {"before": item["before"], "after": item["after"]}
+        if item["before_s"] != item["after_s"]:
+            found[name] |= {"before_s": item["before_s"], "after_s": item["after_s"]}
+    return found

@@ -1,0 +1,165 @@
+"""The record that would tell rivals apart, found by computation (T-optimal design).
+
+Each candidate test is flown by the rig with one rival, noise and all, and the record so made is
+fitted by both: the rival refitted, since without the refit any test would seem to separate them.
+What counts is by how much the true one then beats the other on held-out stretches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import ControlName, channel, noisy_channels
+from coupled.errors import InputError
+from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.choose import Case, Choice, ranked_by_gain
+from coupled.gap.effects import Effect
+from coupled.gap.flown import fly_force
+from coupled.gap.output import Output, white
+from coupled.gap.stages import Reader
+from coupled.record import Record
+from coupled.rig.parameters import Rig
+
+Floats = NDArray[np.float64]
+LENGTH_s = 20.0
+SEPARATED = 10.0  # log-likelihood that settles the matter
+RAMP_s = 0.25  # a hand's edge
+
+
+@dataclass(frozen=True)
+class Test:
+    """A test that could be flown: its words, its force at each frame, and its q̄."""
+
+    words: str
+    force_N: Floats
+    pressure_Pa: Floats
+    rig: Rig
+
+
+def next_test(
+    nominal: Rig, record: Record, control: ControlName, choice: Choice
+) -> list[dict[str, Any]]:
+    """Return the tests that would separate the first rivals found, the best first.
+
+    Each has `words`, `rivals`, and `gain`: the log-likelihood by which it should tell them apart.
+    """
+    step = next((step for step in choice.steps if step.rivals), None)
+    if step is None or channel(control, "force") not in record:
+        return []
+    rival = step.rivals[0]
+    others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
+    hiss = {name: white(record[name]) for name in _noisy(record, control)}
+    found = []
+    for test in tests(nominal, record, control):
+        real = rival.fit.rig.model_copy(update={"noise": hiss, "flight": test.rig.flight})
+        if choice.fit.rig.flight is not None and nominal.flight is not None:
+            changed = {
+                name: getattr(rival.fit.rig.flight, name)
+                for name in ("elevator_effectiveness", "pitch_damping", "gust_rms")
+            }
+            assert test.rig.flight is not None
+            real = real.model_copy(update={"flight": test.rig.flight.model_copy(update=changed)})
+        pair = ((*others, rival.effect), (*others, step.effect))
+        gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
+        if gain is not None:
+            rivals = [step.effect.name, rival.effect.name]
+            found.append({"words": test.words, "rivals": rivals, "gain": gain})
+    return sorted(found, key=lambda item: -float(item["gain"]))
+
+
+def _noisy(record: Record, control: ControlName) -> list[str]:
+    return [name for name in noisy_channels([control], flown=True) if name in record]
+
+
+def _gain(
+    test: Test,
+    real: Rig,
+    control: ControlName,
+    pair: tuple[tuple[Effect, ...], tuple[Effect, ...]],
+    start: dict[str, float],
+) -> float | None:
+    """Return by how much the first set would beat the second on a record of the first."""
+    try:
+        record = fly_force(real, control, test.force_N, test.pressure_Pa, seed=5)
+    except InputError:
+        return None
+    if record.manifest["ended_early"]:
+        return None
+    reader = Reader(test.rig, record, control, surface_points)
+    outputs: list[Output] = reader.outputs()
+    if control == "column":
+        outputs += airframe_outputs(test.rig, record)
+    case = Case(test.rig, control, outputs, None)
+    fits = [case.fit(effects, "fitted", start) for effects in pair]
+    settled = case.fit((), "fitted")
+    fitted = [(effects[-1], found) for effects, found in zip(pair, fits, strict=True)]
+    ranked = ranked_by_gain(outputs, settled, fitted)
+    gains = {candidate.effect.name: candidate.gain for candidate in ranked}
+    return gains[pair[0][-1].name] - gains[pair[1][-1].name]
+
+
+def tests(nominal: Rig, record: Record, control: ControlName) -> Iterator[Test]:
+    """Yield tests that the rig can make: pushes of the record's own size, at its q̄ and others."""
+    most = float(np.max(np.abs(record[channel(control, "force")])))
+    rate = nominal.frame_rate
+    time = np.arange(round(LENGTH_s * rate)) / rate
+    settings = _pressures(nominal, record, control, len(time))
+    for words, shape in _shapes(time):
+        for where, pressure, rig in settings:
+            for share in (1.0, 0.3):
+                push = f"{words} of ±{share * most:.0f} N for {LENGTH_s:g} s {where}"
+                yield Test(push, share * most * shape, pressure, rig)
+
+
+def _shapes(time: Floats) -> list[tuple[str, Floats]]:
+    """Return what a hand can do, ±1, at rest at both ends."""
+    quiet = np.clip(np.minimum(time, time[-1] - time) / RAMP_s, 0.0, 1.0)
+    slow = np.abs(((time / 5.0 + 0.75) % 1.0) * 4.0 - 2.0) - 1.0
+    chirp = np.sin(2.0 * np.pi * (0.1 + 0.07 * time) * time)
+    holds = np.repeat([1.0, -0.6, 0.3, -1.0, 0.5, 0.0], -(-len(time) // 6))[: len(time)]
+    width = max(3, round(RAMP_s / (time[1] - time[0])))
+    edge = np.hanning(width + 2)
+    steps = np.convolve(holds, edge / edge.sum(), mode="same")
+    return [
+        ("slow triangles", slow * quiet),
+        ("a sweep from 0.1 to 3 Hz", chirp * quiet),
+        ("steps that are held", steps * quiet),
+    ]
+
+
+def _pressures(
+    nominal: Rig, record: Record, control: ControlName, frames: int
+) -> list[tuple[str, Floats, Rig]]:
+    """Return the q̄ that a test could have: as recorded, and on a bench through the whole table."""
+    name = "dynamic_pressure_Pa"
+    usual = float(np.median(record[name])) if name in record else 0.0
+    level = np.full(frames, usual)
+    here = [(f"at {usual / 1000.0:.2g} kPa", level, nominal)]
+    table = nominal.controls[control].schedule.dynamic_pressure
+    if nominal.flight is None:
+        whole = np.linspace(table[0], table[-1], frames)
+        words = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"
+        return [*here, (words, whole, nominal)]
+    faster = nominal.flight.model_copy(
+        update={"calibrated_airspeed": 1.2 * nominal.flight.calibrated_airspeed}
+    )
+    changed = nominal.model_copy(update={"flight": faster})
+    return [*here, ("at 1.2 times the airspeed", level, changed)]
+
+
+def in_one_line(tests_found: Sequence[dict[str, Any]], lacking: Sequence[str]) -> str:
+    """Return what to record next, in a sentence, or nothing where nothing would help."""
+    if tests_found:
+        best = tests_found[0]
+        one, other = (name.replace("_", " ") for name in best["rivals"])
+        if best["gain"] < SEPARATED:
+            return f"No test tried would tell {one} from {other}: they act alike on this rig."
+        return f"To tell {one} from {other}, record {best['words']}."
+    if lacking:
+        return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
+    return ""
