@@ -1,6 +1,6 @@
 """The aircraft: the only module that knows JSBSim.
 
-The airframe is trimmed level, takes the commands of elevator, aileron and rudder
+The airframe is trimmed on its flight path, takes the commands of elevator, aileron and rudder
 (about trim, ±1 for the whole travel) and gives the motion. It opens no socket,
 writes no file and prints nothing: a model's own inputs and outputs are disabled
 before they start, and JSBSim's log is kept to be quoted where something fails.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.flight.altered import altered
 from coupled.flight.everyframe import motion_reader, stepper
+from coupled.flight.newton import newton_trim
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 
@@ -53,6 +55,8 @@ assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
+_STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # what is no wheel
+_WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 
 
 class _Log(jsbsim.FGLogger):
@@ -95,7 +99,7 @@ def _is_model(folder: Path) -> bool:
 
 
 class JSBSimAirframe:
-    """A JSBSim model, trimmed level at the rig's altitude and calibrated airspeed.
+    """A JSBSim model, trimmed at the rig's altitude, calibrated airspeed and flight path.
 
     Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of
     the rig in its order; `models`, folders of models of our own, searched first; `file`,
@@ -123,7 +127,8 @@ class JSBSimAirframe:
             [self._node(name).get_double_value for name in _LATERAL] if lateral else [],
         )
         self._height = self._node(_HEIGHT).get_double_value
-        self._wheels = self._node(_WHEELS).get_double_value
+        touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
+        self._touching = [self._node(name).get_double_value for name in touching]
         self._extra = [self._node(name, "record_properties").get_double_value for name in record]
         writes = []
         for control in controls:
@@ -202,7 +207,7 @@ class JSBSimAirframe:
         fdm, flight = self._fdm, self._flight
         fdm["ic/h-sl-ft"] = flight.altitude / FOOT_m
         fdm["ic/vc-kts"] = flight.calibrated_airspeed / KNOT_m_per_s
-        fdm["ic/gamma-deg"] = 0.0
+        fdm["ic/gamma-deg"] = math.degrees(flight.flight_path)
         fdm["propulsion/set-running"] = -1
         for engine in range(fdm.get_propulsion().get_num_engines()):
             for lever in ("mixture", "advance"):
@@ -212,16 +217,22 @@ class JSBSimAirframe:
         for name, value in flight.properties.items():
             self._set(name, value)
         _log.text = ""
+        path = f" on flight_path_rad = {flight.flight_path:g}" if flight.flight_path else " level"
         where = (
-            f"{flight.model} does not trim level at altitude_m = {flight.altitude:g},"
+            f"{flight.model} does not trim{path} at altitude_m = {flight.altitude:g},"
             f" calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
         )
+        problem = ""
         try:
             started = fdm.run_ic()
-            if started:
+            if started and flight.trim == "newton":
+                problem = newton_trim(fdm, flight)
+            elif started:
                 fdm["simulation/do_simple_trim"] = 1
         except (RuntimeError, jsbsim.BaseError):
             raise self._fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
+        if problem:
+            raise self._fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
@@ -252,6 +263,11 @@ class JSBSimAirframe:
             positions[i] = self.motion()[ELEVATOR]
         return commands, positions
 
+    def blow(self, along_m_per_s: float, up_m_per_s: float) -> None:
+        """Let the air move: along the heading of the start (north), and upwards."""
+        for name, speed in zip(_WINDS, (along_m_per_s, -up_m_per_s), strict=True):
+            self._fdm[name] = speed / FOOT_m
+
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""
         return tuple([read() for read in self._extra])
@@ -259,6 +275,6 @@ class JSBSimAirframe:
     def trouble(self) -> str:
         """Return why the flight cannot go on, or an empty string."""
         height = self._height()
-        if height > 0.0 and not self._wheels():
+        if height > 0.0 and not any(touches() for touches in self._touching):
             return ""
         return "the state is not finite" if math.isnan(height) else "the aircraft met the ground"
