@@ -228,6 +228,39 @@ print(fdm["fcs/flap-pos-deg"], fdm["fcs/nozzle-pos-deg"])
     assert stops == pytest.approx([75.0, 116.0])
 
 
+def test_the_wheels_may_touch_only_where_the_rig_says_so() -> None:
+    low = APPROACH.model_copy(update={"altitude": 12.0})
+    ends = {}
+    for landing in (False, True):
+        flown = airframe(low.model_copy(update={"landing": landing}), ("gear/wow",))
+        while not flown.extra()[0]:
+            flown.step((0.0, 0.0, 0.0))
+        ends[landing] = flown.trouble()
+    assert ends == {False: "the aircraft met the ground", True: ""}
+
+
+def test_a_tail_that_strikes_is_no_landing() -> None:
+    flown = airframe(APPROACH.model_copy(update={"altitude": 12.0, "landing": True}))
+    for _ in range(600):
+        flown.step((-0.8, 0.0, 0.0))
+        if flown.trouble():
+            break
+    assert flown.trouble() == "the aircraft met the ground"
+    assert flown.motion()[LONGITUDINAL.index("pitch_rad")] > math.radians(12.0)
+
+
+def test_the_diagnosis_can_alter_its_elevator_and_damping() -> None:
+    per_rate, per_command = airframe(APPROACH).pitch_moments()
+    assert per_rate == pytest.approx(-1.28, abs=0.1)
+    assert per_command == pytest.approx(-7 * 0.0425, rel=0.01)
+    commands, positions = airframe(APPROACH).surface_map()
+    at_trim = float(np.interp(0.0, commands, positions))
+    assert at_trim == pytest.approx(math.radians(-5.0), abs=0.005)
+    assert (positions.min(), positions.max()) == pytest.approx(
+        (math.radians(-25.0), math.radians(15.0))
+    )
+
+
 def test_it_loads_and_flies_without_a_word(tmp_path: Path) -> None:
     code = """
 from coupled.flight.scenario import read_run
