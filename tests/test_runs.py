@@ -97,3 +97,17 @@ def test_the_upset_in_shear_is_recovered_later_where_authority_is_lost() -> None
     times = {name: flight.outcome.time_to_attitude_s or 0.0 for name, flight in flights.items()}
     assert times["gradient only"] > times["rigid"] + 0.03
     assert times["compensated"] == pytest.approx(times["rigid"], abs=0.02)
+
+
+def test_the_spring_tabs_loss_is_the_aircrafts_and_the_bends_comes_on_top() -> None:
+    moved, lost = {}, {}
+    for flight in flown("awjsra-spring-tab"):
+        elevator, key = flight.record["elevator_rad"], (flight.outcome.case, flight.configuration)
+        moved[key] = elevator[360] - elevator[0]
+        lost[key] = flight.outcome.loss
+    for configuration in ("rigid", "gradient only", "compensated"):
+        direct, tab = (moved[case, configuration] for case in ("direct drive", "spring tab"))
+        assert tab / direct == pytest.approx(0.575, abs=0.005)
+        assert lost["spring tab", configuration] == lost["direct drive", configuration]
+    for case in ("direct drive", "spring tab"):
+        assert moved[case, "gradient only"] / moved[case, "rigid"] == pytest.approx(0.8, abs=2e-3)

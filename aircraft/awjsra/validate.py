@@ -10,9 +10,10 @@ differences. Two of the rows come from a flight in time.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import jsbsim
 import numpy as np
@@ -35,8 +36,8 @@ LEVERS = ("fcs/throttle-cmd-norm[0]", "fcs/throttle-cmd-norm[1]")
 
 def trimmed(rig: Rig, estimates: dict[str, float] | None = None) -> jsbsim.FGFDMExec:
     """Return JSBSim with the aircraft trimmed as the rig says, some of its estimates changed."""
-    base = jsbsim.FGJSBBase()
-    base.debug_lvl = 0
+    base: Callable[[], Any] = jsbsim.FGJSBBase  # its debug level is the library's
+    base().debug_lvl = 0
     flight = rig.flight
     assert flight is not None
     fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
@@ -114,7 +115,7 @@ class Linear:
         ones = np.diag([1.0, 1.0, 1.0, 1.0, 0.0])
         found = eigvals(matrix, ones)
         found = found[np.isfinite(found) & (np.abs(found) < 1e4)].real
-        return found[np.argsort(np.abs(found))]
+        return np.asarray(found[np.argsort(np.abs(found))])
 
     def steady(self) -> Floats:
         """Return the steady state per inch of column."""
@@ -134,8 +135,8 @@ def linear(fdm: jsbsim.FGFDMExec) -> Linear:
 def flown(rig: Rig, inches: float, seconds: float, pull_s: float) -> Floats:
     """Return the states of `Linear`, and the load factor, of a pull flown in time."""
     fdm = trimmed(rig)
-    names = ("velocities/vt-fps", "aero/alpha-rad", "attitude/theta-rad", "velocities/q-rad_sec")
-    names += ("accelerations/Nz",)
+    names = ["velocities/vt-fps", "aero/alpha-rad", "attitude/theta-rad", "velocities/q-rad_sec"]
+    names.append("accelerations/Nz")
     trim, found = fdm["fcs/elevator-cmd-norm"], []
     for k in range(round(seconds / FRAME_s)):
         fdm["fcs/elevator-cmd-norm"] = trim - (inches / TRAVEL_in if k * FRAME_s < pull_s else 0.0)
