@@ -59,7 +59,8 @@ def residuals(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 if __name__ == "__main__":
     fdm = trimmed(read_rig(RIG))
-    start = [fdm[f"awjsra/{name}"] for name in HELD]
+    # From a tenth of the way back to what they are held near, so that it has to find them.
+    start = [0.9 * fdm[f"awjsra/{name}"] + 0.1 * near for name, (near, _) in HELD.items()]
     found = least_squares(residuals, start, diff_step=1e-3, max_nfev=30)
     for name, value in zip(HELD, found.x, strict=True):
         print(f'<property value="{value:.3f}"> awjsra/{name} </property>')
