@@ -11,6 +11,7 @@ import pytest
 from coupled import channels
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Measure, RunFile
+from coupled.flight.wind import Wind
 from coupled.logs.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
 from coupled.schema import Section, file_keys
@@ -91,13 +92,13 @@ def test_every_key_of_the_files_is_documented() -> None:
     text = (PACKAGE.parent / "docs" / "files.md").read_text(encoding="utf-8")
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
-    sections += [parameters.Sensing, parameters.Rigging, RunFile, Bench, Measure]
+    sections += [parameters.Sensing, parameters.Rigging, RunFile, Bench, Wind, Measure]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
             if key in ("controls", "flight", "loader", "schedule", "compensation", "sensing"):
                 continue
-            if key in ("rigging", "noise", "measure", "bench", "case", "kind"):
+            if key in ("rigging", "noise", "measure", "bench", "wind", "case", "kind"):
                 continue
             if section is LogMap:
                 assert f"[{key}" in text, key

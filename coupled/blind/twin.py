@@ -193,7 +193,7 @@ def _fly(
             change = [now - then for now, then in zip(motion, start, strict=True)]
             command += moment(k * frame_s, change)
         if gust is not None:
-            craft.set_vertical_wind(float(gust[k]))
+            craft.set_gust(float(gust[k]))
         craft.step((command, 0.0, 0.0))
     flown = np.array(motions)
     if moment is not None:  # the surface stands where the rig put it

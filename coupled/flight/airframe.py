@@ -1,6 +1,6 @@
 """The aircraft: the only module that knows JSBSim.
 
-The airframe is trimmed level, takes the commands of elevator, aileron and rudder
+The airframe is trimmed on its flight path, takes the commands of elevator, aileron and rudder
 (about trim, ±1 for the whole travel) and gives the motion. It opens no socket,
 writes no file and prints nothing: a model's own inputs and outputs are disabled
 before they start, and JSBSim's log is kept to be quoted where something fails.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.flight.altered import altered
 from coupled.flight.everyframe import motion_reader, stepper
-from coupled.flight.gusts import blown, dryden
+from coupled.flight.gusts import dryden, gusty
+from coupled.flight.newton import newton_trim
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 
@@ -54,8 +56,10 @@ assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
 SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
-_WIND_DOWN = "atmosphere/wind-down-fps"
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
+_STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # what is no wheel
+_GUST_DOWN = "atmosphere/gust-down-fps"
+_WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 
 
 class _Log(jsbsim.FGLogger):
@@ -98,7 +102,7 @@ def _is_model(folder: Path) -> bool:
 
 
 class JSBSimAirframe:
-    """A JSBSim model, trimmed level at the rig's altitude and calibrated airspeed.
+    """A JSBSim model, trimmed at the rig's altitude, calibrated airspeed and flight path.
 
     Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of
     the rig in its order; `models`, folders of models of our own, searched first; `file`,
@@ -129,7 +133,8 @@ class JSBSimAirframe:
             [self._node(name).get_double_value for name in _LATERAL] if lateral else [],
         )
         self._height = self._node(_HEIGHT).get_double_value
-        self._wheels = self._node(_WHEELS).get_double_value
+        touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
+        self._touching = [self._node(name).get_double_value for name in touching]
         self._extra = [self._node(name, "record_properties").get_double_value for name in record]
         writes = []
         for control in controls:
@@ -142,7 +147,7 @@ class JSBSimAirframe:
             speed = self.motion()[SPEED]
             air_m_per_s = dryden(flight.gust_rms, flight.gust_length, speed, frame_s, seed)
         if air_m_per_s is not None:
-            self.step = blown(self.step, self.set_vertical_wind, iter(air_m_per_s))
+            self.step = gusty(self.step, self.set_gust, iter(air_m_per_s))
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
@@ -164,6 +169,8 @@ class JSBSimAirframe:
             raise self._fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
         fdm.set_aircraft_path(str(known[name]))
+        frame_s /= self._flight.steps_per_frame
+        fdm.set_dt(frame_s)  # a model's rate limits take it as they load
         _log.text = ""
         try:
             loaded = fdm.load_model(name)
@@ -177,7 +184,7 @@ class JSBSimAirframe:
         while fdm.get_output_filename(output):
             fdm.set_output_filename(output, os.devnull)
             output += 1
-        fdm.set_dt(frame_s / self._flight.steps_per_frame)
+        fdm.set_dt(frame_s)
         self._properties = fdm.get_property_manager()
         # By this list, since asking the manager for a malformed name ends the process.
         lines = fdm.query_property_catalog("").split("\n")
@@ -213,7 +220,7 @@ class JSBSimAirframe:
         fdm, flight = self._fdm, self._flight
         fdm["ic/h-sl-ft"] = flight.altitude / FOOT_m
         fdm["ic/vc-kts"] = flight.calibrated_airspeed / KNOT_m_per_s
-        fdm["ic/gamma-deg"] = 0.0
+        fdm["ic/gamma-deg"] = math.degrees(flight.flight_path)
         fdm["propulsion/set-running"] = -1
         for engine in range(fdm.get_propulsion().get_num_engines()):
             for lever in ("mixture", "advance"):
@@ -223,16 +230,22 @@ class JSBSimAirframe:
         for name, value in flight.properties.items():
             self._set(name, value)
         _log.text = ""
+        path = f" on flight_path_rad = {flight.flight_path:g}" if flight.flight_path else " level"
         where = (
-            f"{flight.model} does not trim level at altitude_m = {flight.altitude:g},"
+            f"{flight.model} does not trim{path} at altitude_m = {flight.altitude:g},"
             f" calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
         )
+        problem = ""
         try:
             started = fdm.run_ic()
-            if started:
+            if started and flight.trim == "newton":
+                problem = newton_trim(fdm, flight)
+            elif started:
                 fdm["simulation/do_simple_trim"] = 1
         except (RuntimeError, jsbsim.BaseError):
             raise self._fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
+        if problem:
+            raise self._fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
@@ -263,9 +276,14 @@ class JSBSimAirframe:
             positions[i] = self.motion()[ELEVATOR]
         return commands, positions
 
-    def set_vertical_wind(self, up_m_per_s: float) -> None:
-        """Let the air rise at this speed from the next step on."""
-        self._fdm[_WIND_DOWN] = -up_m_per_s / FOOT_m
+    def set_gust(self, up_m_per_s: float) -> None:
+        """Let a gust rise at this speed from the next step on, beside any wind."""
+        self._fdm[_GUST_DOWN] = -up_m_per_s / FOOT_m
+
+    def blow(self, along_m_per_s: float, up_m_per_s: float) -> None:
+        """Let the air move: along the heading of the start (north), and upwards."""
+        for name, speed in zip(_WINDS, (along_m_per_s, -up_m_per_s), strict=True):
+            self._fdm[name] = speed / FOOT_m
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""
@@ -274,6 +292,6 @@ class JSBSimAirframe:
     def trouble(self) -> str:
         """Return why the flight cannot go on, or an empty string."""
         height = self._height()
-        if height > 0.0 and not self._wheels():
+        if height > 0.0 and not any(touches() for touches in self._touching):
             return ""
         return "the state is not finite" if math.isnan(height) else "the aircraft met the ground"

@@ -38,7 +38,7 @@ def dryden(
         yield from block.tolist()
 
 
-def blown(step: Step, set_air: Callable[[float], None], air_m_per_s: Iterator[float]) -> Step:
+def gusty(step: Step, set_air: Callable[[float], None], air_m_per_s: Iterator[float]) -> Step:
     """Return a stepping in which the air over each frame moves up as told."""
 
     def run(commands: tuple[float, float, float], /) -> None:

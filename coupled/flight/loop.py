@@ -25,6 +25,7 @@ from coupled.flight.bench import Airframe, Bench
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.pilot import Action, Table
 from coupled.flight.scenario import Scenario
+from coupled.flight.wind import blown
 from coupled.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
@@ -121,12 +122,15 @@ def make_airframe(scenario: Scenario, air_m_per_s: Sequence[float] | None = None
         check_direct_controls(rig.flight, frame_s, controls, **where)
         asked: dict[str, Any] = {"record": run.record_properties, "record_file": scenario.file}
         asked |= {"seed": run.seed, "air_m_per_s": air_m_per_s}
-        return JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
+        airframe = JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
     except InputError as error:
         if error.key not in scenario.changes:
             raise
         place = f"case {scenario.label!r}: rig.{error.key}"
         raise InputError(scenario.file, place, error.problem) from None
+    if run.wind is not None:
+        airframe.step = blown(airframe.step, airframe.blow, run.wind, frame_s)
+    return airframe
 
 
 def gradient_at(control: Control, pressure_Pa: float) -> float:

@@ -16,6 +16,7 @@ from typing import Any, Literal, cast
 from coupled.channels import CONTROL_NAMES, ControlName, channel, unit_of
 from coupled.errors import InputError, nearest
 from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, read_force_table
+from coupled.flight.wind import Wind, check_wind
 from coupled.resources import find, shipped_rigs, shipped_runs
 from coupled.rig.parameters import PLAIN_NAME, Rig
 from coupled.rig.rigfile import change, read_rig
@@ -65,6 +66,7 @@ class RunFile(Section):
     configurations: list[Configuration] = quantity("", list(CONFIGURATIONS), min_length=1)
     measure: Measure = Measure()
     bench: Bench | None = None
+    wind: Wind | None = None
     case: list[Case] = []
 
 
@@ -125,8 +127,9 @@ def read_run(name: str) -> list[Scenario]:
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
     known_keys(table, keys, file, "")
-    if "bench" in table:
-        table["bench"] = build(Bench, table["bench"], file, "bench")
+    for key, section in (("bench", Bench), ("wind", Wind)):
+        if key in table:
+            table[key] = build(section, table[key], file, key)
     cases = table.pop("case", [])
     if not isinstance(cases, list):
         raise InputError(file, "case", "cases are written [[case]]")
@@ -134,6 +137,8 @@ def read_run(name: str) -> list[Scenario]:
     run = build(RunFile, table, file, "")
     if run.bench is not None:
         _check_bench(run.bench, file)
+    if run.wind is not None:
+        check_wind(run.wind, file)
     _refuse_doubles(run, file)
     variants = run.case or [Case(label=run.name)]
     return [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
@@ -148,6 +153,8 @@ def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> 
         raise InputError(file, "bench", f"{rig_file.name} has an aircraft, which gives q̄ itself")
     if rig.flight is None and run.record_properties:
         raise InputError(file, "record_properties", f"{rig_file.name} has no aircraft to ask")
+    if rig.flight is None and run.wind is not None:
+        raise InputError(file, "wind", f"{rig_file.name} has no aircraft to blow on")
     pilots = copy.deepcopy(pilots)
     for key, value in case.pilot.items():
         place = f"case[{index}].pilot.{key}"

@@ -99,11 +99,15 @@ class Control(Section):
 
 
 class Flight(Section):
-    """The JSBSim model, where it is trimmed, what its elevator and damping do, and the air."""
+    """The JSBSim model, how it is trimmed and flown, two of its moments, and the air."""
 
     model: str = quantity("", min_length=1)
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
+    flight_path: float = quantity("rad", 0.0, ge=-0.6, le=0.6)
+    trim: Literal["jsbsim", "newton"] = "jsbsim"
+    direct_controls: bool = True
+    landing: bool = False
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)

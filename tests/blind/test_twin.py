@@ -123,7 +123,7 @@ def test_rising_air_raises_alpha() -> None:
     assert rig.flight is not None
     craft = airframe(rig.flight, 1 / 120)
     before = craft.motion()
-    craft.set_vertical_wind(2.0)
+    craft.set_gust(2.0)
     for _ in range(3):
         craft.step((0.0, 0.0, 0.0))
     assert craft.motion()[4] - before[4] == pytest.approx(2.0 / before[6], rel=0.15)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from coupled.channels import LONGITUDINAL
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.direct import check_direct_controls
-from coupled.resources import shipped_rigs
+from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
 
@@ -25,16 +26,17 @@ C172 = Flight(model="c172p", altitude=1500.0, calibrated_airspeed=50.0)
 def test_every_shipped_aircraft_trims_and_answers_to_the_rigs_signs(name: str) -> None:
     rig = read_rig(shipped_rigs()[name])
     assert rig.flight is not None
-    travel = check_direct_controls(rig.flight, FRAME, CONTROLS)
+    travel = check_direct_controls(rig.flight, FRAME, CONTROLS, models=[aircraft_folder()])
     assert all(0.1 < abs(reach) < 0.6 for reach in travel.values())
-    airframe = JSBSimAirframe(rig.flight, FRAME, CONTROLS)
+    airframe = JSBSimAirframe(rig.flight, FRAME, CONTROLS, [aircraft_folder()])
     start = airframe.motion()
     for _ in range(240):
         airframe.step((0.0, 0.0, 0.0))
     end = airframe.motion()
     assert start[LONGITUDINAL.index("load_factor")] == pytest.approx(1.0, abs=0.02)
-    drift = abs(end[LONGITUDINAL.index("altitude_m")] - start[LONGITUDINAL.index("altitude_m")])
-    assert drift < 1.0
+    climb = end[LONGITUDINAL.index("altitude_m")] - start[LONGITUDINAL.index("altitude_m")]
+    speed = start[LONGITUDINAL.index("true_airspeed_m_per_s")]
+    assert climb == pytest.approx(2.0 * speed * math.sin(rig.flight.flight_path), abs=1.0)
 
 
 def test_it_opens_no_socket_writes_no_file_and_prints_nothing(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], N
 def nominal_rig(flown: bool) -> Rig:
     """Return the rig that a diagnosis is held against."""
     if flown:
-        return read_run("worst-case")[0].rig
+        return read_run("worst-case-t37")[0].rig
     table = {**BENCH, "frame_rate_Hz": 120.0}
     return bench({"controls.column.schedule.pressure_scale": 1.0}, table)
 

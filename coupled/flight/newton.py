@@ -1,0 +1,82 @@
+"""Trim by Newton's method: angle of attack, thrust and elevator together.
+
+JSBSim's own trim pairs the thrust with the acceleration along the nose, and finds one after the
+other. Where the thrust mostly lifts, as through nozzles that point down, that fails. Here all
+three are moved at once until the three accelerations of the plane of symmetry vanish. The
+aircraft is taken to be symmetric: no roll, no sideslip, ailerons and rudder at neutral.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.parameters import Flight
+from coupled.units import KNOT_m_per_s
+
+Floats = NDArray[np.float64]
+_ACCELERATIONS = (
+    "accelerations/udot-ft_sec2",
+    "accelerations/wdot-ft_sec2",
+    "accelerations/qdot-rad_sec2",
+)
+_NAMES = ("the angle of attack", "the throttle", "the elevator")
+_LOW, _HIGH = np.array([-0.35, 0.0, -1.0]), np.array([0.5, 1.0, 1.0])
+_STEPS = np.array([1e-4, 1e-3, 1e-3])
+_STARTS = (0.7, 0.4)  # throttles; where Newton's method leads out of bounds from one, the other
+_STILL = 1e-7  # ft/s² and rad/s²
+
+
+def newton_trim(fdm: Any, flight: Flight, start_alpha_rad: float = 0.07) -> str:
+    """Trim a loaded aircraft on its flight path; return why it cannot be, or an empty string.
+
+    Altitude, flaps and what else the rig sets are to be set before. Systems with a memory stand
+    at their steady state meanwhile.
+    """
+    fdm.set_trim_status(True)
+    try:
+        for throttle in _STARTS:
+            problem = _search(fdm, flight, np.array([start_alpha_rad, throttle, 0.0]))
+            if not problem:
+                break
+        return problem
+    finally:
+        fdm.set_trim_status(False)
+
+
+def _search(fdm: Any, flight: Flight, found: Floats) -> str:
+    for _ in range(40):
+        left = _accelerations(fdm, flight, found)
+        if not np.all(np.isfinite(left)):
+            return "its state is not finite"
+        if np.max(np.abs(left)) < _STILL:
+            return ""
+        slopes = np.empty((3, 3))
+        for i in range(3):
+            step = np.where(np.arange(3) == i, _STEPS, 0.0)
+            up = _accelerations(fdm, flight, found + step)
+            down = _accelerations(fdm, flight, found - step)
+            slopes[:, i] = (up - down) / (2.0 * _STEPS[i])
+        if not np.all(np.isfinite(slopes)) or abs(np.linalg.det(slopes)) < 1e-12:
+            return "angle of attack, throttle and elevator do not tell apart"
+        move = np.linalg.solve(slopes, -left)
+        move *= min(1.0, 0.1 / float(np.max(np.abs(move))))
+        found = np.clip(found + move, _LOW, _HIGH)
+    worst = [n for n, x, a, b in zip(_NAMES, found, _LOW, _HIGH, strict=True) if not a < x < b]
+    return f"{worst[0]} is at its bound" if worst else "no balance is found"
+
+
+def _accelerations(fdm: Any, flight: Flight, point: Floats) -> Floats:
+    alpha, throttle, elevator = (float(x) for x in point)
+    fdm["ic/vc-kts"] = flight.calibrated_airspeed / KNOT_m_per_s
+    fdm["ic/alpha-rad"] = alpha
+    fdm["ic/gamma-deg"] = math.degrees(flight.flight_path)
+    for engine in range(fdm.get_propulsion().get_num_engines()):
+        fdm[f"fcs/throttle-cmd-norm[{engine}]"] = throttle
+    fdm["fcs/elevator-cmd-norm"] = elevator
+    for _ in range(3):  # the rate of the angle of attack, which damps, is an answer too
+        fdm.run_ic()
+    return np.array([fdm[name] for name in _ACCELERATIONS])
