@@ -1,58 +1,147 @@
-"""The commands of the gap between a rig and its records: diagnose."""
+"""The command of the gap between a rig and its records: one, several, or a folder of them."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from coupled.channels import CONTROL_NAMES, ControlName
 from coupled.cli.app import JsonOption, app
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
-from coupled.resources import shipped_rigs
-from coupled.terminal import check_json, give_json, out, say
+from coupled.resources import find, shipped_rigs
+from coupled.terminal import check_json, give_json, out, progress, say
+
+if TYPE_CHECKING:
+    from coupled.gap.diagnose import Diagnosis
+    from coupled.record import Record
 
 
-@app.command(epilog="[dim]Example: coupled diagnose out/737.csv --rig 737 --json out/737.json[/]")
+@app.command(
+    epilog="[dim]Examples: coupled diagnose out/737.csv --rig 737 --plots out/737"
+    " · coupled diagnose a.csv b.csv --rig my-rig.toml --json - --power"
+    " · coupled diagnose out/trials --output out/diagnoses[/]"
+)
 def diagnose(
-    record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
-    rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")],
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD...",
+            help="Records of one rig, CSV or Parquet; or a folder whose records.toml names each's.",
+        ),
+    ],
+    rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")] = "",
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
+    power: Annotated[
+        bool, typer.Option("--power", help="Tell what size of each effect would have shown.")
+    ] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="For a folder: where its diagnoses go, a JSON each."),
+    ] = None,
     json_file: JsonOption = "",
 ) -> None:
-    """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
-    from coupled.channels import CONTROL_NAMES
-    from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.gap.words import in_words
-    from coupled.record import read_record
-    from coupled.resources import find
-    from coupled.rig.rigfile import read_rig
-    from coupled.rig.rigwrite import rig_text
-    from coupled.tables.gaps import print_stages
-
+    """Tell where records depart from their rig, which effect causes it, and how far it shrinks."""
+    if any(record.is_dir() for record in records):
+        _diagnose_folder(records, rig, output)
+        return
+    if output is not None:
+        raise InputError(output, "--output", "is for a folder of records; give --json FILE")
+    if not rig:
+        raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
     rig_file = find(rig, shipped_rigs(), "rig")
-    inputs = [record, rig_file]
+    name = _control(control, records[0])
+    inputs = [*records, rig_file]
     if improve is not None:
         check_target(improve, inputs)
     check_json(json_file, [*inputs, *([improve] if improve else [])])
-    for name in CONTROL_NAMES:
-        if name == control:
-            nominal = read_rig(rig_file)
-            whole = find_gap(nominal, {str(record): read_record(record)}, name)
-            diagnosis, improved = whole.found, whole.improved
-            break
-    else:
-        raise InputError(record, "--control", f"is {control!r}; one of {', '.join(CONTROL_NAMES)}")
+    whole, read = _diagnose(records, rig_file, name)
+    if power:
+        whole.found["power"] = _power(whole)
     if json_file != "-":
-        out.print(in_words(diagnosis, control), markup=False, highlight=False)
-        print_stages(out, diagnosis)
+        _print(whole)
     if improve is not None:
-        remark = f"{rig_file.name} with what was found in {record.name}:\n"
-        write_text(improve, rig_text(improved, remark + in_words(diagnosis, control)))
-        if json_file != "-":
-            say(f"improved rig: {improve}")
-    give_json(diagnosis, json_file)
+        _write_improved(improve, whole, rig_file, read)
+    give_json(whole.found, json_file)
+
+
+def _control(word: str, file: Path) -> ControlName:
+    for name in CONTROL_NAMES:
+        if name == word:
+            return name
+    raise InputError(file, "--control", f"is {word!r}; one of {', '.join(CONTROL_NAMES)}")
+
+
+def _diagnose(
+    files: list[Path], rig_file: Path, control: ControlName
+) -> tuple[Diagnosis, dict[str, Record]]:
+    from coupled.gap.diagnose import diagnose as find_gap
+    from coupled.gap.report import add_report
+    from coupled.record import read_record
+    from coupled.rig.rigfile import read_rig
+
+    nominal = read_rig(rig_file)
+    read: dict[str, Record] = {}
+    for file in files:
+        if str(file) in read:
+            raise InputError(file, "", "is given twice")
+        read[str(file)] = read_record(file)
+    with progress() as advance:
+        whole = find_gap(nominal, read, control, advance)
+        advance("flying again, and looking for the next test", 0, 1)
+        add_report(whole, read)
+    return whole, read
+
+
+def _power(whole: Diagnosis) -> list[dict[str, Any]]:
+    from coupled.gap.power import power
+
+    return power(whole.choice.settled.rig, whole.control, whole.outputs)
+
+
+def _print(whole: Diagnosis) -> None:
+    from coupled.gap.words import in_words
+    from coupled.tables.gaps import print_closed_loop, print_power, print_stages
+
+    out.print(in_words(whole.found, whole.control), markup=False, highlight=False)
+    print_stages(out, whole.found)
+    print_closed_loop(out, whole.found)
+    if "power" in whole.found:
+        print_power(out, whole.found["power"])
+
+
+def _write_improved(
+    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
+) -> None:
+    from coupled.gap.words import in_words
+    from coupled.rig.rigwrite import rig_text
+
+    names = ", ".join(Path(name).name for name in records)
+    remark = f"{rig_file.name} with what was found in {names}:\n"
+    write_text(path, rig_text(whole.improved, remark + in_words(whole.found, whole.control)))
+    say(f"improved rig: {path}")
+
+
+def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None:
+    """Diagnose every record of a folder, each alone; print and write a summary."""
+    from coupled.gap.batch import jobs, run_all, summary
+    from coupled.tables.gaps import print_summary
+
+    if len(folders) > 1:
+        raise InputError(folders[1], "", "a folder of records is diagnosed by itself")
+    if rig:
+        raise InputError(folders[0], "--rig", "leave it out: records.toml names each record's rig")
+    if output is None:
+        raise InputError(folders[0], "--output", "is missing: the folder for the diagnoses")
+    todo = jobs(folders[0], output)
+    check_target(output / "summary.csv")
+    with progress() as advance:
+        found = run_all(todo, advance)
+    write_text(output / "summary.csv", summary(found))
+    print_summary(out, found)
+    say(f"diagnoses: {output}  ({len(found)}, and summary.csv)")

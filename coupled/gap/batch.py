@@ -6,11 +6,13 @@ of the same version does only what is missing. The records are dealt to all core
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import multiprocessing
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +22,14 @@ import coupled
 from coupled.errors import InputError, nearest
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
+from coupled.gap.report import add_report
 from coupled.record import read_record
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 LIST = "records.toml"
+HEAD = ("record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed")
 Progress = Callable[[str, int, int], None]
 
 
@@ -78,6 +82,31 @@ def _rig(folder: Path, name: str, rig: str) -> Path:
     raise InputError(folder / LIST, name, f"there is no rig {rig!r}; {nearest(rig, shipped)}")
 
 
+def summary(found: Sequence[dict[str, Any]]) -> str:
+    """Return a table of diagnoses as CSV, a row a record."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(
+        ["record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed"]
+    )
+    for item in found:
+        effects = item["effects"]
+        parameters = [
+            f"{name}={value['value']:.5g}"
+            for effect in effects
+            for name, value in effect["parameters"].items()
+        ]
+        guilty = [stage for stage, told in item["stages"].items() if told.get("guilty")]
+        rivals = ["|".join(group) for group in item["rivals"]]
+        closed = item["shrink"].get("closed", "")
+        row = [item["record"], item["made"]["rig"], item["verdict"]]
+        row += [
+            " ".join(names) for names in ([e["name"] for e in effects], parameters, guilty, rivals)
+        ]
+        table.writerow([*row, f"{closed:.4f}" if closed != "" else ""])
+    return text.getvalue()
+
+
 def version_hash() -> str:
     """Return the hash of all the package's sources: what a frozen version is."""
     here = Path(coupled.__file__).parent
@@ -101,7 +130,9 @@ def run(job: Job, version: str) -> dict[str, Any]:
         return known
     try:
         records = {str(job.record): read_record(job.record)}
-        found = diagnose(read_rig(job.rig), records, "column").found
+        whole = diagnose(read_rig(job.rig), records, "column")
+        add_report(whole, records)
+        found = whole.found
     except InputError as error:
         refused = {"verdict": "refused", "why": f"{error.key}: {error.problem}".lstrip(": ")}
         found = refused | {"stages": {}, "effects": [], "rivals": [], "shrink": {}}

@@ -26,6 +26,7 @@ SCREENED = 6
 SETTLE = 1.05  # gap from which a stage's settings are worth fitting
 LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
 MISMATCH = 0.03  # share of a gap that the physics of a right effect may leave
+SIMPLER = 0.1  # share of the gain by which more numbers must win where fewer close the gap
 SPARE = 4.0  # an effect that others have made needless: it would be missed by less
 MOST = 4  # effects in one answer
 Tell = Callable[[str, int, int], None]
@@ -33,12 +34,16 @@ Tell = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Case:
-    """What the search works on: a nominal rig, and the outputs of its records."""
+    """What the search works on: a nominal rig, and the outputs of its records.
+
+    `refloored` gives the outputs with the floors of another rig.
+    """
 
     nominal: Rig
     control: ControlName
     outputs: Sequence[Output]
-    tell: Tell | None
+    tell: Tell | None = None
+    refloored: Callable[[Rig], Sequence[Output]] | None = None
 
     @property
     def settings(self) -> tuple[Effect, ...]:
@@ -50,6 +55,14 @@ class Case:
     def neutral(self) -> dict[str, float]:
         """The settings as the rig file has them."""
         return {f"{setting.name}.factor": 1.0 for setting in SETTINGS.values()}
+
+    def gaps(self, rig: Rig) -> dict[str, float]:
+        """Return each stage's gap, by the floors of this rig where they are higher."""
+        gaps = stage_gaps(self.outputs, rig)
+        if self.refloored is None or rig == self.nominal:
+            return gaps
+        own = stage_gaps(self.refloored(rig), rig)
+        return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the settings whose number none of these effects frees."""
@@ -105,9 +118,10 @@ def search(
     outputs: Sequence[Output],
     library: Sequence[Effect] = EFFECTS,
     tell: Tell | None = None,
+    refloored: Callable[[Rig], Sequence[Output]] | None = None,
 ) -> Choice:
     """Return the effects that explain a record's gap, each earning its place in turn."""
-    case = Case(nominal, control, outputs, tell)
+    case = Case(nominal, control, outputs, tell, refloored)
     settled = current = case.fit(())
     steps: list[Step] = []
     tried: dict[str, float] = {}
@@ -116,7 +130,7 @@ def search(
         tried = tried or {candidate.effect.name: candidate.gain for candidate in ranked}
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
-        best = _simplest(ranked)
+        best = _simplest(case, settled, ranked)
         steps.append(_step(best, ranked))
         current = case.fit((*current.effects, best.effect), start=best.fit.values)
         needless = _needless(case, current)
@@ -174,12 +188,23 @@ def _step(best: Candidate, ranked: Sequence[Candidate]) -> Step:
     return Step(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
 
 
-def _simplest(ranked: Sequence[Candidate]) -> Candidate:
-    """Return the best candidate, or one with fewer numbers that is as good."""
+def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
+    """Return the best candidate, or one with fewer numbers that is as good.
+
+    Where the one with fewer closes the gap, the other must beat it by more than the physics of
+    a right effect may leave.
+    """
     best = ranked[0]
+    first = stage_gaps(case.outputs, settled.rig)
     for other in ranked[1:]:
-        fewer = len(other.effect.free) < len(best.effect.free)
-        if fewer and other.gain > ranked[0].gain - RIVAL:
+        if len(other.effect.free) >= len(best.effect.free):
+            continue
+        left = stage_gaps(case.outputs, other.fit.rig)
+        closes = all(
+            left[stage] <= bar(first[stage]) for stage in shows_in(other.effect) if stage in left
+        )
+        margin = max(RIVAL, SIMPLER * ranked[0].gain) if closes else RIVAL
+        if other.gain > ranked[0].gain - margin:
             best = other
     return best
 
@@ -192,7 +217,7 @@ def bar(before: float) -> float:
 def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
     """Return the candidates by their held-out gain over the current effects, best first."""
     first = stage_gaps(case.outputs, settled.rig)
-    now = stage_gaps(case.outputs, current.rig)
+    now = case.gaps(current.rig) if current.effects else first
     guilty = {stage for stage, gap in now.items() if gap > bar(first[stage])}
     candidates = [
         effect

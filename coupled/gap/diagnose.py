@@ -24,7 +24,7 @@ from coupled.gap.airframe import (
     surface_points,
 )
 from coupled.gap.checks import check_record
-from coupled.gap.choose import CLEAR, Choice, Tell, bar, search
+from coupled.gap.choose import CLEAR, Case, Choice, Tell, bar, search
 from coupled.gap.effects import EFFECTS, STAGES, parameter_name
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.shrink import shrink
@@ -68,13 +68,12 @@ def diagnose(
         raise InputError(file, "", "lets no stage be judged; it lacks " + ", ".join(lacking))
     airs = can_tell_air(list(records.values()))
     library = [effect for effect in EFFECTS if airs or effect.name != "vertical_gust"]
-    choice = search(rig, control, outputs, library, tell)
-    # What noise leaves depends on the rig: the improved one has floors of its own.
-    improved = [replace(reader, rig=choice.fit.rig) for reader in readers] if choice.steps else []
-    after = stage_gaps(outputs, choice.fit.rig)
-    if improved:
-        floors = stage_gaps(_outputs(improved), choice.fit.rig)
-        after = {stage: min(gap, floors.get(stage, gap)) for stage, gap in after.items()}
+
+    def refloored(other: Rig) -> Sequence[Output]:
+        return _outputs([replace(reader, rig=other) for reader in readers])
+
+    choice = search(rig, control, outputs, library, tell, refloored)
+    after = Case(rig, control, outputs, tell, refloored).gaps(choice.fit.rig)
     stages = _stages(readers, outputs, after, choice)
     _tell_where(stages, readers, outputs, choice)
     found = {

@@ -26,7 +26,7 @@ from coupled.record import Record
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]
-LENGTH_s = 20.0
+LENGTH_s = 15.0
 SEPARATED = 10.0  # log-likelihood that settles the matter
 RAMP_s = 0.25  # a hand's edge
 
@@ -92,9 +92,9 @@ def _gain(
         return None
     reader = Reader(test.rig, record, control, surface_points)
     outputs: list[Output] = reader.outputs()
-    if control == "column":
+    if control == "column" and any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
         outputs += airframe_outputs(test.rig, record)
-    case = Case(test.rig, control, outputs, None)
+    case = Case(test.rig, control, outputs)
     fits = [case.fit(effects, "fitted", start) for effects in pair]
     settled = case.fit((), "fitted")
     fitted = [(effects[-1], found) for effects, found in zip(pair, fits, strict=True)]
@@ -111,9 +111,8 @@ def tests(nominal: Rig, record: Record, control: ControlName) -> Iterator[Test]:
     settings = _pressures(nominal, record, control, len(time))
     for words, shape in _shapes(time):
         for where, pressure, rig in settings:
-            for share in (1.0, 0.3):
-                push = f"{words} of ±{share * most:.0f} N for {LENGTH_s:g} s {where}"
-                yield Test(push, share * most * shape, pressure, rig)
+            push = f"{words} of ±{most:.0f} N for {LENGTH_s:g} s {where}"
+            yield Test(push, most * shape, pressure, rig)
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:

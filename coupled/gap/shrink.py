@@ -22,7 +22,7 @@ def shrink(
 ) -> dict[str, Any]:
     """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
     effects = choice.fit.effects
-    found = Case(rig, control, outputs, None).fit(effects, "fitted", choice.fit.values).rig
+    found = Case(rig, control, outputs).fit(effects, "fitted", choice.fit.values).rig
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
     result = _of(widest, rig, found, bool(effects))

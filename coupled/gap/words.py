@@ -1,28 +1,97 @@
-"""A diagnosis in the two or three sentences that an engineer can repeat."""
+"""A diagnosis in the few sentences that an engineer can repeat."""
 
 from __future__ import annotations
 
 from typing import Any, cast
 
+OF_SIGNAL = {
+    "computed": "the deflection",
+    "estimate": "the estimated deflection",
+    "force": "the force",
+    "gradient": "the gradient",
+    "dynamic_pressure": "q̄",
+    "load_factor": "the load factor",
+    "time": "time",
+    "elevator": "the elevator",
+    "pitch_rate": "the pitch rate",
+    "alpha": "the angle of attack",
+}
+
 
 def in_words(diagnosis: dict[str, Any], control: str) -> str:
-    """Return the two or three sentences that an engineer can repeat."""
-    verdict, effects = diagnosis["verdict"], diagnosis["effects"]
-    guilty = [stage for stage, found in diagnosis["stages"].items() if found.get("guilty")]
-    if verdict == "no_gap":
+    """Return what is wrong, how large, how sure, how much it explains, and what to record next."""
+    said = [_what(diagnosis, control)]
+    if diagnosis["verdict"] == "no_gap":
         unjudged = [stage for stage, found in diagnosis["stages"].items() if "gap" not in found]
-        but = f" Not judged: {', '.join(unjudged)}." if unjudged else ""
+        if unjudged:
+            said.append(f"Not judged: {', '.join(unjudged)}.")
+    else:
+        said += [_since(diagnosis), _sure(diagnosis), _closes(diagnosis)]
+    said.append(diagnosis.get("next_test", ""))
+    return " ".join(sentence for sentence in said if sentence)
+
+
+def _guilty(diagnosis: dict[str, Any]) -> list[str]:
+    return [stage for stage, found in diagnosis["stages"].items() if found.get("guilty")]
+
+
+def _what(diagnosis: dict[str, Any], control: str) -> str:
+    named = "; ".join(_one_in_words(effect) for effect in diagnosis["effects"])
+    if diagnosis["verdict"] == "no_gap":
         within = "every stage that could be judged stays within its noise"
-        return f"No gap in the {control}: {within}.{but}"
-    named = "; ".join(_one_in_words(effect) for effect in effects)
+        return f"No gap in the {control}: {within}."
+    where = ", ".join(_guilty(diagnosis))
+    if diagnosis["verdict"] == "unexplained":
+        also = f" Found nevertheless: {named}." if named else ""
+        return f"A gap in the {where} that no effect of the library explains.{also}"
+    return f"The gap lies in the {where}: {named}."
+
+
+def _since(diagnosis: dict[str, Any]) -> str:
+    """Return since when, and for what is not explained, what it follows."""
+    said = []
+    for stage in _guilty(diagnosis):
+        found = diagnosis["stages"][stage].get("where")
+        if found is None:
+            continue
+        if found.get("onset_s", 0.0) > 5.0:
+            said.append(f"In the {stage} it is first seen at {found['onset_s']:.1f} s.")
+        if diagnosis["verdict"] == "unexplained" and found["follows"]:
+            most = found["follows"][0]
+            share = f"{100 * most['share']:.0f} %"
+            said.append(f"In the {stage}, {share} of it follows {_signal(most['signal'])}.")
+    return " ".join(said)
+
+
+def _signal(name: str) -> str:
+    if name == "constant":
+        return "nothing: it is constant"
+    base = next((known for known in OF_SIGNAL if name.startswith(known)), name)
+    rest = name[len(base) :]
+    kind = "the sign of " if rest.endswith("sign") else ""
+    kind += "the rate of " if "_rate" in rest else ("the cube of " if "cubed" in rest else "")
+    return kind + OF_SIGNAL.get(base, base)
+
+
+def _sure(diagnosis: dict[str, Any]) -> str:
+    if diagnosis["rivals"]:
+        groups = "; ".join(
+            " or ".join(name.replace("_", " ") for name in group) for group in diagnosis["rivals"]
+        )
+        return f"The record cannot tell {groups}."
+    if diagnosis["verdict"] == "unexplained" or not diagnosis["effects"]:
+        return ""
+    least = min(effect["probability"] for effect in diagnosis["effects"])
+    return f"Probability {'over 0.99' if least > 0.99 else format(least, '.2f')}."
+
+
+def _closes(diagnosis: dict[str, Any]) -> str:
     shrink = diagnosis["shrink"]
-    share = f" It closes {100 * shrink['closed']:.0f} % of the gap." if "closed" in shrink else ""
-    if verdict == "unexplained":
-        also = f" Found nevertheless: {named}." if effects else ""
-        return f"A gap in the {', '.join(guilty)} that no effect of the library explains.{also}"
-    rivals = "; ".join(" or ".join(group) for group in diagnosis["rivals"])
-    doubt = f" The record cannot tell {rivals}." if verdict == "ambiguous" else ""
-    return f"The gap lies in the {', '.join(guilty)}: {named}.{share}{doubt}"
+    if "closed" not in shrink:
+        return ""
+    few = "" if shrink["reliable"] else ", of too few stretches to rely on"
+    ends = f"{100 * shrink['low']:.0f} to {100 * shrink['high']:.0f} %{few}"
+    return f"It closes {100 * shrink['closed']:.0f} % of the gap on held-out data ({ends})."
 
 
 def _one_in_words(effect: dict[str, Any]) -> str:
