@@ -22,6 +22,9 @@ def diagnose(
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
+    plots: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw ladder, stages and signature there.")
+    ] = None,
     json_file: JsonOption = "",
 ) -> None:
     """Tell where a record departs from its rig, which effect causes it, and how far it shrinks."""
@@ -36,13 +39,17 @@ def diagnose(
 
     rig_file = find(rig, shipped_rigs(), "rig")
     inputs = [record, rig_file]
-    if improve is not None:
-        check_target(improve, inputs)
-    check_json(json_file, [*inputs, *([improve] if improve else [])])
+    drawn = _plot_targets(plots)
+    targets = [*drawn, *([improve] if improve else [])]
+    for target in targets:
+        check_target(target, inputs)
+    if improve in drawn:
+        raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
+    check_json(json_file, [*inputs, *targets])
     for name in CONTROL_NAMES:
         if name == control:
-            nominal = read_rig(rig_file)
-            whole = find_gap(nominal, {str(record): read_record(record)}, name)
+            nominal, records = read_rig(rig_file), {str(record): read_record(record)}
+            whole = find_gap(nominal, records, name)
             diagnosis, improved = whole.found, whole.improved
             break
     else:
@@ -55,4 +62,21 @@ def diagnose(
         write_text(improve, rig_text(improved, remark + in_words(diagnosis, control)))
         if json_file != "-":
             say(f"improved rig: {improve}")
+    if plots is not None:
+        from coupled.plots.gaps import draw_diagnosis
+        from coupled.plots.saving import save
+
+        for file, figure in draw_diagnosis(whole, records).items():
+            save(figure, plots / file)
+            if json_file != "-":
+                say(f"figure: {plots / file}")
     give_json(diagnosis, json_file)
+
+
+def _plot_targets(folder: Path | None) -> list[Path]:
+    """Return the files that a diagnosis draws into a folder."""
+    if folder is None:
+        return []
+    from coupled.plots.gaps import FIGURES
+
+    return [folder / name for name in FIGURES]

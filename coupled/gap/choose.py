@@ -97,6 +97,7 @@ class Choice:
     fit: Fit
     settled: Fit
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
+    rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
 
 
 def search(
@@ -110,10 +111,10 @@ def search(
     case = Case(nominal, control, outputs, tell)
     settled = current = case.fit(())
     steps: list[Step] = []
-    tried: dict[str, float] = {}
+    rounds: list[dict[str, float]] = []
     while len(steps) < MOST:
         ranked = _round(case, settled, current, library)
-        tried = tried or {candidate.effect.name: candidate.gain for candidate in ranked}
+        rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(ranked)
@@ -127,7 +128,8 @@ def search(
             if needless is best.effect:
                 break
     steps = [_again(case, current, step) if len(steps) > 1 else step for step in steps]
-    return Choice(tuple(steps), current, settled, tried)
+    tried = next((gains for gains in rounds if gains), {})
+    return Choice(tuple(steps), current, settled, tried, tuple(rounds))
 
 
 def _again(case: Case, current: Fit, step: Step) -> Step:
