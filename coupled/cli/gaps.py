@@ -37,6 +37,9 @@ def diagnose(
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
+    plots: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw ladder, stages and signature there.")
+    ] = None,
     power: Annotated[
         bool, typer.Option("--power", help="Tell what size of each effect would have shown.")
     ] = False,
@@ -57,16 +60,22 @@ def diagnose(
     rig_file = find(rig, shipped_rigs(), "rig")
     name = _control(control, records[0])
     inputs = [*records, rig_file]
-    if improve is not None:
-        check_target(improve, inputs)
-    check_json(json_file, [*inputs, *([improve] if improve else [])])
+    drawn = _plot_targets(plots)
+    targets = [*drawn, *([improve] if improve else [])]
+    for target in targets:
+        check_target(target, inputs)
+    if improve in drawn:
+        raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
+    check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name)
     if power:
         whole.found["power"] = _power(whole)
     if json_file != "-":
         _print(whole)
     if improve is not None:
-        _write_improved(improve, whole, rig_file, read)
+        _write_improved(improve, whole, rig_file, read, json_file != "-")
+    if plots is not None:
+        _draw(plots, whole, read, json_file != "-")
     give_json(whole.found, json_file)
 
 
@@ -116,7 +125,7 @@ def _print(whole: Diagnosis) -> None:
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
+    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record], aloud: bool
 ) -> None:
     from coupled.gap.words import in_words
     from coupled.rig.rigwrite import rig_text
@@ -124,7 +133,27 @@ def _write_improved(
     names = ", ".join(Path(name).name for name in records)
     remark = f"{rig_file.name} with what was found in {names}:\n"
     write_text(path, rig_text(whole.improved, remark + in_words(whole.found, whole.control)))
-    say(f"improved rig: {path}")
+    if aloud:
+        say(f"improved rig: {path}")
+
+
+def _plot_targets(folder: Path | None) -> list[Path]:
+    """Return the files that a diagnosis draws into a folder."""
+    if folder is None:
+        return []
+    from coupled.plots.gaps import FIGURES
+
+    return [folder / name for name in FIGURES]
+
+
+def _draw(folder: Path, whole: Diagnosis, records: dict[str, Record], aloud: bool) -> None:
+    from coupled.plots.gaps import draw_diagnosis
+    from coupled.plots.saving import save
+
+    for file, figure in draw_diagnosis(whole, records).items():
+        save(figure, folder / file)
+        if aloud:
+            say(f"figure: {folder / file}")
 
 
 def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None:

@@ -8,76 +8,27 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from coupled.channels import ControlName
-from coupled.gap.effects import EFFECTS, SETTINGS, TOLERANCE, Effect, apply
-from coupled.gap.fit import Fit, fit, shows_in, touched
-from coupled.gap.output import Output, Part, memory, stage_gaps
+from coupled.gap.case import Case, Tell
+from coupled.gap.effects import EFFECTS, TOLERANCE, Effect
+from coupled.gap.fit import Fit, shows_in
+from coupled.gap.output import Output, memory, stage_gaps
+from coupled.gap.screen import screen
 from coupled.rig.parameters import Rig
 
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
-SCREENED = 6
-SETTLE = 1.05  # gap from which a stage's settings are worth fitting
 LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
 MISMATCH = 0.03  # share of a gap that the physics of a right effect may leave
 SIMPLER = 0.1  # share of the gain by which more numbers must win where fewer close the gap
 SPARE = 4.0  # an effect that others have made needless: it would be missed by less
 MOST = 4  # effects in one answer
-Tell = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Case:
-    """What the search works on: a nominal rig, and the outputs of its records.
-
-    `refloored` gives the outputs with the floors of another rig.
-    """
-
-    nominal: Rig
-    control: ControlName
-    outputs: Sequence[Output]
-    tell: Tell | None = None
-    refloored: Callable[[Rig], Sequence[Output]] | None = None
-
-    @property
-    def settings(self) -> tuple[Effect, ...]:
-        """The nominal rig's settings that the outputs tell of: nuisances of every fit."""
-        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE}
-        return tuple(s for s in SETTINGS.values() if s.stage in stages)
-
-    @property
-    def neutral(self) -> dict[str, float]:
-        """The settings as the rig file has them."""
-        return {f"{setting.name}.factor": 1.0 for setting in SETTINGS.values()}
-
-    def gaps(self, rig: Rig) -> dict[str, float]:
-        """Return each stage's gap, by the floors of this rig where they are higher."""
-        gaps = stage_gaps(self.outputs, rig)
-        if self.refloored is None or rig == self.nominal:
-            return gaps
-        own = stage_gaps(self.refloored(rig), rig)
-        return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
-
-    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the settings whose number none of these effects frees."""
-        freed = {SETTINGS[effect.name].name for effect in effects if effect.name in SETTINGS}
-        return [setting for setting in self.settings if setting.name not in freed]
-
-    def fit(
-        self,
-        effects: Sequence[Effect],
-        part: Part = "all",
-        start: Mapping[str, float] | None = None,
-    ) -> Fit:
-        """Return the effects fitted, with the settings free within their tolerance."""
-        free = self.nuisances(effects)
-        return fit(self.nominal, self.control, self.outputs, effects, free, part, start)
 
 
 @dataclass(frozen=True)
@@ -110,6 +61,7 @@ class Choice:
     fit: Fit
     settled: Fit
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
+    rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
 
 
 def search(
@@ -124,10 +76,10 @@ def search(
     case = Case(nominal, control, outputs, tell, refloored)
     settled = current = case.fit(())
     steps: list[Step] = []
-    tried: dict[str, float] = {}
+    rounds: list[dict[str, float]] = []
     while len(steps) < MOST:
         ranked = _round(case, settled, current, library)
-        tried = tried or {candidate.effect.name: candidate.gain for candidate in ranked}
+        rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
@@ -141,7 +93,8 @@ def search(
             if needless is best.effect:
                 break
     steps = [_again(case, current, step) if len(steps) > 1 else step for step in steps]
-    return Choice(tuple(steps), current, settled, tried)
+    tried = next((gains for gains in rounds if gains), {})
+    return Choice(tuple(steps), current, settled, tried, tuple(rounds))
 
 
 def _again(case: Case, current: Fit, step: Step) -> Step:
@@ -225,11 +178,11 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         if effect not in current.effects and guilty & set(shows_in(effect))
     ]
     found = []
-    screened = _screened(case, current, candidates)
-    for i, effect in enumerate(screened):
+    screened = screen(case, current, candidates)
+    for i, (effect, start) in enumerate(screened):
         if case.tell is not None:
             case.tell(f"fitting {effect.name}", i, len(screened))
-        fitted = case.fit((*current.effects, effect), "fitted", current.values)
+        fitted = case.fit((*current.effects, effect), "fitted", {**current.values, **start})
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
@@ -263,26 +216,3 @@ def ranked_by_gain(
         gain = float(sum(n * np.log(b / a) for n, b, a in terms))
         ranked.append(Candidate(gain, effect, fitted))
     return sorted(ranked, key=lambda candidate: -candidate.gain)
-
-
-def _screened(case: Case, current: Fit, candidates: Sequence[Effect]) -> list[Effect]:
-    """Return the candidates whose signature takes most of the residual, by projection."""
-    scores = []
-    outputs = case.outputs
-    for effect in candidates:
-        ours = touched(outputs, [effect])
-        now = np.concatenate([o.residual(current.rig) for o in ours])
-        best = 0.0
-        for i in range(max(len(p.starts) for p in effect.parameters)):
-            values = dict(current.values)
-            for p in effect.free:
-                values[f"{effect.name}.{p.name}"] = p.starts[min(i, len(p.starts) - 1)]
-            chosen = (*current.effects, effect)
-            every = (*chosen, *case.nuisances(chosen))
-            rig = apply(case.nominal, case.control, every, {**case.neutral, **values})
-            sign = now - np.concatenate([o.residual(rig) for o in ours])
-            size = float(sign @ sign)
-            best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
-        scores.append((best, effect))
-    scores.sort(key=lambda item: -item[0])
-    return [effect for _, effect in scores[:SCREENED]]

@@ -23,8 +23,9 @@ from coupled.gap.airframe import (
     spread_of_air,
     surface_points,
 )
+from coupled.gap.case import Case, Tell
 from coupled.gap.checks import check_record
-from coupled.gap.choose import CLEAR, Case, Choice, Tell, bar, search
+from coupled.gap.choose import CLEAR, Choice, bar, search
 from coupled.gap.effects import EFFECTS, STAGES, parameter_name
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.shrink import shrink

@@ -135,7 +135,7 @@ EFFECTS: tuple[Effect, ...] = (
 )
 # A pot is set, and a servo tuned, to a few per cent: no effect, but a nuisance that fits profile
 # out. {the effect that frees the same number: the setting}
-TOLERANCE = {"inertia": 0.02, "viscous_damping": 0.02, "servo_lag": 0.03}
+TOLERANCE = {"inertia": 0.02, "viscous_damping": 0.02, "servo_lag": 0.02}
 
 
 def _setting(effect: str, name: str, field: str) -> Effect:

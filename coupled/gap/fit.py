@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.stats import t as student
 
 from coupled.channels import ControlName
 from coupled.gap.effects import Effect, Parameter, apply
@@ -22,6 +23,7 @@ from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]
 CHANGE = 0.3  # floors by which a difference should move the residual
+MODEL = 0.015  # of an effect's size: what the physics of a right effect is known to be off by
 TRIES = 40  # iterations of a fit
 # The outputs in which an effect of a stage shows.
 TOUCHES = {
@@ -100,7 +102,11 @@ def fit(
         if best is None or found.cost < best.cost:
             best = found
     assert best is not None
-    half = _half_width(best, len(ours)) * scale
+    groups = np.concatenate(
+        [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
+    )
+    half = _half_width(best, len(ours), groups) * scale
+    half = np.hypot(half, [MODEL * _size(p, v) for p, v in zip(frees, best.x * scale, strict=True)])
     values = best.x * scale
     stuck = np.isclose(best.x, low, atol=1e-4) | np.isclose(best.x, high, rtol=1e-4)
     return Fit(
@@ -140,13 +146,29 @@ class _Slopes:
         return np.column_stack(columns)
 
 
-def _half_width(found: Any, outputs: int) -> Floats:
-    """Return half of each scaled parameter's 95 % interval; infinite where nothing tells it."""
+def _size(p: Parameter, value: float) -> float:
+    """Return how far a parameter is from where it does nothing."""
+    return abs(value - 1.0) if p.mode == "factor" else abs(value)
+
+
+def _half_width(found: Any, outputs: int, groups: NDArray[np.intp]) -> Floats:
+    """Return half of each scaled parameter's 95 % interval; infinite where nothing tells it.
+
+    The larger of two: white residuals widened by their memory, and the scatter of the score from
+    stretch to stretch (the sandwich), which counts misfit wherever it sits.
+    """
     jacobian, left = found.jac, found.fun
     rows = len(left) // outputs
     widen = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(np.mean(left**2)) * widen
-    half = 1.96 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    bread = np.linalg.pinv(jacobian.T @ jacobian)
+    plain = np.diag(bread) * float(np.mean(left**2)) * widen
+    names, number = np.unique(groups, return_inverse=True)
+    scores = np.zeros((len(names), jacobian.shape[1]))
+    np.add.at(scores, number, jacobian * left[:, None])
+    spare = max(1, len(names) - jacobian.shape[1])
+    filled = bread @ (scores.T @ scores) @ bread * (len(names) / spare)
+    variance = np.maximum(np.maximum(plain, np.diag(filled)), 0.0)
+    half = student.ppf(0.975, spare) * np.sqrt(variance)
     half[np.linalg.norm(jacobian, axis=0) < 1e-9] = np.inf
     return np.asarray(half)
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from coupled.channels import ControlName, channel, noisy_channels
 from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs, surface_points
-from coupled.gap.choose import Case, Choice, ranked_by_gain
+from coupled.gap.case import Case
+from coupled.gap.choose import Choice, ranked_by_gain
 from coupled.gap.effects import Effect
 from coupled.gap.flown import fly_force
 from coupled.gap.output import Output, white

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from coupled.channels import ControlName
-from coupled.gap.choose import Case, Choice
+from coupled.gap.case import Case
+from coupled.gap.choose import Choice
 from coupled.gap.fit import touched
 from coupled.gap.output import Output
 from coupled.rig.parameters import Rig

@@ -1,0 +1,63 @@
+"""What the search for effects works on, and how it fits: with the settings' tolerance profiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from coupled.channels import ControlName
+from coupled.gap.effects import SETTINGS, Effect
+from coupled.gap.fit import Fit, fit
+from coupled.gap.output import Output, Part, stage_gaps
+from coupled.rig.parameters import Rig
+
+SETTLE = 1.05  # gap from which a stage's settings are worth fitting
+Tell = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the search works on: a nominal rig, and the outputs of its records.
+
+    `refloored` gives the outputs with the floors of another rig.
+    """
+
+    nominal: Rig
+    control: ControlName
+    outputs: Sequence[Output]
+    tell: Tell | None = None
+    refloored: Callable[[Rig], Sequence[Output]] | None = None
+
+    @property
+    def settings(self) -> tuple[Effect, ...]:
+        """The nominal rig's settings that the outputs tell of: nuisances of every fit."""
+        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE}
+        return tuple(s for s in SETTINGS.values() if s.stage in stages)
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """The settings as the rig file has them."""
+        return {f"{setting.name}.factor": 1.0 for setting in SETTINGS.values()}
+
+    def gaps(self, rig: Rig) -> dict[str, float]:
+        """Return each stage's gap, by the floors of this rig where they are higher."""
+        gaps = stage_gaps(self.outputs, rig)
+        if self.refloored is None or rig == self.nominal:
+            return gaps
+        own = stage_gaps(self.refloored(rig), rig)
+        return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
+
+    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the settings whose number none of these effects frees."""
+        freed = {SETTINGS[effect.name].name for effect in effects if effect.name in SETTINGS}
+        return [setting for setting in self.settings if setting.name not in freed]
+
+    def fit(
+        self,
+        effects: Sequence[Effect],
+        part: Part = "all",
+        start: Mapping[str, float] | None = None,
+    ) -> Fit:
+        """Return the effects fitted, with the settings free within their tolerance."""
+        free = self.nuisances(effects)
+        return fit(self.nominal, self.control, self.outputs, effects, free, part, start)

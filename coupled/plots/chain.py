@@ -1,0 +1,139 @@
+"""The signal chain with its gaps, and the residual of the guilty stages over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+
+from coupled.gap.choose import CLEAR
+from coupled.gap.effects import STAGES
+from coupled.gap.output import Output
+from coupled.plots import gapview as look
+from coupled.plots.gapview import View, residual_shown, words
+
+_MOST = 4  # residuals drawn
+_FILL = {"guilty": "#f6d5bf", "clear": "#cfeae0", "not judged": "0.93"}
+_EDGE = {"guilty": look.WRONG, "clear": look.RIGHT, "not judged": "0.6"}
+
+
+def draw_stages(view: View) -> Figure:
+    """Draw where along the chain the gap lies, and the residual there before and after."""
+    outputs = view.suspects()
+    shown = outputs[:_MOST]
+    figure = Figure(figsize=(10.4, 2.1 + 2.1 * len(shown)), layout="constrained")
+    heights = [1.35, *([2.0] * len(shown))]
+    widths = [1.5, 1.0] if view.effects else [1.0]
+    grid = figure.add_gridspec(
+        1 + len(shown), len(widths), height_ratios=heights, width_ratios=widths
+    )
+    _draw_chain(figure.add_subplot(grid[0, :]), view.stages)
+    for i, output in enumerate(shown):
+        for column in range(len(widths)):
+            axes = figure.add_subplot(grid[1 + i, column])
+            _draw_residual(axes, view, output, column == 0)
+            if i == len(shown) - 1:
+                axes.set_xlabel("time, s", fontsize=9)
+    handles, labels = figure.axes[1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8.5)
+    more = len(outputs) - len(shown)
+    rest = f" ({more} narrower residuals are not drawn)" if more else ""
+    figure.suptitle(f"Where the {view.diagnosis.control}'s gap lies{rest}", fontsize=12)
+    return figure
+
+
+def _draw_chain(axes: Any, stages: dict[str, Any]) -> None:
+    """Draw a box a stage, in the order of the chain: its residual over its floor."""
+    axes.set_axis_off()
+    axes.set_xlim(-0.05, len(STAGES) - 0.15)
+    axes.set_ylim(0.0, 1.0)
+    for i, stage in enumerate(STAGES):
+        found = stages.get(stage)
+        state = _state(found)
+        axes.add_patch(
+            FancyBboxPatch(
+                (i, 0.08),
+                0.8,
+                0.84,
+                boxstyle="round,pad=0,rounding_size=0.06",
+                mutation_aspect=1.0,
+                facecolor=_FILL[state],
+                edgecolor=_EDGE[state],
+                linewidth=2.2 if state == "guilty" else 1.2,
+                linestyle="dashed" if state == "not judged" else "solid",
+            )
+        )
+        axes.text(i + 0.4, 0.74, stage, ha="center", va="center", fontsize=9, fontweight="bold")
+        axes.text(i + 0.4, 0.34, _told(found), ha="center", va="center", fontsize=8.5)
+        if i:
+            arrow = {"arrowstyle": "-|>", "color": "0.35", "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", (i, 0.5), (i - 0.2, 0.5), arrowprops=arrow)
+
+
+def _state(found: dict[str, Any] | None) -> str:
+    if found is None or "gap" not in found:
+        return "not judged"
+    return "guilty" if found["guilty"] else "clear"
+
+
+def _told(found: dict[str, Any] | None) -> str:
+    if found is None:
+        return "not in\nthis record"
+    if "gap" not in found:
+        return "not judged:\n" + ("channels lack" if found["missing"] else "never moves")
+    text = f"{found['gap']:.3g} × floor"
+    if not found["guilty"] and found["gap"] < CLEAR:
+        return f"{text}\nclear"
+    better = found.get("left", np.inf) < found["gap"]
+    return f"{text}\nthen {found['left']:.3g} ×" if better else text
+
+
+def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
+    """Draw a residual over time, before and after (`wide`), or what is left of it alone."""
+    scale, unit = residual_shown(output.channel)
+    factor, time = scale * output.floor, view.time(output)
+    before = factor * output.residual(view.diagnosis.nominal)
+    after = factor * output.residual(view.diagnosis.improved)
+    improved = bool(view.effects)
+    _shade_held(axes, output, time)
+    axes.axhspan(
+        -2.0 * factor,
+        2.0 * factor,
+        color="0.75",
+        alpha=0.6,
+        linewidth=0.0,
+        label="± 2 floors of noise",
+    )
+    if wide:
+        clear = view.diagnosis.found["verdict"] == "no_gap"
+        color = look.RIGHT if clear else look.WRONG
+        axes.plot(time, before, color=color, linewidth=0.9, label="measured less nominal")
+        title = f"{output.stage}: {words(output.channel)}{view.source(output)}"
+        axes.set_title(title, fontsize=9, loc="left")
+    if improved:
+        axes.plot(time, after, color=look.RIGHT, linewidth=0.8, label="with the effects found")
+    if not wide:
+        reach = max(4.0 * factor, 1.1 * float(np.percentile(np.abs(after), 99.5)))
+        axes.set_ylim(-reach, reach)
+        axes.set_title("close up: what is left", fontsize=9, loc="left")
+    axes.set_xlim(time[0], time[-1])
+    axes.set_ylabel(f"residual, {unit}", fontsize=9)
+    axes.tick_params(labelsize=8)
+    axes.grid(alpha=0.25)
+
+
+def _shade_held(axes: Any, output: Output, time: Any) -> None:
+    """Shade the stretches that no fit saw."""
+    edges = np.diff(np.concatenate(([0], output.rows("held").astype(int), [0])))
+    starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
+    for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        axes.axvspan(
+            time[start],
+            time[end],
+            color=look.SHADE,
+            linewidth=0.0,
+            zorder=0,
+            label="held out of the fit" if i == 0 else None,
+        )

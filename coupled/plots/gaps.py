@@ -1,0 +1,26 @@
+"""The figures of a diagnosis: the ladder, the chain of stages, the effect's signature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from matplotlib.figure import Figure
+
+from coupled.gap.diagnose import Diagnosis
+from coupled.plots.chain import draw_stages
+from coupled.plots.gapview import View
+from coupled.plots.ladder import draw_ladder
+from coupled.plots.signatures import draw_signature
+from coupled.record import Record
+
+FIGURES = {
+    "ladder.png": draw_ladder,
+    "stages.png": draw_stages,
+    "signature.png": draw_signature,
+}
+
+
+def draw_diagnosis(diagnosis: Diagnosis, records: Mapping[str, Record]) -> dict[str, Figure]:
+    """Draw a diagnosis of these records: the figures by their files' names."""
+    view = View(diagnosis, tuple(records.values()), tuple(records))
+    return {name: draw(view) for name, draw in FIGURES.items()}

@@ -1,0 +1,185 @@
+"""What the figures of a gap share: their colours, their units, and the rigs between the rungs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from coupled.channels import CONTROL_NAMES, channel
+from coupled.gap.airframe import surface_points
+from coupled.gap.choose import CLEAR, bar
+from coupled.gap.diagnose import Diagnosis
+from coupled.gap.effects import SETTINGS, Effect, apply
+from coupled.gap.fit import shows_in
+from coupled.gap.output import Floats, Output, white
+from coupled.gap.stages import Reader
+from coupled.record import Record
+from coupled.rig.parameters import Rig
+from coupled.rig.replay import replay_compensation
+from coupled.units import DEGREE_rad
+
+# Okabe and Ito's colours, as in the other figures: what is wrong is vermilion, what is right green.
+MEASURED, WRONG, RIGHT, RIVAL = "black", "#d55e00", "#009e73", "#0072b2"
+FAINT, SHADE = "0.6", "#e4ecf4"
+_UNITS = {
+    "N_per_m": (1.0, "N/m"),
+    "N_per_rad": (DEGREE_rad, "N/°"),
+    "rad_per_s": (1.0 / DEGREE_rad, "°/s"),
+    "m_per_s": (1.0, "m/s"),
+    "rad": (1.0 / DEGREE_rad, "°"),
+    "Pa": (1e-3, "kPa"),
+    "m": (100.0, "cm"),
+    "N": (1.0, "N"),
+}
+_WORDS = {
+    "computed": "computed deflection δc",
+    "deflection": "deflection δ at the grip",
+    "estimate": "host's estimate δ̂",
+    "gradient": "scheduled gradient G_T",
+    "modifying_force": "modifying force F_mod",
+    "force": "pilot's force F",
+    "elevator": "elevator",
+    "pitch_rate": "pitch rate",
+    "alpha": "angle of attack",
+    "dynamic_pressure": "dynamic pressure q̄",
+}
+
+
+def unit_shown(name: str) -> tuple[float, str]:
+    """Return the factor and the unit in which a channel is drawn."""
+    for ending, shown in _UNITS.items():
+        if name.endswith("_" + ending):
+            return shown
+    return 1.0, "g" if name == "load_factor" else "1"
+
+
+def residual_shown(name: str) -> tuple[float, str]:
+    """Return the factor and the unit in which a channel's residual is drawn: small, so mm."""
+    factor, unit = unit_shown(name)
+    return (10.0 * factor, "mm") if unit == "cm" else (factor, unit)
+
+
+def words(name: str) -> str:
+    """Return a channel in words, with its symbol."""
+    first, rest = name.split("_", 1)
+    bare = rest if first in CONTROL_NAMES else name
+    for start in sorted(_WORDS, key=len, reverse=True):
+        if bare.startswith(start):
+            return _WORDS[start]
+    return plain(bare)
+
+
+def plain(name: str) -> str:
+    """Return an effect's or a stage's name in words."""
+    return name.replace("_", " ")
+
+
+def joined(stage: str) -> str:
+    """Return the stage that an output is shown at: F_mod is the loader's, though judged apart."""
+    return "loader" if stage == "multiplier" else stage
+
+
+def style_of(kind: str) -> dict[str, Any]:
+    """Return how a line is drawn: measured, wrong (before), right (after) or rival."""
+    styles: dict[str, dict[str, Any]] = {
+        "measured": {"color": "0.7", "linewidth": 4.5, "zorder": 1.5},
+        "wrong": {"color": WRONG, "linewidth": 1.4, "linestyle": "dashed"},
+        "right": {"color": RIGHT, "linewidth": 1.5},
+        "rival": {"color": RIVAL, "linewidth": 1.4, "linestyle": "dotted"},
+    }
+    return styles[kind]
+
+
+@dataclass(frozen=True)
+class View:
+    """A diagnosis beside its records, as the figures ask for it."""
+
+    diagnosis: Diagnosis
+    records: tuple[Record, ...]
+    files: tuple[str, ...]
+
+    @property
+    def stages(self) -> dict[str, Any]:
+        """What was found at each stage."""
+        found: dict[str, Any] = self.diagnosis.found["stages"]
+        return found
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects found, in the order in which they were."""
+        return tuple(step.effect for step in self.diagnosis.choice.steps)
+
+    def rig_with(self, effects: Sequence[Effect]) -> Rig:
+        """Return the rig with some of the effects found, at the sizes of the final fit."""
+        told = self.diagnosis
+        if not effects:
+            return told.nominal
+        if set(effects) == set(self.effects):
+            return told.improved
+        values = told.choice.fit.values
+        settings = [s for s in SETTINGS.values() if f"{s.name}.factor" in values]
+        return apply(told.nominal, told.control, (*effects, *settings), values)
+
+    def rungs(self) -> list[tuple[str, Rig]]:
+        """Return the rigs from the nominal one to the improved, an effect more at a time."""
+        found = [("nominal", self.diagnosis.nominal)]
+        for k, effect in enumerate(self.effects):
+            found.append((f"+ {plain(effect.name)}", self.rig_with(self.effects[: k + 1])))
+        return found
+
+    def threshold(self, stage: str) -> float:
+        """Return the gap up to which a stage counts as explained."""
+        settled = self.stages.get(stage, {}).get("settled")
+        return CLEAR if settled is None else bar(settled)
+
+    def suspects(self) -> list[Output]:
+        """Return the outputs of guilty stages and of the effects found, widest gap first.
+
+        Those within their floor are left out, unless all are.
+        """
+        guilty = {stage for stage, found in self.stages.items() if found.get("guilty")}
+        for effect in self.effects:
+            guilty |= {joined(stage) for stage in shows_in(effect)}
+        every = [*self.diagnosis.outputs, *self._host()]
+        ours = [output for output in every if joined(output.stage) in guilty] or every
+        known = [(max(o.gap(self.diagnosis.nominal), self._left(o)), o) for o in ours]
+        known.sort(key=lambda pair: -pair[0])
+        wide = [output for gap, output in known if gap > CLEAR]
+        return wide or [output for _, output in known]
+
+    def _left(self, output: Output) -> float:
+        return output.gap(self.diagnosis.improved)
+
+    def _host(self) -> list[Output]:
+        """Return the host's own arithmetic as an output, where it is guilty: nothing fits it."""
+        if not self.stages.get("compensation", {}).get("guilty"):
+            return []
+        return [_arithmetic(reader) for reader in self.readers(self.diagnosis.nominal)]
+
+    def readers(self, rig: Rig) -> list[Reader]:
+        """Return what reads the stages' inputs off each record."""
+        control = self.diagnosis.control
+        return [Reader(rig, r, control, surface_points, i) for i, r in enumerate(self.records)]
+
+    def time(self, output: Output) -> Floats:
+        """Return the time of an output's frames, in s from the record's start."""
+        time = self.records[output.record].time_s
+        return np.asarray(time - time[0])
+
+    def source(self, output: Output) -> str:
+        """Return the file that an output is of, where there are several."""
+        return "" if len(self.files) < 2 else f" ({self.files[output.record]})"
+
+
+def _arithmetic(reader: Reader) -> Output:
+    computed, force = reader.signal("computed"), reader.signal("force")
+    estimate = reader.signal("estimate")
+
+    def predict(rig: Rig) -> Floats:
+        return replay_compensation(rig, reader.control, computed, force)
+
+    name, rate = channel(reader.control, "estimate"), reader.rig.frame_rate
+    return Output("compensation", name, estimate, predict, white(computed), rate, reader.number)

@@ -1,0 +1,274 @@
+"""The ladder of a diagnosis: what was tried in each round, and how far each rung leads down."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from coupled.gap.airframe import can_tell_air
+from coupled.gap.choose import LEAST_GAIN, RIVAL, Step
+from coupled.gap.effects import EFFECTS
+from coupled.gap.fit import shows_in
+from coupled.gap.output import stage_gaps
+from coupled.plots import gapview as look
+from coupled.plots.gapview import View, joined, plain
+
+_COLORS = {
+    "schedule": "#cc79a7",
+    "loader": "#0072b2",
+    "linkage": "#d55e00",
+    "compensation": "#e69f00",
+    "surface": "#009e73",
+    "airframe": "black",
+}
+_LINEAR = 10.0  # gain up to which the axis is linear
+_ROOM = 12.0  # beyond the bars, for their numbers
+_HALF = 0.38  # of a rung's width
+Gaps = list[dict[str, float]]
+
+
+def draw_ladder(view: View) -> Figure:
+    """Draw the gains of every effect tried, the gap from rung to rung, and what was found."""
+    rounds = [gains for gains in view.diagnosis.choice.rounds if gains]
+    gaps = _all_gaps(view)
+    heights = [len(gains) + 1.6 for gains in rounds] or [4.0]
+    numbers = _numbers(view)
+    height = max(5.2, 1.1 + 0.27 * sum(heights))
+    figure = Figure(figsize=(10.4, min(height, 14.0)), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=[1.15, 1.0], squeeze=False)[0]
+    if rounds:
+        grid = left.subplots(len(rounds), 1, height_ratios=heights, sharex=True, squeeze=False)
+        for k, axes in enumerate(grid[:, 0]):
+            _draw_round(axes, view, k, rounds, gaps)
+        _finish_gains(left, grid[:, 0], rounds)
+    else:
+        _say(left.subplots(), "No stage stands clear of its floor:\nno effect was tried.")
+    rungs, table = right.subplots(2, 1, height_ratios=[3.0, max(1.0, 0.3 * (len(numbers) + 1))])
+    _draw_rungs(rungs, view, gaps)
+    _draw_numbers(table, numbers)
+    verdict = plain(view.diagnosis.found["verdict"]).replace("effect", "explained")
+    figure.suptitle(f"Ladder of the {view.diagnosis.control}'s gap: {verdict}", fontsize=12)
+    return figure
+
+
+def _all_gaps(view: View) -> Gaps:
+    """Return the stages' gaps rung by rung; at the last as the diagnosis has what is left."""
+    gaps = [_gaps(view, rig) for _, rig in view.rungs()]
+    if view.effects:
+        gaps[-1] = {s: view.stages.get(s, {}).get("left", gap) for s, gap in gaps[-1].items()}
+    return gaps
+
+
+def _gaps(view: View, rig: Any) -> dict[str, float]:
+    """Return each stage's gap with a rig."""
+    found: dict[str, float] = {}
+    for stage, gap in stage_gaps(view.diagnosis.outputs, rig).items():
+        found[joined(stage)] = max(found.get(joined(stage), 0.0), gap)
+    return found
+
+
+def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Step | None:
+    """Return the step that a round gave, if any: a step found since in no later round."""
+    later = {name for gains in rounds[k + 1 :] for name in gains}
+    least = max(LEAST_GAIN, max(rounds[k].values()) - RIVAL)
+    for step in view.diagnosis.choice.steps:
+        name = step.effect.name
+        if name not in later and rounds[k].get(name, -np.inf) >= least:
+            return step
+    return None
+
+
+def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], gaps: Gaps) -> None:
+    gains = sorted(rounds[k].items(), key=lambda item: item[1])
+    step = _winner(view, k, rounds)
+    rivals = {rival.effect.name for rival in step.rivals} if step else set()
+    for place, (name, gain) in enumerate(gains):
+        found = step is not None and name == step.effect.name
+        style: dict[str, Any] = {"color": look.RIGHT} if found else {"color": "0.78"}
+        if name in rivals:
+            style = {"facecolor": "white", "edgecolor": look.RIVAL, "hatch": "////"}
+        axes.barh(place, gain, 0.72, **style)
+        _write_gain(axes, place, gain, "bold" if found else "normal")
+    axes.set_yticks(range(len(gains)), [plain(name) for name, _ in gains], fontsize=8)
+    axes.set_ylim(-0.7, len(gains) - 0.3)
+    axes.axvline(0.0, color="black", linewidth=0.8)
+    axes.axvline(LEAST_GAIN, color=look.WRONG, linewidth=1.2, linestyle=(0, (4, 2)))
+    axes.set_title(_headline(k, step), fontsize=9, loc="left")
+    axes.grid(alpha=0.25, axis="x")
+    out = _screened(view, rounds[k], gaps[min(k, len(gaps) - 1)])
+    if out:
+        text = "screened out: " + ", ".join(plain(name) for name in out)
+        axes.set_xlabel("\n".join(textwrap.wrap(text, 74)), fontsize=7, color="0.45", loc="left")
+
+
+def _headline(k: int, step: Step | None) -> str:
+    if step is None:
+        return f"round {k + 1}: nothing earns its place"
+    rivals = " or ".join(plain(rival.effect.name) for rival in step.rivals)
+    doubt = f" (or {rivals})" if rivals else ""
+    return f"round {k + 1}: {plain(step.effect.name)}{doubt}"
+
+
+def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
+    side = 1 if gain >= 0.0 else -1
+    axes.annotate(
+        f"{gain:.3g}" if abs(gain) < 1000 else f"{gain:.0f}",
+        (gain, place),
+        textcoords="offset points",
+        xytext=(3 * side, 0),
+        ha="left" if side > 0 else "right",
+        va="center",
+        fontsize=7.5,
+        fontweight=weight,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )
+
+
+def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> None:
+    """Set the shared axis, with room for the numbers at the bars' ends, and the legend."""
+    every = [gain for gains in rounds for gain in gains.values()]
+    last = column[-1]
+    last.set_xscale("symlog", linthresh=_LINEAR, linscale=0.8)
+    last.set_xlim(min(-_LINEAR, _ROOM * min(every)), _ROOM * max(LEAST_GAIN, *every))
+    left, right = last.get_xlim()
+    span = [-1e6, -1e4, -100, 0, 100, 1e4, 1e6]
+    if right < 1e3 and left > -1e3:
+        span = [-100, -10, 0, 10, 100]
+    ticks = [tick for tick in span if left <= tick <= right]
+    last.set_xticks(ticks, [f"{tick:,.0f}".replace(",", " ") for tick in ticks], fontsize=8)
+    last.minorticks_off()
+    figure.supxlabel("gain on stretches not fitted to, log-likelihood", fontsize=9)
+    marks = [
+        _bar(last, {"color": look.RIGHT}, "found"),
+        _bar(last, {"facecolor": "white", "edgecolor": look.RIVAL, "hatch": "////"}, "rival"),
+        _bar(last, {"color": "0.78"}, "tried"),
+        last.plot([], [], color=look.WRONG, linestyle=(0, (4, 2)), label=f"least, {LEAST_GAIN:g}")[
+            0
+        ],
+    ]
+    figure.legend(handles=marks, loc="outside upper center", ncols=4, fontsize=8, frameon=False)
+
+
+def _bar(axes: Any, style: dict[str, Any], label: str) -> Any:
+    return axes.barh([np.nan], [0.0], label=label, **style)
+
+
+def _screened(view: View, tried: dict[str, float], gaps: dict[str, float]) -> list[str]:
+    """Return the effects of the stages then guilty that were not worth a fit, or hit a bound."""
+    guilty = {stage for stage, gap in gaps.items() if gap > view.threshold(stage)}
+    known = {effect.name for effect in view.effects}
+    airs = can_tell_air(view.records)
+    return [
+        effect.name
+        for effect in EFFECTS
+        if effect.name not in tried
+        and effect.name not in known
+        and guilty & {joined(stage) for stage in shows_in(effect)}
+        and (airs or effect.name != "vertical_gust")
+    ]
+
+
+def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
+    """Draw each suspect stage's gap from the nominal rig down to the improved one."""
+    names = [name for name, _ in view.rungs()]
+    suspects = {joined(output.stage) for output in view.suspects()}
+    stages = [stage for stage in _COLORS if stage in suspects and stage in gaps[0]]
+    places = np.arange(len(names))
+    for i, stage in enumerate(stages):
+        color, way = _COLORS[stage], [gap.get(stage, np.nan) for gap in gaps]
+        half = _HALF / len(stages)
+        at = places - _HALF + (2 * i + 1) * half
+        axes.step(at, way, where="mid", color=color, linewidth=0.9, linestyle=(0, (2, 2)))
+        axes.hlines(way, at - 0.9 * half, at + 0.9 * half, color=color, linewidth=3.5, label=stage)
+        for place, gap in zip(at, way, strict=True):
+            axes.annotate(
+                f"{gap:.3g}",
+                (place, gap),
+                (0, 4 if gap >= 1.0 else -4),  # clear of the floor's own line
+                textcoords="offset points",
+                ha="center",
+                va="bottom" if gap >= 1.0 else "top",
+                fontsize=8,
+                color=color,
+            )
+        axes.axhline(view.threshold(stage), color=color, linewidth=0.8, linestyle="dotted")
+    axes.axhline(1.0, color="black", linewidth=1.2)
+    top = max(max(gap.get(stage, 1.0) for stage in stages) for gap in gaps) if stages else 2.0
+    axes.set_yscale("log")
+    axes.set_ylim(0.72, max(2.0, 1.6 * top))
+    ticks = [
+        t
+        for t in (
+            1,
+            *((1.2, 1.5) if top < 2.0 else ()),
+            2,
+            5,
+            10,
+            20,
+            50,
+            100,
+            200,
+            500,
+            1000,
+            2000,
+            5000,
+        )
+        if t <= 1.6 * top
+    ]
+    axes.set_yticks(ticks, [str(tick) for tick in ticks], fontsize=8)
+    axes.minorticks_off()
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_xticks(places, ["\n".join(textwrap.wrap(name, 16)) for name in names], fontsize=8)
+    axes.set_ylabel("residual over its noise floor, 1", fontsize=9)
+    axes.set_title(
+        "gap from rung to rung\n(black: floor of noise; dotted: explained below it)",
+        fontsize=9,
+        loc="left",
+    )
+    axes.grid(alpha=0.25, axis="y")
+    if stages:
+        axes.legend(fontsize=8, loc="upper right", frameon=False)
+
+
+def _numbers(view: View) -> list[tuple[str, str, str]]:
+    """Return a line an effect, and one a parameter: its name, its value, its 95 % interval."""
+    lines = []
+    for effect in view.diagnosis.found["effects"]:
+        lines.append((f"{plain(effect['name'])}, p = {effect['probability']:.2f}", "", ""))
+        for name, found in effect["parameters"].items():
+            ends = [found["low"], found["high"]]
+            interval = "not told" if None in ends else f"{ends[0]:.4g} to {ends[1]:.4g}"
+            lines.append((f"    {name}", f"{found['value']:.4g}", interval))
+    return lines
+
+
+def _draw_numbers(axes: Any, lines: list[tuple[str, str, str]]) -> None:
+    if not lines:
+        _say(axes, "No effect found.")
+        return
+    axes.set_axis_off()
+    heads = ("effect", "value", "95 % interval")
+    table = axes.table(
+        cellText=lines,
+        colLabels=heads,
+        loc="upper center",
+        cellLoc="left",
+        colLoc="left",
+        colWidths=[0.45, 0.2, 0.35],
+        edges="horizontal",
+    )
+    table.auto_set_font_size(False)
+    table.set_fontsize(7.5)
+    for (row, _), cell in table.get_celld().items():
+        cell.set_linewidth(0.5)
+        cell.PAD = 0.02
+        if row == 0:
+            cell.set_text_props(fontweight="bold")
+
+
+def _say(axes: Any, text: str) -> None:
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes, fontsize=10)

@@ -1,0 +1,248 @@
+"""The signals that make an effect visible, as measured and as a rig has them.
+
+Each is computed in the same way from the record (`rig` None) and from what a rig predicts of it,
+so that the three curves of a figure differ by the rig alone. What is "missing" or "left" is so
+with respect to the scene's base: the rig without the effect that the scene is of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupled.channels import channel, unit_of
+from coupled.gap.airframe import surface_points, vertical_air
+from coupled.gap.output import Floats, Output
+from coupled.gap.smooth import rate_of, smoothed
+from coupled.gap.stages import Reader
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Loader, Rig
+from coupled.rig.replay import replay_product, replay_surface
+from coupled.units import DEGREE_rad
+
+LITTLE = 10.0  # % of the surface's travel under which a ratio of commands says nothing
+
+STICKS = 0.1  # of a signal's own size, under which its side is not sure
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One record, its outputs, and the base: the rig without the effect looked for."""
+
+    reader: Reader
+    outputs: tuple[Output, ...]
+
+    @property
+    def base(self) -> Rig:
+        """The rig without the effect."""
+        return self.reader.rig
+
+    @property
+    def loader(self) -> Loader:
+        """The base's loader."""
+        return self.base.controls[self.reader.control].loader
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames a second, Hz."""
+        return self.base.frame_rate
+
+    @property
+    def fine(self) -> float:
+        """Factor to the unit of small deflections: mm, or ° of a wheel."""
+        return 1000.0 if unit_of(self.reader.control) == "m" else 1.0 / DEGREE_rad
+
+    @property
+    def coarse(self) -> float:
+        """Factor to the unit of what is per deflection: m, or ° of a wheel."""
+        return 1.0 if unit_of(self.reader.control) == "m" else 1.0 / DEGREE_rad
+
+    def channel(self, quantity: str) -> str:
+        """Return the channel of a quantity of the control; any other is one already."""
+        try:
+            return channel(self.reader.control, quantity)
+        except KeyError:
+            return quantity
+
+    def rate(self, signal: Floats) -> Floats:
+        """Return a signal's rate of change a second."""
+        return rate_of(signal, self.frame_rate)
+
+    def raw(self, quantity: str, rig: Rig | None) -> Floats:
+        """Return an output as measured, or as a rig predicts it; KeyError where there is none."""
+        name = self.channel(quantity)
+        for output in self.outputs:
+            if output.channel == name:
+                return output.measured if rig is None else output.predict(rig)
+        raise KeyError(name)
+
+    def seen(self, quantity: str, rig: Rig | None) -> Floats:
+        """Return the same without its white noise."""
+        return smoothed(self.raw(quantity, rig))
+
+    def told(self, quantity: str) -> Floats:
+        """Return a measured channel without its white noise; KeyError where there is none."""
+        return smoothed(self.recorded(quantity))
+
+    def recorded(self, quantity: str) -> Floats:
+        """Return a measured channel as it is; KeyError with its name where there is none."""
+        name = self.channel(quantity)
+        if name not in self.reader.record:
+            raise KeyError(name)
+        return self.reader.record[name]
+
+
+def _computed(scene: Scene, rig: Rig | None) -> Floats:
+    """Return δc; as measured where no loader could be judged."""
+    try:
+        seen = scene.seen("computed", rig)
+    except KeyError:
+        seen = scene.told("computed")
+    return seen / scene.base.controls[scene.reader.control].sensing.deflection_scale
+
+
+def _missing(scene: Scene, rig: Rig | None) -> Floats:
+    """Return F − m·δc'' − c·δc' − G_B·δc − F_mod with the base's numbers, in N.
+
+    What else the base has is taken off too; NaN where its dry friction or its breakout holds,
+    and may be anything up to its size.
+    """
+    at = _computed(scene, rig)
+    speed, loader = scene.rate(at), scene.loader
+    control, gradient, second = scene.reader.control, scene.reader.gradient(), scene.reader.second()
+    product = replay_product(scene.base, control, at, gradient, second)
+    moved = loader.mass * scene.rate(speed) + loader.damping * speed
+    held = loader.friction * np.sign(speed) + loader.breakout * np.sign(at) - loader.offset
+    if loader.bob_weight:
+        held = held + loader.bob_weight * (scene.told("load_factor") - 1.0)
+    spring = loader.basic_gradient * at + loader.cubic * at**3
+    left = scene.told("force") - moved - spring - product - held
+    sticks = (loader.friction > 0.0) & (np.abs(speed) < STICKS * np.std(speed))
+    sticks |= (loader.breakout > 0.0) & (np.abs(at) < STICKS * np.std(at))
+    return np.where(sticks, np.nan, left)
+
+
+def _against_base(quantity: str) -> Callable[[Scene, Rig | None], Floats]:
+    def left(scene: Scene, rig: Rig | None) -> Floats:
+        return scene.raw(quantity, rig) - scene.raw(quantity, scene.base)
+
+    return left
+
+
+def _bent(scene: Scene, rig: Rig | None) -> Floats:
+    """Return δ less the base's servo: what the structure gives under F."""
+    return _against_base("deflection")(scene, rig) + scene.loader.bend * scene.told("force")
+
+
+def _servo_speed(scene: Scene, rig: Rig | None) -> Floats:
+    unbent = scene.seen("deflection", rig) - scene.loader.bend * scene.told("force")
+    return scene.fine * scene.rate(unbent)
+
+
+def _answer(scene: Scene, rig: Rig | None) -> Floats:
+    """Return the command that the surface's position answers to, % about trim, pull positive."""
+    commands, positions = surface_points(scene.base)
+    order = np.argsort(positions)
+    position = scene.raw("elevator_rad", rig)
+    sign = COMMAND_SIGN[scene.base.controls[scene.reader.control].surface]
+    return np.asarray(100.0 * sign * np.interp(position, positions[order], commands[order]))
+
+
+def _wanted(scene: Scene) -> Floats:
+    """Return the command that the base gives the surface, a frame later, in %."""
+    control = scene.reader.control
+    believed, pressure = scene.recorded("estimate"), scene.recorded("dynamic_pressure_Pa")
+    commands = replay_surface(scene.base, control, believed, pressure)
+    sign = COMMAND_SIGN[scene.base.controls[control].surface]
+    return 100.0 * sign * np.concatenate(([0.0], commands[:-1]))
+
+
+def _ratio(scene: Scene, rig: Rig | None) -> Floats:
+    """Return how much of the command the surface does; NaN where little is asked."""
+    wanted, answer = _wanted(scene), _answer(scene, rig)
+    asked = np.abs(wanted) > LITTLE
+    ratio = np.full(len(wanted), np.nan)
+    ratio[asked] = answer[asked] / wanted[asked]
+    return ratio
+
+
+def _air(scene: Scene, rig: Rig | None) -> Floats:
+    found = vertical_air(scene.reader.record, 1.0 / scene.frame_rate)
+    if found is None:
+        raise KeyError("altitude_m")
+    return found
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal: what it is, its unit ({d} mm or °, {D} m or °), and how it is come by."""
+
+    label: str
+    unit: str
+    get: Callable[[Scene, Rig | None], Floats]
+
+    def words(self, control: str) -> str:
+        """Return the label with its unit on a control."""
+        small, large, tiny = ("mm", "m", "µm") if unit_of(control) == "m" else ("°", "°", "0.001°")
+        return f"{self.label}, {self.unit.format(d=small, D=large, u=tiny)}"
+
+
+def _noise(scene: Scene, rig: Rig | None) -> Floats:
+    read = scene.recorded("computed")
+    return 1000.0 * scene.fine * (read - smoothed(read))
+
+
+SIGNALS: dict[str, Signal] = {
+    "speed": Signal("deflection rate δc′", "{d}/s", lambda s, r: s.fine * s.rate(_computed(s, r))),
+    "acceleration": Signal(
+        "acceleration δc″", "{D}/s²", lambda s, r: s.coarse * s.rate(s.rate(_computed(s, r)))
+    ),
+    "computed": Signal("computed deflection δc", "{d}", lambda s, r: s.fine * _computed(s, r)),
+    "missing": Signal("missing force\nF − m·δc″ − c·δc′ − G_B·δc − F_mod", "N", _missing),
+    "force": Signal("pilot's force F", "N", lambda s, r: s.told("force")),
+    "load": Signal("load factor beyond 1", "g", lambda s, r: s.told("load_factor") - 1.0),
+    "pressure": Signal(
+        "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.told("dynamic_pressure_Pa")
+    ),
+    "gradient": Signal(
+        "scheduled gradient G_T", "N/{D}", lambda s, r: s.raw("gradient", r) / s.coarse
+    ),
+    "computed_left": Signal(
+        "δc beyond the loader's", "{d}", lambda s, r: s.fine * _against_base("computed")(s, r)
+    ),
+    "product_left": Signal("F_mod beyond ΔG·δc", "N", _against_base("modifying_force")),
+    "noise": Signal("noise of δc as read", "{u}", _noise),
+    "bent": Signal("bend δ − x", "{d}", lambda s, r: s.fine * _bent(s, r)),
+    "deflection_left": Signal(
+        "rest of the grip δ − x − K·F",
+        "{d}",
+        lambda s, r: s.fine * _against_base("deflection")(s, r),
+    ),
+    "deflection": Signal("grip δ", "{d}", lambda s, r: s.fine * s.seen("deflection", r)),
+    "servo_speed": Signal("rate of the servo (δ − K·F)′", "{d}/s", _servo_speed),
+    "wanted": Signal("elevator commanded about trim", "%", lambda s, r: _wanted(s)),
+    "wanted_rate": Signal("rate of the command", "%/s", lambda s, r: s.rate(smoothed(_wanted(s)))),
+    "answer_left": Signal(
+        "elevator's answer less its command", "%", lambda s, r: _answer(s, r) - _wanted(s)
+    ),
+    "answer_rate": Signal(
+        "rate of the elevator's answer", "%/s", lambda s, r: s.rate(smoothed(_answer(s, r)))
+    ),
+    "ratio": Signal("elevator's answer over its command", "1", _ratio),
+    "elevator": Signal(
+        "elevator about trim",
+        "°",
+        lambda s, r: (s.told("elevator_rad") - s.told("elevator_rad")[0]) / DEGREE_rad,
+    ),
+    "pitch_rate": Signal(
+        "pitch rate", "°/s", lambda s, r: s.seen("pitch_rate_rad_per_s", r) / DEGREE_rad
+    ),
+    "pitch_left": Signal(
+        "pitch rate beyond the model's",
+        "°/s",
+        lambda s, r: _against_base("pitch_rate_rad_per_s")(s, r) / DEGREE_rad,
+    ),
+    "air": Signal("rise of the air", "m/s", _air),
+}

@@ -1,0 +1,252 @@
+"""What makes the named effect visible: its own law, measured and as the rigs have it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from coupled.gap.effects import Effect
+from coupled.gap.fit import touched
+from coupled.gap.output import Floats, Output
+from coupled.plots import gapview as look
+from coupled.plots.gapview import View, plain, style_of, unit_shown, words
+from coupled.plots.signals import SIGNALS, Scene
+from coupled.plots.structure import draw_structure
+from coupled.rig.parameters import Rig
+
+Kind = Literal["law", "loop", "time"]
+_EDGE = 12  # frames at a record's ends that a derivative spoils
+_BINS = 36
+_FEW = 4  # of them, at the least, under one median
+_DOTS = 3000
+_LOOP_s = 5.0
+_WHOLE_s = 1e4
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How an effect is drawn: y against x as a law, a loop or over time; and its zoom's length."""
+
+    x: str
+    y: str
+    kind: Kind = "law"
+    zoom_s: float = 2.5
+
+
+SIGNATURES: dict[str, Signature] = {
+    "pressure_lag": Signature("pressure", "gradient", "loop", 6.0),
+    "pressure_scale": Signature("pressure", "gradient", zoom_s=_WHOLE_s),
+    "schedule_slope": Signature("pressure", "gradient", zoom_s=_WHOLE_s),
+    "coulomb_friction": Signature("speed", "missing"),
+    "stribeck_friction": Signature("speed", "missing"),
+    "viscous_damping": Signature("speed", "missing"),
+    "inertia": Signature("acceleration", "missing", zoom_s=1.5),
+    "gradient_error": Signature("computed", "missing"),
+    "cubic_stiffness": Signature("computed", "missing"),
+    "breakout": Signature("computed", "missing"),
+    "bob_weight": Signature("load", "missing"),
+    "force_offset": Signature("computed", "missing"),
+    "digital_multiplier": Signature("noise", "product_left", zoom_s=0.3),
+    "transport_delay": Signature("speed", "computed_left", zoom_s=1.0),
+    "deflection_scale": Signature("computed", "computed_left"),
+    "bend": Signature("force", "bent"),
+    "stiffening_bend": Signature("force", "bent"),
+    "backlash": Signature("computed", "deflection_left", "loop"),
+    "servo_lag": Signature("speed", "deflection_left", zoom_s=0.8),
+    "servo_rate_limit": Signature("speed", "servo_speed", zoom_s=1.5),
+    "arc_geometry": Signature("deflection", "deflection_left"),
+    "cable_stretch": Signature("pressure", "ratio"),
+    "surface_lag": Signature("wanted_rate", "answer_left", zoom_s=1.5),
+    "surface_rate_limit": Signature("wanted_rate", "answer_rate", zoom_s=1.5),
+    "surface_freeplay": Signature("wanted", "answer_left", "loop"),
+    "rigging_offset": Signature("wanted", "answer_left"),
+    "elevator_effectiveness": Signature("elevator", "pitch_rate", "loop", 4.0),
+    "pitch_damping": Signature("pitch_rate", "pitch_left", zoom_s=4.0),
+    "vertical_gust": Signature("", "air", "time", 6.0),
+}
+
+
+@dataclass(frozen=True)
+class _Model:
+    """A rig that is drawn beside the measured: its name in the legend, and its style."""
+
+    label: str
+    rig: Rig
+    kind: str
+
+
+def draw_signature(view: View) -> Figure:
+    """Draw each found effect's own law and a zoom in time; and the structure of what is left.
+
+    The structure is drawn where no effect was found, or not enough.
+    """
+    effects = view.effects
+    rest = not effects or view.diagnosis.found["verdict"] == "unexplained"
+    heights = [3.9] * len(effects) + ([5.4] if rest else [])
+    figure = Figure(figsize=(10.4, 0.5 + sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for part, effect in zip(parts, effects, strict=False):
+        _draw_effect(part, view, effect)
+    if rest:
+        draw_structure(parts[-1], view)
+    return figure
+
+
+def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
+    others = [other for other in view.effects if other is not effect]
+    base = view.rig_with(others)
+    pool = touched(view.diagnosis.outputs, [effect])
+    widest = max(pool, key=lambda output: output.gap(base))
+    reader = view.readers(base)[widest.record]
+    ours = tuple(o for o in view.diagnosis.outputs if o.record == widest.record)
+    models = _models(view, effect, base)
+    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
+    try:
+        _draw_law(left, Scene(reader, ours), SIGNATURES[effect.name], models)
+    except KeyError as lacking:
+        left.set_axis_off()
+        left.text(0.5, 0.5, f"the record lacks {lacking.args[0]}", ha="center", fontsize=9)
+    _draw_zoom(right, view, widest, models, SIGNATURES[effect.name].zoom_s)
+    for axes in (left, right):
+        axes.grid(alpha=0.25)
+        axes.tick_params(labelsize=8)
+    figure.suptitle(_title(view, effect) + view.source(widest), fontsize=11)
+    handles, labels = right.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8.5)
+
+
+def _title(view: View, effect: Effect) -> str:
+    """Return the effect with its parameters."""
+    found = next(e for e in view.diagnosis.found["effects"] if e["name"] == effect.name)
+    told = [f"{name} = {p['value']:.4g}" for name, p in found["parameters"].items()]
+    return ", ".join([f"{effect.stage}: {plain(effect.name)}", *told])
+
+
+def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:
+    """Return the rigs to draw: without the effect, with it, and with its first rival instead."""
+    alone = len(view.effects) == 1
+    models = [_Model("nominal" if alone else "without it", base, "wrong")]
+    models.append(_Model(f"with {plain(effect.name)}", view.diagnosis.improved, "right"))
+    step = next(step for step in view.diagnosis.choice.steps if step.effect is effect)
+    for rival in step.rivals[:1]:
+        models.append(_Model(f"rival: {plain(rival.effect.name)}", rival.fit.rig, "rival"))
+    return models
+
+
+def _draw_law(axes: Any, scene: Scene, signature: Signature, models: Sequence[_Model]) -> None:
+    """Draw the effect's law: what was measured as dots, the rigs as lines."""
+    control, y = scene.reader.control, SIGNALS[signature.y]
+    axes.set_ylabel(y.words(control), fontsize=9)
+    if signature.kind == "time":
+        time = scene.reader.record.time_s
+        axes.plot(time - time[0], y.get(scene, None), color=look.RIGHT, linewidth=1.2)
+        axes.axhline(0.0, **style_of("wrong"))
+        axes.set_xlabel("time, s", fontsize=9)
+        axes.set_title("as the kinematics tell it", fontsize=9, loc="left")
+        return
+    x = SIGNALS[signature.x]
+    axes.set_xlabel(x.words(control), fontsize=9)
+    inner = slice(_EDGE, -_EDGE)
+    at, told = x.get(scene, None)[inner], y.get(scene, None)[inner]
+    known = [(m, x.get(scene, m.rig)[inner], y.get(scene, m.rig)[inner]) for m in models]
+    rows = _widest_window(told - known[0][2], round(_LOOP_s * scene.frame_rate))
+    if signature.kind == "loop":
+        axes.plot(at, told, ".", color="0.75", markersize=1.5, zorder=0, rasterized=True)
+        axes.plot(at[rows], told[rows], **{**style_of("measured"), "linewidth": 1.8})
+        title = f"loops of {_LOOP_s:g} s; dots: all that was measured"
+        for model, across, up in known:
+            axes.plot(across[rows], up[rows], **style_of(model.kind))
+    else:
+        every = max(1, len(at) // _DOTS)
+        axes.plot(at[::every], told[::every], ".", color="0.7", markersize=2.0, rasterized=True)
+        for model, across, up in known:
+            axes.plot(*_medians(across, up), **style_of(model.kind))
+        axes.plot(*_medians(at, told), "o", color=look.MEASURED, markersize=3.5, zorder=4)
+        title = "dots: measured; black: their medians; lines: medians"
+    axes.set_title(title, fontsize=9, loc="left")
+    _limit(axes, [told, *(up for _, _, up in known)])
+
+
+def _limit(axes: Any, series: Sequence[Floats]) -> None:
+    """Let the few dots that a derivative throws far out not set the scale."""
+    ends = np.array([np.nanpercentile(up, [0.5, 99.5]) for up in series])
+    low, high = float(ends[:, 0].min()), float(ends[:, 1].max())
+    room = 0.15 * (high - low) or 1.0
+    axes.set_ylim(low - room, high + room)
+
+
+def _medians(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return medians of y by bins of x."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if not len(x):
+        return x, y
+    # Half of the edges by count, for what is dense, and half by width, for what is rare.
+    shares = np.linspace(0.0, 1.0, _BINS // 2 + 1)
+    edges = np.union1d(np.quantile(x, shares), x.min() + shares * np.ptp(x))
+    number = np.searchsorted(edges[1:-1], x)
+    bins = [number == k for k in range(len(edges) - 1)]
+    pairs = [(np.median(x[b]), np.median(y[b])) for b in bins if b.sum() >= _FEW]
+    whole = np.array(pairs, dtype=np.float64).reshape(-1, 2)
+    return whole[:, 0], whole[:, 1]
+
+
+def _widest_window(left: Floats, frames: int) -> slice:
+    """Return the window of so many frames in which a residual is largest."""
+    frames = min(frames, len(left))
+    total = np.cumsum(np.concatenate(([0.0], np.nan_to_num(left) ** 2)))
+    start = int(np.argmax(total[frames:] - total[:-frames]))
+    return slice(start, start + frames)
+
+
+def _draw_zoom(
+    axes: Any, view: View, output: Output, models: Sequence[_Model], length_s: float
+) -> None:
+    """Draw measured and predicted over time, where they differ most; the input beneath."""
+    factor, unit = unit_shown(output.channel)
+    made = [(model, factor * output.predict(model.rig)) for model in models]
+    rows = _widest_window(made[1][1] - made[0][1], round(length_s * output.frame_rate_Hz))
+    time = view.time(output)[rows]
+    told = factor * output.measured[rows]
+    driven = _input(view, output)
+    if driven is not None:
+        label, signal = driven
+        part = signal[rows] - np.median(signal[rows])
+        size = float(np.ptp(told)) / max(float(np.ptp(part)), 1e-12)
+        axes.plot(
+            time,
+            size * part + np.median(told),
+            color="#e69f00",
+            linewidth=1.0,
+            linestyle="dashdot",
+            label=f"{label}, scaled",
+        )
+    axes.plot(time, told, label="measured", **style_of("measured"))
+    for model, whole in made:
+        axes.plot(time, whole[rows], label=model.label, **style_of(model.kind))
+    axes.set_xlim(time[0], time[-1])
+    axes.set_xlabel("time, s", fontsize=9)
+    axes.set_ylabel(f"{words(output.channel)}, {unit}", fontsize=9)
+    axes.set_title(
+        "the whole record" if length_s == _WHOLE_s else "where they differ most",
+        fontsize=9,
+        loc="left",
+    )
+
+
+def _input(view: View, output: Output) -> tuple[str, Floats] | None:
+    """Return what drives an output's stage, where the record has it."""
+    control, record = view.diagnosis.control, view.records[output.record]
+    names = {
+        "loader": ("F", f"{control}_force_N"),
+        "airframe": ("elevator, nose up", "elevator_rad"),
+        "schedule": ("q̄", "dynamic_pressure_Pa"),
+    }
+    label, name = names.get(output.stage, ("", ""))
+    if name not in record:
+        return None
+    return label, (-1.0 if name == "elevator_rad" else 1.0) * record[name]

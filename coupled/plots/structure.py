@@ -1,0 +1,128 @@
+"""The structure of a residual that no effect explains: what it goes with, strongest first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from coupled.channels import unit_of
+from coupled.gap.output import Floats, Output
+from coupled.gap.smooth import rate_of, smoothed
+from coupled.plots import gapview as look
+from coupled.plots.gapview import View, plain, residual_shown, unit_shown, words
+
+_BINS = 24
+_DOTS = 2500
+
+
+def draw_structure(figure: Any, view: View) -> None:
+    """Draw what is left of the widest residual against each signal, and its spectrum."""
+    improved = view.diagnosis.improved
+    output = max(view.suspects(), key=lambda o: o.gap(improved))
+    scale, unit = residual_shown(output.channel)
+    left = scale * output.floor * output.residual(improved)
+    line = _spectrum(left, output.frame_rate_Hz)
+    panels = [(_share(signal, left), label, signal) for label, signal in _signals(view, output)]
+    panels.append((line.share, "", left))
+    panels.sort(key=lambda panel: -panel[0])
+    grid = list(figure.subplots(2, 3).flat)
+    for i, (axes, (share, label, signal)) in enumerate(zip(grid, panels, strict=False)):
+        if label:
+            _draw_against(axes, signal, left, label, unit)
+            told = f"{100.0 * share:.0f} % of its variance goes with it"
+        else:
+            _draw_spectrum(axes, line, unit)
+            told = f"{100.0 * share:.0f} % of its power at {line.frequency[line.peak]:.3g} Hz"
+        axes.set_title(f"{i + 1}. {told}", fontsize=9, loc="left")
+        axes.grid(alpha=0.25)
+        axes.tick_params(labelsize=8)
+    for axes in grid[len(panels) :]:
+        axes.set_visible(False)
+    what = f"{plain(output.stage)}: residual of the {words(output.channel)}{view.source(output)}"
+    gap = output.gap(improved)
+    figure.suptitle(f"{what}, {gap:.3g} × its floor, against what it may go with", fontsize=11)
+
+
+def _draw_against(axes: Any, signal: Floats, left: Floats, label: str, unit: str) -> None:
+    axes.plot(*_thin(signal, left), ".", color="0.7", markersize=2.0, rasterized=True)
+    axes.plot(*_means(signal, left), "o-", color=look.RIVAL, markersize=3.0, linewidth=1.2)
+    axes.set_xlabel(label, fontsize=9)
+    axes.set_ylabel(f"residual, {unit}", fontsize=9)
+
+
+def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
+    """Return the signals that a residual may go with, each with its label."""
+    record, control = view.records[output.record], view.diagnosis.control
+    d = unit_of(control)
+    found: list[tuple[str, Floats]] = []
+    for name in (f"{control}_force_N", f"{control}_computed_{d}", "dynamic_pressure_Pa"):
+        if name in record:
+            factor, unit = unit_shown(name)
+            found.append((f"{words(name)}, {unit}", factor * record[name]))
+    computed = f"{control}_computed_{d}"
+    if computed in record:
+        factor, unit = unit_shown(computed)
+        speed = factor * rate_of(smoothed(record[computed]), output.frame_rate_Hz)
+        found.append((f"deflection's rate δc′, {unit}/s", speed))
+    return [*found, ("time, s", view.time(output))]
+
+
+def _binned(signal: Floats) -> tuple[Any, int]:
+    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, _BINS + 1)))
+    return np.searchsorted(edges[1:-1], signal), max(1, len(edges) - 1)
+
+
+def _means(signal: Floats, left: Floats) -> tuple[Floats, Floats]:
+    """Return the means of a residual by the quantiles of a signal."""
+    number, bins = _binned(signal)
+    count = np.maximum(np.bincount(number, minlength=bins), 1)
+    return (
+        np.bincount(number, signal, minlength=bins) / count,
+        np.bincount(number, left, minlength=bins) / count,
+    )
+
+
+def _share(signal: Floats, left: Floats) -> float:
+    """Return the share of a residual's variance that its means by a signal take (η²)."""
+    number, _ = _binned(signal)
+    means = _means(signal, left)[1][number]
+    return float(np.var(means) / max(float(np.var(left)), 1e-300))
+
+
+def _thin(signal: Floats, left: Floats) -> tuple[Floats, Floats]:
+    every = max(1, len(left) // _DOTS)
+    return signal[::every], left[::every]
+
+
+@dataclass(frozen=True)
+class _Spectrum:
+    """Amplitude by frequency in Hz, its peak's place, and the share of the power at the peak."""
+
+    frequency: Floats
+    amplitude: Floats
+    peak: int
+    share: float
+
+
+def _spectrum(left: Floats, frame_rate_Hz: float) -> _Spectrum:
+    """Return a residual's spectrum under a Hann window, whose line is four bins wide."""
+    window = np.hanning(len(left))
+    lines = np.fft.rfft((left - left.mean()) * window)
+    amplitude = np.asarray(2.0 * np.abs(lines) / window.sum(), dtype=np.float64)
+    frequency = np.asarray(np.fft.rfftfreq(len(left), 1.0 / frame_rate_Hz), dtype=np.float64)
+    peak = 1 + int(np.argmax(amplitude[1:]))
+    line = amplitude[max(1, peak - 2) : peak + 3]
+    share = float(np.sum(line**2) / max(float(np.sum(amplitude[1:] ** 2)), 1e-300))
+    return _Spectrum(frequency, amplitude, peak, share)
+
+
+def _draw_spectrum(axes: Any, found: _Spectrum, unit: str) -> None:
+    """Draw the amplitude of each frequency, which tells of a motion of its own."""
+    axes.plot(found.frequency[1:], found.amplitude[1:], color=look.RIVAL, linewidth=0.9)
+    at = found.frequency[found.peak]
+    axes.plot(at, found.amplitude[found.peak], "o", color=look.WRONG, markersize=4)
+    axes.set_xscale("log")
+    axes.set_xlabel("frequency, Hz", fontsize=9)
+    axes.set_ylabel(f"amplitude, {unit}", fontsize=9)

@@ -1,0 +1,189 @@
+"""The figures of a diagnosis: one for each effect of the library, and what they tell apart."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from coupled.channels import unit_of
+from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.choose import Candidate, Choice, Step
+from coupled.gap.diagnose import Diagnosis, diagnose
+from coupled.gap.effects import BY_NAME, EFFECTS, Effect, apply
+from coupled.gap.fit import Fit
+from coupled.gap.output import Output, stage_gaps
+from coupled.gap.stages import Reader
+from coupled.plots.gaps import FIGURES, draw_diagnosis
+from coupled.plots.gapview import View, unit_shown, words
+from coupled.plots.saving import save
+from coupled.plots.signals import SIGNALS
+from coupled.plots.signatures import SIGNATURES, draw_signature
+from coupled.record import Record, write_record
+from coupled.rig.parameters import Rig
+from tests.gap.made import made, nominal_rig
+from tests.test_cli import coupled
+
+Case = tuple[Rig, Record, tuple[Output, ...]]
+UNIT = re.compile(r", (%|%/s|1|°|°/s|g|N|N/m|m/s|m/s²|mm|mm/s|cm|cm/s|µm|kPa|kPa/s|s|Hz)$")
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Mapping[bool, Case]:
+    """A bench and a flight of 12 s without any effect, with their outputs, by whether flown."""
+    return {flown: case(tmp_path_factory.mktemp("r"), flown) for flown in (False, True)}
+
+
+def case(folder: Path, flown: bool) -> Case:
+    nominal = nominal_rig(flown)
+    record = made(folder, nominal, {}, 3).between(0.0, 12.0)
+    reader = Reader(nominal, record, "column", surface_points)
+    return nominal, record, (*reader.outputs(), *airframe_outputs(nominal, record))
+
+
+def told(case: Case, effects: list[Effect], rival: Effect | None = None) -> Diagnosis:
+    """Return the diagnosis that names these effects, whatever the record says."""
+    nominal, _, outputs = case
+    fitted = fit_of(nominal, effects)
+    rivals = (Candidate(9.0, rival, fit_of(nominal, [rival])),) if rival else ()
+    steps = tuple(Step(effect, 50.0, 0.99, rivals) for effect in effects)
+    rounds = tuple({effect.name: 50.0, "inertia_like": -300.0} for effect in effects)
+    gaps = stage_gaps(outputs, nominal)
+    blamed = {effect.stage for effect in effects}
+    stages = {s: {"gap": gap, "left": 1.0, "guilty": s in blamed} for s, gap in gaps.items()}
+    found = {
+        "verdict": "effect" if effects else "no_gap",
+        "stages": stages,
+        "effects": [
+            {
+                "name": effect.name,
+                "probability": 0.99,
+                "parameters": {
+                    p.name.format(d=unit_of("column")): {"value": 1.0, "low": 0.9, "high": None}
+                    for p in effect.free
+                },
+            }
+            for effect in effects
+        ],
+    }
+    choice = Choice(steps, fitted, fit_of(nominal, []), {}, rounds)
+    return Diagnosis(found, fitted.rig, nominal, "column", outputs, choice)
+
+
+def fit_of(nominal: Rig, effects: list[Effect]) -> Fit:
+    values = {f"{e.name}.{p.name}": p.starts[0] for e in effects for p in e.free}
+    rig = apply(nominal, "column", effects, values)
+    return Fit(tuple(effects), values, values, values, (), rig)
+
+
+def needs_flight(effect: Effect) -> bool:
+    return effect.stage in ("surface", "airframe") or effect.name == "bob_weight"
+
+
+def labels(figure: Figure) -> list[str]:
+    """Return the labels of all axes that are drawn with a scale."""
+    shown = [axes for axes in figure.axes if axes.axison and axes.get_visible()]
+    return [text for axes in shown for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_every_effect_has_a_signature_with_units(
+    cases: Mapping[bool, Case], effect: Effect
+) -> None:
+    case = cases[needs_flight(effect)]
+    figure = draw_signature(View(told(case, [effect]), (case[1],), ("r.csv",)))
+    figure.draw_without_rendering()
+    assert effect.name.replace("_", " ") in figure.subfigs[0].get_suptitle()
+    found = labels(figure)
+    assert len(found) == 4
+    assert all(UNIT.search(label) for label in found), found
+
+
+def test_the_table_of_signatures_is_the_library() -> None:
+    assert set(SIGNATURES) == set(BY_NAME)
+    used = {name for s in SIGNATURES.values() for name in (s.x, s.y) if name}
+    assert used == set(SIGNALS)
+
+
+def test_the_files_differ_as_the_diagnoses_do(cases: Mapping[bool, Case], tmp_path: Path) -> None:
+    case = cases[False]
+    diagnoses = [
+        told(case, []),
+        told(case, [BY_NAME["coulomb_friction"]]),
+        told(case, [BY_NAME["coulomb_friction"], BY_NAME["backlash"]], BY_NAME["servo_lag"]),
+    ]
+    written: dict[str, set[bytes]] = {name: set() for name in FIGURES}
+    for diagnosis in diagnoses:
+        for name, figure in draw_diagnosis(diagnosis, {"r.csv": case[1]}).items():
+            assert all(UNIT.search(label) for label in labels(figure) if not stands_alone(label))
+            save(figure, tmp_path / name)
+            written[name].add((tmp_path / name).read_bytes())
+    assert all(len(files) == len(diagnoses) for files in written.values())
+
+
+def stands_alone(label: str) -> bool:
+    """Tell whether a label is of the ladder's list of effects, whose axis is shared."""
+    return label.startswith("screened out")
+
+
+def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: Path) -> None:
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {}, 5).between(0.0, 12.0)
+    data = record.data.copy()
+    at = record.channels.index("column_deflection_m")
+    data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
+    spoiled = Record(record.channels, data)
+    diagnosis = diagnose(nominal, {"r.csv": spoiled}, "column")
+    assert diagnosis.found["verdict"] == "unexplained"
+    assert diagnosis.choice.rounds[0] == diagnosis.choice.tried
+    figures = draw_diagnosis(diagnosis, {"r.csv": spoiled})
+    figure = figures["signature.png"]
+    figure.draw_without_rendering()
+    titles = [axes.get_title("left") for axes in figure.axes]
+    assert "power at 1.4" in titles[0]  # 9 rad/s
+    shares = [float(re.findall(r"(\d+) %", title)[0]) for title in titles]
+    assert shares == sorted(shares, reverse=True)
+    assert len(shares) == 6
+
+
+def test_what_was_lost_on_the_way_is_drawn_without_it(cases: Mapping[bool, Case]) -> None:
+    """A record without load factor, and one whose host does not compute as it should."""
+    nominal, record, outputs = cases[False]
+    diagnosis = told(cases[False], [BY_NAME["bob_weight"]])
+    figure = draw_signature(View(diagnosis, (record,), ("r.csv",)))
+    assert "lacks load_factor" in figure.axes[0].texts[0].get_text()
+    guilty: dict[str, Any] = {"compensation": {"gap": 40.0, "guilty": True}}
+    found = {**told(cases[False], []).found, "verdict": "unexplained", "stages": guilty}
+    host = replace(told(cases[False], []), found=found)
+    figure = draw_diagnosis(host, {"r.csv": record})["signature.png"]
+    assert "compensation" in figure.subfigs[0].get_suptitle()
+    assert outputs and nominal.flight is None
+
+
+def test_channels_are_put_in_words_and_units() -> None:
+    assert words("column_gradient_N_per_m") == "scheduled gradient G_T"
+    assert unit_shown("column_gradient_N_per_m")[1] == "N/m"
+    assert unit_shown("wheel_deflection_rad")[1] == "°"
+    assert unit_shown("pitch_rate_rad_per_s")[1] == "°/s"
+    assert unit_shown("load_factor") == (1.0, "g")
+
+
+def test_plots_on_the_command_line(tmp_path: Path) -> None:
+    nominal = nominal_rig(True)
+    write_record(made(tmp_path, nominal, {}, 8).between(0.0, 12.0), tmp_path / "r.csv")
+    asked = ("diagnose", "r.csv", "--rig", "report-column", "--plots")
+    done = coupled(tmp_path, *asked, "figures")
+    assert done.returncode == 0, done.stderr
+    for name in FIGURES:
+        assert f"figure: figures/{name}" in done.stdout
+        assert (tmp_path / "figures" / name).read_bytes()[:4] == b"\x89PNG"
+    (tmp_path / "taken").write_text("")
+    refused = coupled(tmp_path, *asked, "taken")
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
