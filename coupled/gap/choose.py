@@ -179,10 +179,12 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
     ]
     found = []
     screened = screen(case, current, candidates)
-    for i, (effect, start) in enumerate(screened):
+    for i, (effect, starts) in enumerate(screened):
         if case.tell is not None:
             case.tell(f"fitting {effect.name}", i, len(screened))
-        fitted = case.fit((*current.effects, effect), "fitted", {**current.values, **start})
+        chosen = (*current.effects, effect)
+        tries = [case.fit(chosen, "fitted", {**current.values, **start}) for start in starts]
+        fitted = min(tries, key=lambda one: one.cost)
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))

@@ -86,8 +86,8 @@ EFFECTS: tuple[Effect, ...] = (
         "stribeck_friction",
         "loader",
         (
-            _added("friction_N", "loader", "friction", 0, 60, 1.0),
-            _value("breakaway_N", "loader", "breakaway", 0, 120, 3.0),
+            _added("friction_N", "loader", "friction", 0, 60, 1.0, 0.3),
+            _value("breakaway_N", "loader", "breakaway", 0, 120, 2.0, 3.0),
             _value("stribeck_{d}_per_s", "loader", "stribeck_rate", 2e-4, 0.05, 2e-3),
         ),
     ),
@@ -99,7 +99,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one("loader", "bob_weight", _added("force_N_per_g", "loader", "bob_weight", -200, 200, 5.0)),
     _one("loader", "force_offset", _added("offset_N", "loader", "offset", -100, 100, 1.0)),
     _one("loader", "digital_multiplier", _switch("loader", "multiplier", "digital")),
-    _one("loader", "transport_delay", _added("delay_s", "loader", "delay", 0, 0.19, 0.01, 0.04)),
+    _one("loader", "transport_delay", _added("delay_s", "loader", "delay", 0, 0.19, 0.01)),
     _one("sensing", "deflection_scale", _factor("sensing", "deflection_scale", 1.03)),
     _one("linkage", "bend", _value("bend_{d}_per_N", "loader", "bend", 0, 1e-2, 5e-5)),
     Effect(
@@ -110,12 +110,12 @@ EFFECTS: tuple[Effect, ...] = (
             _value("limit_{d}", "loader", "bend_limit", 1e-4, 1, 5e-3, 2e-2),
         ),
     ),
-    _one("linkage", "backlash", _added("play_{d}", "loader", "play", 0, 0.1, 5e-4, 3e-3)),
+    _one("linkage", "backlash", _added("play_{d}", "loader", "play", 0, 0.1, 1e-3)),
     _one("linkage", "servo_lag", _factor("loader", "servo_frequency", 0.8)),
     _one(
         "linkage",
         "servo_rate_limit",
-        _value("rate_{d}_per_s", "loader", "servo_rate_limit", 1e-3, 10, 0.05, 0.2),
+        _value("rate_{d}_per_s", "loader", "servo_rate_limit", 1e-3, 10, 0.1),
     ),
     _one("linkage", "arc_geometry", _switch("loader", "arc_geometry", True)),
     _one(
@@ -125,7 +125,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "surface",
         "surface_rate_limit",
-        _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.3, 1.0),
+        _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.5),
     ),
     _one("surface", "surface_freeplay", _added("play_norm", "rigging", "play", 0, 0.5, 0.01)),
     _one("airframe", "elevator_effectiveness", _factor("flight", "elevator_effectiveness", 0.9)),

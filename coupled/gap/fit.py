@@ -47,6 +47,7 @@ class Fit:
     high: Mapping[str, float]
     at_bound: tuple[str, ...]
     rig: Rig
+    cost: float  # half the sum of squares, in floors
 
 
 def shows_in(effect: Effect) -> tuple[str, ...]:
@@ -88,7 +89,7 @@ def fit(
         return np.concatenate([output.residual(rig, part) for output in ours])
 
     if not keys:
-        return Fit(tuple(effects), {}, {}, {}, (), rig_of(np.array([])))
+        return Fit(tuple(effects), {}, {}, {}, (), rig_of(np.array([])), 0.0)
     scale = np.array([max(abs(s) for s in p.starts) or 1.0 for p in frees])
     low = np.array([p.low for p in frees]) / scale
     high = np.array([p.high for p in frees]) / scale
@@ -116,6 +117,7 @@ def fit(
         dict(zip(keys, (values + half).tolist(), strict=True)),
         tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
         rig_of(values),
+        float(best.cost),
     )
 
 

@@ -23,24 +23,30 @@ FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is 
 
 def screen(
     case: Case, current: Fit, candidates: Sequence[Effect]
-) -> list[tuple[Effect, dict[str, float]]]:
-    """Return the candidates whose signature takes most of the residual, and where to start."""
+) -> list[tuple[Effect, list[dict[str, float]]]]:
+    """Return the candidates whose signature takes most of the residual, and where to start.
+
+    There is a start for each shape that an effect of several parameters begins from.
+    """
     scores = []
     for effect in candidates:
         ours = touched(case.outputs, [effect])
         now = np.concatenate([output.residual(current.rig) for output in ours])
-        best, least, start = 0.0, np.inf, {}
-        for values in _sizes(effect):
-            rig = _with(case, current, effect, values)
-            left = np.concatenate([output.residual(rig) for output in ours])
-            sign = now - left
-            size = float(sign @ sign)
-            best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
-            if float(left @ left) < least:
-                least, start = float(left @ left), values
-        scores.append((best, effect, start))
+        best, starts = 0.0, []
+        for shape in range(max([len(p.starts) for p in effect.free], default=1)):
+            least, start = np.inf, {}
+            for values in _sizes(effect, shape):
+                rig = _with(case, current, effect, values)
+                left = np.concatenate([output.residual(rig) for output in ours])
+                sign = now - left
+                size = float(sign @ sign)
+                best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
+                if float(left @ left) < least:
+                    least, start = float(left @ left), values
+            starts.append(start)
+        scores.append((best, effect, starts))
     scores.sort(key=lambda item: -item[0])
-    return [(effect, start) for _, effect, start in scores[:SCREENED]]
+    return [(effect, starts) for _, effect, starts in scores[:SCREENED]]
 
 
 def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig:
@@ -51,23 +57,18 @@ def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) ->
     return apply(case.nominal, case.control, every, known)
 
 
-def _sizes(effect: Effect) -> list[dict[str, float]]:
-    """Return sets of an effect's parameters to try; few where each has to be flown."""
-    if not effect.free:
-        return [{}]
-    found = []
-    tries = max(len(p.starts) for p in effect.free)
+def _sizes(effect: Effect, shape: int) -> list[dict[str, float]]:
+    """Return sets of an effect's parameters to try; one where each has to be flown."""
     flown = effect.stage == "airframe"
-    for k in range(1 if flown else len(SIZES)):
-        for i in range(tries):
-            values = {}
-            for p in effect.free:
-                start = p.starts[min(i, len(p.starts) - 1)]
-                value = start
-                if not flown and p.mode == "factor":
-                    value = 1.0 + FACTORS[k] * (start - 1.0)
-                elif not flown and not p.name.startswith(("bend", "stribeck")):
-                    value = SIZES[k] * start
-                values[f"{effect.name}.{p.name}"] = float(np.clip(value, p.low, p.high))
-            found.append(values)
+    found = []
+    for k in range(1 if flown or not effect.free else len(SIZES)):
+        values = {}
+        for p in effect.free:
+            start = value = p.starts[min(shape, len(p.starts) - 1)]
+            if not flown and p.mode == "factor":
+                value = 1.0 + FACTORS[k] * (start - 1.0)
+            elif not flown and not p.name.startswith(("bend", "stribeck")):
+                value = SIZES[k] * start
+            values[f"{effect.name}.{p.name}"] = float(np.clip(value, p.low, p.high))
+        found.append(values)
     return found
