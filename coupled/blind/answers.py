@@ -10,7 +10,7 @@ from typing import Any
 
 from coupled.errors import InputError
 
-VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained")
+VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained", "refused")
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,22 @@ class Answer:
 
     @property
     def exact(self) -> bool:
-        """Whether it names what is there, nothing else, and is sure of it."""
-        return self.verdict == "effect" and frozenset(self.found) == self.named
+        """Whether it names what is there, nothing else, and is sure of it.
+
+        Where another effect is the same law on this record, naming just these two is exact.
+        """
+        if self.verdict == "effect":
+            return frozenset(self.found) == self.named
+        twins = frozenset(self.truth.get("alike", []))
+        return bool(twins) and self.contains and self.sets == self.named | twins
 
     @property
     def contains(self) -> bool:
         """Whether it is exact, or names no more than it holds possible, the truth among them."""
+        if self.verdict == "effect":
+            return frozenset(self.found) == self.named
         ambiguous = self.verdict == "ambiguous" and self.named <= self.sets
-        return self.exact or (ambiguous and len(self.found) == len(self.named))
+        return ambiguous and len(self.found) == len(self.named)
 
     @property
     def wrong(self) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.effects import BY_NAME
+from coupled.gap.fit import fit
 from coupled.gap.stages import Reader
 from coupled.record import Record
 from coupled.rig.parameters import Rig
@@ -24,3 +26,21 @@ def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, flo
         gaps[stage] = max(output.gap(rig), gaps.get(stage, 0.0))
     shown = [gaps[stage] for stage in ("loader", "linkage") if stage in gaps]
     return gaps | ({"sensing": max(shown)} if shown else {})
+
+
+# Two effects that are one law wherever the gradient rises in proportion to q̄.
+TWINS = {"pressure_scale": "schedule_slope", "schedule_slope": "pressure_scale"}
+ALIKE = 0.02  # floors: what a twin may leave more than the true effect
+
+
+def alike(rig: Rig, record: Record, effect: str) -> list[str]:
+    """Return the effect that no record of this rig at these pressures could tell from `effect`."""
+    if effect not in TWINS:
+        return []
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    ours = [output for output in outputs if output.stage == "schedule"]
+    left = {}
+    for name in (effect, TWINS[effect]):
+        found = fit(rig, "column", ours, [BY_NAME[name]])
+        left[name] = max(output.gap(found.rig) for output in ours)
+    return [TWINS[effect]] if left[TWINS[effect]] - left[effect] < ALIKE else []

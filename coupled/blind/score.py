@@ -85,7 +85,7 @@ def _kinds(answers: Iterable[Answer]) -> set[str]:
 
 
 def _alarm(answer: Answer) -> bool:
-    return answer.verdict not in ("no_gap", "missing")
+    return answer.verdict not in ("no_gap", "missing", "refused")
 
 
 def _undecided(answer: Answer) -> bool:
@@ -98,7 +98,7 @@ def _intervals(right: Sequence[Answer]) -> Score:
     covered = total = without = 0
     for answer in right:
         for effect in answer.truth["effects"]:
-            told = answer.found[effect["name"]].get("parameters", {})
+            told = answer.found.get(effect["name"], {}).get("parameters", {})
             for name, value in effect["parameters"].items():
                 low, high = (told.get(name, {}).get(end) for end in ("low", "high"))
                 if low is None or high is None:

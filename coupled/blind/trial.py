@@ -11,7 +11,7 @@ import numpy as np
 
 from coupled.blind.effects import EFFECTS
 from coupled.blind.kinds import Clean, Draw, Kind
-from coupled.blind.measure import stage_gaps
+from coupled.blind.measure import alike, stage_gaps
 from coupled.blind.outsiders import OUTSIDERS
 from coupled.blind.rigs import DRAWN
 from coupled.blind.setting import Setting, draw_setting, fly_clean
@@ -150,6 +150,8 @@ def _flown(
         "alone": [part.gap for part in parts],
         "ratio": min(part.gap / bare[part.kind.stage] for part in parts),
     }
+    if plan.kind == "single":
+        truth["alike"] = alike(setting.rig, record, kinds[0].name)
     trial = Trial(setting.rig, record, truth)
     return _lacking(rng, trial) if plan.kind == "lacking" else trial
 
