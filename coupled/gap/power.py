@@ -1,9 +1,9 @@
 """Power: how large each effect would have had to be for this record to show it.
 
 An effect shows where its signature, made orthogonal to those of the settings that may stand off
-by their tolerance, lifts a stage from its floor over the bar of guilt. Its size is found by a few
-secant steps of log signature over log size. A setting that is off by less than its tolerance is no
-effect, however well the record shows it.
+by their tolerance, lifts a stage from its floor over the bar of guilt. The least such size is
+found by bisection. A setting that is off by less than its tolerance is no effect, however well
+the record shows it.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from coupled.gap.output import Output
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]
-STEPS = 6
-NEAR = 0.05  # relative error of the signature at which the search ends
+DECADE, DECADES = 10.0, 3  # sizes are sought over three decades to either side of a fit's start
+STEPS = 5  # halvings of the decade where it begins to show: to 7 %
 HELD = ("stribeck_{d}_per_s",)
 INVERSE = ("rate_{d}_per_s", "rate_norm_per_s", "limit_{d}")  # the smaller, the more it does
 
@@ -125,22 +125,23 @@ def _least(
 ) -> dict[str, float] | None:
     """Return the parameters at which an effect just shows, or None where it never does."""
     wanted = math.sqrt(CLEAR**2 - 1.0)
+
+    def shows(size: float) -> bool:
+        return _signature(nominal, control, outputs, effect, size) >= wanted
+
     if not effect.free:
-        shows = _signature(nominal, control, outputs, effect, 1.0) >= wanted
-        return {} if shows else None
-    size, last = 1.0, (0.0, 0.0)
-    for step in range(STEPS):
-        seen = _signature(nominal, control, outputs, effect, size)
-        if abs(seen / wanted - 1.0) < NEAR:
+        return {} if shows(1.0) else None
+    high = 1.0
+    while not shows(high):
+        high *= DECADE
+        if high > DECADE**DECADES:
+            return None
+    low = high / DECADE
+    while shows(low):
+        low, high = low / DECADE, low
+        if low < DECADE**-DECADES:
             break
-        if seen <= 1e-6:
-            size *= 10.0
-            continue
-        here = (math.log(size), math.log(seen))
-        slope = 1.0
-        if step and abs(here[0] - last[0]) > 1e-9 and last != (0.0, 0.0):
-            slope = float(np.clip((here[1] - last[1]) / (here[0] - last[0]), 0.3, 4.0))
-        last = here
-        size = math.exp(here[0] + float(np.clip((math.log(wanted) - here[1]) / slope, -7.0, 4.0)))
-    seen = _signature(nominal, control, outputs, effect, size)
-    return _values(effect, size, nominal, control) if seen > 0.7 * wanted else None
+    for _ in range(STEPS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if shows(middle) else (middle, high)
+    return _values(effect, high, nominal, control)

@@ -50,7 +50,7 @@ def print_power(console: Console, sizes: Sequence[dict[str, Any]]) -> None:
             told = "no size that it may have"
         else:
             numbers = item["parameters"].items()
-            told = ", ".join(f"{name} {value:.3g}" for name, value in numbers) or "it would show"
+            told = ", ".join(f"{name} {value:.4g}" for name, value in numbers) or "it would show"
         table.add_row(item["name"], item["stage"], told)
     console.print()
     console.print(table)
