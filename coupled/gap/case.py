@@ -57,7 +57,11 @@ class Case:
         effects: Sequence[Effect],
         part: Part = "all",
         start: Mapping[str, float] | None = None,
+        only: Effect | None = None,
     ) -> Fit:
-        """Return the effects fitted, with the settings free within their tolerance."""
+        """Return the effects fitted, with the settings free within their tolerance.
+
+        With `only`, just that one and what shares an output with it; the others stay.
+        """
         free = self.nuisances(effects)
-        return fit(self.nominal, self.control, self.outputs, effects, free, part, start)
+        return fit(self.nominal, self.control, self.outputs, effects, free, part, start, only)

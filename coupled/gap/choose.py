@@ -183,7 +183,9 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         if case.tell is not None:
             case.tell(f"fitting {effect.name}", i, len(screened))
         chosen = (*current.effects, effect)
-        tries = [case.fit(chosen, "fitted", {**current.values, **start}) for start in starts]
+        tries = [
+            case.fit(chosen, "fitted", {**current.values, **start}, effect) for start in starts
+        ]
         fitted = min(tries, key=lambda one: one.cost)
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):

@@ -115,7 +115,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "linkage",
         "servo_rate_limit",
-        _value("rate_{d}_per_s", "loader", "servo_rate_limit", 1e-3, 10, 0.1),
+        _value("rate_{d}_per_s", "loader", "servo_rate_limit", 1e-3, 10, 0.1, 0.18),
     ),
     _one("linkage", "arc_geometry", _switch("loader", "arc_geometry", True)),
     _one(
@@ -125,7 +125,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "surface",
         "surface_rate_limit",
-        _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.5),
+        _value("rate_norm_per_s", "rigging", "rate_limit", 1e-2, 50, 0.3, 0.55),
     ),
     _one("surface", "surface_freeplay", _added("play_norm", "rigging", "play", 0, 0.5, 0.01)),
     _one("airframe", "elevator_effectiveness", _factor("flight", "elevator_effectiveness", 0.9)),

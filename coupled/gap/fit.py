@@ -69,27 +69,79 @@ def fit(
     nuisances: Sequence[Effect] = (),
     part: Part = "all",
     start: Mapping[str, float] | None = None,
+    only: Effect | None = None,
 ) -> Fit:
     """Return the effects fitted to a part of the outputs that they touch.
 
     Starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. `nuisances` are settings, free within their tolerance: fitted, but nothing found.
+    Effects that share no output are fitted apart, so that neither's misfit leads the other
+    astray; with `only`, just those that share one with it, and the others stay at `start`.
     """
     every = [*effects, *nuisances]
-    ours = touched(outputs, every)
-    keys, frees = _free(every)
-    start = start or {}
+    values: dict[str, float] = {}
+    low: dict[str, float] = {}
+    high: dict[str, float] = {}
+    bound: tuple[str, ...] = ()
+    cost = 0.0
+    for group in _groups(every):
+        if only is None or only in group:
+            found = _fit(nominal, control, touched(outputs, group), group, part, start or {})
+            low, high, bound = low | found.low, high | found.high, bound + found.at_bound
+            values, cost = values | found.values, cost + found.cost
+            continue
+        keys, frees = _free(group)
+        values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
+    rig = apply(nominal, control, every, values)
+    return Fit(tuple(effects), values, low, high, bound, rig, cost)
 
-    def rig_of(x: Floats) -> Rig:
-        values = dict(zip(keys, np.asarray(x, dtype=float).tolist(), strict=True))
-        return apply(nominal, control, every, values)
+
+def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
+    """Return the effects in groups that share no output."""
+    groups: list[tuple[set[str], list[Effect]]] = []
+    for effect in effects:
+        stages, members = set(shows_in(effect)), [effect]
+        apart = []
+        for others, theirs in groups:
+            if others & stages:
+                stages, members = stages | others, theirs + members
+            else:
+                apart.append((others, theirs))
+        groups = [*apart, (stages, members)]
+    return [members for _, members in groups]
+
+
+@dataclass(frozen=True)
+class _Group:
+    """The fit of effects that share outputs."""
+
+    values: dict[str, float]
+    low: dict[str, float]
+    high: dict[str, float]
+    at_bound: tuple[str, ...]
+    cost: float
+
+
+def _fit(
+    nominal: Rig,
+    control: ControlName,
+    ours: Sequence[Output],
+    effects: Sequence[Effect],
+    part: Part,
+    start: Mapping[str, float],
+) -> _Group:
+    keys, frees = _free(effects)
 
     def residual(scaled: Floats) -> Floats:
-        rig = rig_of(scaled * scale)
+        values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
+        rig = apply(nominal, control, effects, values)
         return np.concatenate([output.residual(rig, part) for output in ours])
 
+    if not ours:
+        return _Group(dict(zip(keys, _starts(keys, frees, start)[0], strict=True)), {}, {}, (), 0.0)
     if not keys:
-        return Fit(tuple(effects), {}, {}, {}, (), rig_of(np.array([])), 0.0)
+        left = residual(np.array([]))
+        return _Group({}, {}, {}, (), 0.5 * float(left @ left))
     scale = np.array([max(abs(s) for s in p.starts) or 1.0 for p in frees])
     low = np.array([p.low for p in frees]) / scale
     high = np.array([p.high for p in frees]) / scale
@@ -103,20 +155,16 @@ def fit(
         if best is None or found.cost < best.cost:
             best = found
     assert best is not None
-    groups = np.concatenate(
-        [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
-    )
-    half = _half_width(best, len(ours), groups) * scale
-    half = np.hypot(half, [MODEL * _size(p, v) for p, v in zip(frees, best.x * scale, strict=True)])
+    number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
+    half = _half_width(best, len(ours), np.concatenate(number)) * scale
     values = best.x * scale
+    half = np.hypot(half, [MODEL * _size(p, v) for p, v in zip(frees, values, strict=True)])
     stuck = np.isclose(best.x, low, atol=1e-4) | np.isclose(best.x, high, rtol=1e-4)
-    return Fit(
-        tuple(effects),
+    return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),
         dict(zip(keys, (values + half).tolist(), strict=True)),
         tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
-        rig_of(values),
         float(best.cost),
     )
 

@@ -18,6 +18,7 @@ from coupled.rig.parameters import Rig
 
 SCREENED = 6
 SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts
+SHOWN = 1e-4  # mean square of a signature, floors², from which a size does something
 FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
 
 
@@ -41,10 +42,12 @@ def screen(
                 sign = now - left
                 size = float(sign @ sign)
                 best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
-                if float(left @ left) < least:
+                # A limit that is never met leaves the residual as it is, and a fit where it was.
+                if size > SHOWN * len(now) and float(left @ left) < least:
                     least, start = float(left @ left), values
-            starts.append(start)
-        scores.append((best, effect, starts))
+            starts += [start] if start or not effect.free else []
+        if starts:
+            scores.append((best, effect, starts))
     scores.sort(key=lambda item: -item[0])
     return [(effect, starts) for _, effect, starts in scores[:SCREENED]]
 
