@@ -12,6 +12,7 @@ stable at any frequency and second-order in δc.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -45,6 +46,7 @@ LINKAGE_PARAMETERS = layout(LinkageParameters, position=(4,), speed=(4,))
 LINKAGE_STATE = layout(LinkageState)
 
 
+@lru_cache(maxsize=64)
 def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDArray[np.float64]:
     """Return the servo's exact one-substep map, shape (2, 4).
 
@@ -57,7 +59,9 @@ def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDA
     a[1] = (-w * w, -2.0 * z * w, w * w, 0.0)
     a[2, 3] = 1.0 / h
     e = expm(a * h)[:2]
-    return np.column_stack((e[:, 0], e[:, 1], e[:, 2] - e[:, 3], e[:, 3]))
+    weights = np.column_stack((e[:, 0], e[:, 1], e[:, 2] - e[:, 3], e[:, 3]))
+    weights.setflags(write=False)  # one array for all who ask for the same servo
+    return weights
 
 
 @stage
