@@ -81,7 +81,7 @@ def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
     half = 0.5 * loader.damping / loader.mass
     root = half**2 - softest / loader.mass
     slowest = half - math.sqrt(root) if root > 0.0 else half
-    return min(max((24.0 if precise else 5.0) / max(slowest, 1e-3), 0.5), 60.0)
+    return min(max((24.0 if precise else 9.0) / max(slowest, 1e-3), 0.5), 60.0)
 
 
 def _hold(

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 
 from coupled.calibration.belief import real_scales
 from coupled.calibration.estimate import COVERAGE, Instruments
-from coupled.channels import ControlName
+from coupled.channels import ControlName, unit_of
 from coupled.errors import InputError
 from coupled.rig.parameters import Rig
 from coupled.rig.statics import static_point
@@ -160,3 +160,14 @@ def _precision(information: Floats, c: Floats, bend: float, count: int) -> Preci
     error = float(np.sqrt(c @ np.linalg.solve(information, c))) / bend
     wide = float(student.ppf(0.5 + 0.5 * COVERAGE, count - 2)) if count > 2 else np.inf
     return Precision(count, bend, error, wide * error)
+
+
+def form(chosen: Sequence[tuple[Station, int]], control: str) -> str:
+    """Return a plan as a CSV to be filled in: where to hold, and empty cells to write into."""
+    unit = unit_of(control)
+    lines = [f"gradient_set,deflection_{unit},force_N,v1_V,v3_V,v2_V,remark"]
+    for station, count in chosen:
+        where = f"hold at {station.deflection:.4g} {unit} and about {station.force:.3g} N"
+        where += f" with the host told {station.pressure_Pa:.5g} Pa"
+        lines += [f"{station.label},,,,,,{where}"] * count
+    return "\n".join(lines) + "\n"

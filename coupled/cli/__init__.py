@@ -1,6 +1,6 @@
 """The command line: parses, calls, prints. A module a group of commands."""
 
-from coupled.cli import flights, gaps
+from coupled.cli import calibration, flights, gaps
 from coupled.cli.app import app, main
 
-__all__ = ["app", "flights", "gaps", "main"]
+__all__ = ["app", "calibration", "flights", "gaps", "main"]
