@@ -14,6 +14,7 @@ from coupled.units import DEGREE_rad, INCH_PER_POUND_m_per_N, POUND_N
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result
+    from coupled.calibration.checks import Check
     from coupled.calibration.coverage import Coverage
     from coupled.calibration.estimate import Estimate
     from coupled.calibration.plan import Precision, Station
@@ -178,3 +179,37 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     table.add_row("scatter of K, errors in all variables", f"{100 * coverage.spread:.2f} %")
     table.add_row("a good reading taken for mistyped", f"{100 * coverage.accused:.1f} %")
     console.print(table)
+
+
+def print_checks(console: Console, control: str, checks: Sequence[Check], every: bool) -> None:
+    """Print a control's checks: those that fail and each kind's narrowest, or every one."""
+    shown = list(checks) if every else _narrowest(checks)
+    table = Table(box=None, pad_edge=False)
+    table.add_column(control, no_wrap=True)
+    for head in ("q̄, kPa", "rig", "specified", "±", "", "margin", ""):
+        table.add_column(head, justify="left" if head == "" else "right", no_wrap=True)
+    for c in shown:
+        numbers = (c.pressure_Pa / 1000.0, c.measured, c.reference, c.tolerance)
+        cells = [f"{numbers[0]:.2f}", *(_short(number) for number in numbers[1:])]
+        verdict = "pass" if c.passed else "[red]FAIL[/]"
+        name = c.name.replace(", positive", " +").replace(", negative", " −")
+        table.add_row(name, *cells, c.unit, f"{100 * c.margin:.0f} %", verdict)
+    console.print(table)
+    good = sum(check.passed for check in checks)
+    console.print(f"{control}: {good} of {len(checks)} checks pass\n", highlight=False)
+
+
+def _short(number: float) -> str:
+    """Return a number in three figures, or to a whole where it is large."""
+    return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
+
+
+def _narrowest(checks: Sequence[Check]) -> list[Check]:
+    """Return every check that fails, and of each kind the one with the least margin."""
+    least: dict[str, Check] = {}
+    for check in checks:
+        kind = check.name.split(",")[0]
+        if kind not in least or check.margin < least[kind].margin:
+            least[kind] = check
+    kept = list(least.values())
+    return [check for check in checks if not check.passed or check in kept]
