@@ -1,1 +1,1 @@
-"""The bench procedure: readings, their fit with errors, the virtual bench, and the documentation."""
+"""The bench procedure: readings, their fit with errors, a virtual bench, the documentation."""

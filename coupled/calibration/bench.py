@@ -121,9 +121,7 @@ def _wander(frames: int, rate: float, rng: np.random.Generator) -> Floats:
     return np.asarray(lfilter([1.0], [1.0, -memory], pushes))
 
 
-def _reading(
-    true: Floats, error: float, step: float, rng: np.random.Generator
-) -> Floats:
+def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) -> Floats:
     """Return what is read of true values: with the instrument's error, rounded to its step."""
     seen = true + error * rng.standard_normal(np.shape(true))
     return np.asarray(step * np.round(seen / step) if step > 0.0 else seen)

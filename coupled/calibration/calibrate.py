@@ -127,7 +127,9 @@ def calibrate(
     try:
         line = errors_in_variables(d, f, v1, instruments)
     except (FloatingPointError, np.linalg.LinAlgError):
-        raise InputError(file, "", "the fit does not settle; the readings tell too little") from None
+        raise InputError(
+            file, "", "the fit does not settle; the readings tell too little"
+        ) from None
     there = f != 0.0
     s3 = scales.s3_by_ratios(f[there], v3[there])
     s2 = scales.s2_from_gains(line.s1, s3, control.gains)
@@ -174,9 +176,13 @@ def _refuse_poor(
 ) -> None:
     n, force, deflection = len(readings.row), readings.force, readings.deflection
     if n < FEWEST:
-        raise InputError(file, "", f"holds {n} readings with deflection and force; {FEWEST} at least")
+        raise InputError(
+            file, "", f"holds {n} readings with deflection and force; {FEWEST} at least"
+        )
     if np.count_nonzero(force) < FEWEST:
-        raise InputError(file, "force", f"is not 0 in {np.count_nonzero(force)} rows; {FEWEST} at least")
+        raise InputError(
+            file, "force", f"is not 0 in {np.count_nonzero(force)} rows; {FEWEST} at least"
+        )
     rows = f"rows {readings.row[0]} to {readings.row[-1]}"
     for quantity, values in (("force", force), ("deflection", deflection), ("v1", readings.v1)):
         if np.ptp(values) <= 1e-12 * np.max(np.abs(values)):
@@ -190,7 +196,9 @@ def _refuse_poor(
         return
     slope = float(force @ deflection / (deflection @ deflection))
     separating = _separating(control, slope, float(np.max(np.abs(force))), unit_of(name))
-    problem = f"{why}: with one gradient v1 = (S1 - S1*K*G)*deflection, and S1 and K are inseparable"
+    problem = (
+        f"{why}: with one gradient v1 = (S1 - S1*K*G)*deflection, and S1 and K are inseparable"
+    )
     raise InputError(file, rows, f"{problem}; {separating}")
 
 
@@ -226,6 +234,4 @@ def check_scales(result: Result, control: Control) -> Sequence[str]:
         "S3": (believed.s3, result.s3),
         "K": (control.compensation.bend, result.line.bend),
     }
-    return [
-        name for name, (value, found) in pairs.items() if not found.low <= value <= found.high
-    ]
+    return [name for name, (value, found) in pairs.items() if not found.low <= value <= found.high]

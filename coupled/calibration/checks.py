@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from coupled.calibration.sweeps import Release
 from coupled.channels import ControlName
+from coupled.rig.parameters import Rig
 from coupled.rig.told import Told
-from coupled.units import DEGREE_rad, POUND_N
+from coupled.units import POUND_N, DEGREE_rad
 
 Floats = NDArray[np.float64]
 INNER, OUTER = 0.03, 0.93  # of the travel: where a sweep's force is judged
@@ -93,35 +94,41 @@ def band(control: ControlName, force: Floats) -> Floats:
     return np.maximum(FORCE_SHARE * np.abs(force), TOLERANCES[control].force_N)
 
 
-def judged(control: ControlName, travel: float, felt: Told, specified: Told) -> list[
-    tuple[Floats, Floats, Floats]
-]:
+def judged(
+    control: ControlName, travel: float, felt: Told, specified: Told
+) -> list[tuple[Floats, Floats, Floats]]:
     """Return (δ, F felt, F specified) along each leg, at the same δ in d, where it is judged."""
     found = []
     for (d, f, _), (d0, f0, _) in zip(legs(felt), legs(specified), strict=True):
         side = 1.0 if d.sum() > 0.0 else -1.0
         at = np.linspace(INNER, OUTER, 181) * travel
-        both = [np.interp(at, side * x, y) for x, y in ((d, f), (d0, f0))]
-        found.append((side * at, *both))
+        found.append((side * at, np.interp(at, side * d, f), np.interp(at, side * d0, f0)))
     return found
 
 
-def breakout(deflection: Floats, force: Floats, travel: float) -> float:
-    """Return the force in N at which a control leaves neutral: where its line starts."""
+def breakout(deflection: Floats, force: Floats, travel: float, straight: float) -> float:
+    """Return the force in N at which a control leaves neutral: where its line starts.
+
+    `straight` is where its first segment ends, d.
+    """
     share = np.abs(deflection) / travel
-    near = (share > LINE[0]) & (share < LINE[1])
+    near = (share > LINE[0]) & (share < min(LINE[1], 0.9 * straight / travel))
+    if np.count_nonzero(near) < 2:
+        near = share < LINE[1]
     return float(np.abs(np.polyfit(deflection[near], force[near], 1)[1]))
 
 
 def static_checks(
-    control: ControlName, travel: float, pressure_Pa: float, felt: Told, specified: Told
+    rig: Rig, control: ControlName, pressure_Pa: float, felt: Told, specified: Told
 ) -> list[Check]:
     """Return breakout both ways, and the force where it is nearest to its limit on each leg."""
     found = []
+    travel = rig.controls[control].travel
+    straight = rig.controls[control].schedule.break_deflection or travel
     pairs = zip(legs(felt), legs(specified), LEGS, strict=True)
     for i, ((d, f, _), (d0, f0, _), leg) in enumerate(pairs):
         if i % 2 == 0:
-            forces = (breakout(d, f, travel), breakout(d0, f0, travel))
+            forces = (breakout(d, f, travel, straight), breakout(d0, f0, travel, straight))
             allowed = TOLERANCES[control].breakout_N
             name = f"breakout, {leg.removeprefix('out, ')}"
             found.append(Check(name, pressure_Pa, *forces, allowed, "N"))

@@ -99,4 +99,3 @@ def _one(bench: Bench, seed: int) -> list[float]:
     plain = found.plain.bend
     errors = [found.line.bend.value / bend - 1.0, plain.value / bend - 1.0]
     return [*held, *errors, float(plain.low <= bend <= plain.high), float(bool(found.suspects))]
-

@@ -67,7 +67,7 @@ def document(
         condition = _condition(rig, control, pressure)
         conditions.append(condition)
         felt, specified = condition.felt, condition.specified
-        checks += static_checks(control, travel, pressure, felt, specified)
+        checks += static_checks(rig, control, pressure, felt, specified)
         if surface_rad is not None:
             checks += surface_checks(control, travel, surface_rad, pressure, felt)
         for side, (now, wanted) in condition.let_go.items():

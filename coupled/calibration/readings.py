@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError, nearest
 from coupled.files import write_text
 from coupled.schema import LARGEST
-from coupled.units import DEGREE_rad, INCH_m, POUND_N
+from coupled.units import POUND_N, DEGREE_rad, INCH_m
 
 Floats = NDArray[np.float64]
 MOST_ROWS = 10_000
@@ -55,10 +55,16 @@ class Readings:
         """Return the readings that do not stand in these rows of the file."""
         keep, null = ~np.isin(self.row, rows), ~np.isin(self.null_row, rows)
         return Readings(
-            self.row[keep],
-            tuple(label for label, kept in zip(self.label, keep, strict=True) if kept),
-            *(column[keep] for column in (self.deflection, self.force, self.v1, self.v3)),
-            *(c[null] for c in (self.null_row, self.null_v1, self.null_v2, self.null_v3)),
+            row=self.row[keep],
+            label=tuple(name for name, kept in zip(self.label, keep, strict=True) if kept),
+            deflection=self.deflection[keep],
+            force=self.force[keep],
+            v1=self.v1[keep],
+            v3=self.v3[keep],
+            null_row=self.null_row[null],
+            null_v1=self.null_v1[null],
+            null_v2=self.null_v2[null],
+            null_v3=self.null_v3[null],
         )
 
 
@@ -166,13 +172,19 @@ def _assembled(
             taken.append((number, cells[LABEL], four))
         elif "deflection" in value or "force" in value:
             raise InputError(path, f"row {number}", "has a deflection or a force without the other")
-    columns = np.array([four for _, _, four in taken], dtype=float).reshape(-1, 4).T
+    deflection, force, v1, v3 = np.array([four for *_, four in taken], float).reshape(-1, 4).T
+    null_v1, null_v2, null_v3 = np.array([volts for _, *volts in nulls], float).reshape(-1, 3).T
     return Readings(
-        np.array([number for number, _, _ in taken], dtype=np.int64),
-        tuple(label for _, label, _ in taken),
-        *columns,
-        np.array([null[0] for null in nulls], dtype=np.int64),
-        *np.array([null[1:] for null in nulls], dtype=float).reshape(-1, 3).T,
+        row=np.array([number for number, *_ in taken], np.int64),
+        label=tuple(label for _, label, _ in taken),
+        deflection=deflection,
+        force=force,
+        v1=v1,
+        v3=v3,
+        null_row=np.array([number for number, *_ in nulls], np.int64),
+        null_v1=null_v1,
+        null_v2=null_v2,
+        null_v3=null_v3,
     )
 
 
@@ -208,9 +220,7 @@ def write_readings(path: Path, readings: Readings, control: str, inches: bool = 
         strict=True,
     ):
         lines.append(",".join([label, *(_shown(x) for x in numbers), ""]))
-    for v3, v2, v1 in zip(
-        readings.null_v3, readings.null_v2, readings.null_v1, strict=True
-    ):
+    for v3, v2, v1 in zip(readings.null_v3, readings.null_v2, readings.null_v1, strict=True):
         lines.append(f"null,,,{_shown(v1)},{_shown(v3)},{_shown(v2)}")
     write_text(path, "\n".join(lines) + "\n")
 

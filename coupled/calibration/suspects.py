@@ -74,7 +74,9 @@ def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -
         scale = _scale(residual)
         weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0)
         before = beta
-        beta = np.linalg.lstsq(design * weight[:, None], target * weight, rcond=None)[0]
+        beta = np.asarray(
+            np.linalg.lstsq(design * weight[:, None], target * weight, rcond=None)[0], float
+        )
         if np.allclose(beta, before, rtol=1e-10, atol=0.0):
             break
     return beta
@@ -117,9 +119,9 @@ def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
     return _deviations((v - a * d - b * f) / spread)
 
 
-def _off_the_ratio(top: Floats, bottom: Floats, top_variance: Floats, bottom_variance: Floats) -> (
-    Floats
-):
+def _off_the_ratio(
+    top: Floats, bottom: Floats, top_variance: Floats, bottom_variance: Floats
+) -> Floats:
     """Return how many deviations each of `top` is off the median ratio times `bottom`."""
     there = bottom != 0.0
     slope = float(np.median(top[there] / bottom[there])) if there.any() else 0.0

@@ -52,14 +52,18 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> Told:
     data = rig.controls[control]
     frames = round(SWEEP_s * rig.frame_rate)
     ends = np.arange(frames + 1) / rig.frame_rate
-    quarter = 0.25 * SWEEP_s
-    path = np.interp(ends, np.array([0.0, 1.0, 3.0, 4.0]) * quarter, [0.0, BEYOND, -BEYOND, 0.0])
-    path *= data.travel
-    # The static line jumps at neutral by the breakout; its value on either side is what counts.
-    outward = np.where(path == 0.0, 1e-9 * data.travel, path)
+    quarter, half, last = 0.25 * SWEEP_s, 0.5 * SWEEP_s, SWEEP_s - TURN_s
+    stops = [TURN_s, quarter, half - TURN_s, half + TURN_s, 3.0 * quarter, last]
+    path = np.interp(ends, stops, [0.0, BEYOND, 0.0, 0.0, -BEYOND, 0.0]) * data.travel
+    # At neutral the static line jumps by the breakout, and the hand takes its time over it.
+    turns = [0.0, TURN_s, half - TURN_s, half + TURN_s, last, SWEEP_s]
+    preload = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+    tiny = 1e-9 * data.travel
+    outward = np.where(np.abs(path) < tiny, tiny, path)
     force = static_line(rig, control, pressure_Pa, outward).force
-    turns = np.array([quarter, quarter + TURN_s, 3.0 * quarter, 3.0 * quarter + TURN_s])
-    side = np.interp(ends, turns, [1.0, -1.0, -1.0, 1.0])
+    force = np.where(np.abs(path) < tiny, preload * force, force)
+    turns = [0.0, TURN_s, quarter, quarter + TURN_s, 3.0 * quarter, 3.0 * quarter + TURN_s]
+    side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
     force = force + side * max(data.loader.friction, data.loader.breakaway)
     nodes = np.interp(nodes_of(rig, frames), ends, force)
     return run_told(rig, control, nodes, np.full(frames, pressure_Pa))

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.channels import unit_of
-from coupled.units import DEGREE_rad, INCH_PER_POUND_m_per_N, POUND_N
+from coupled.units import POUND_N, DEGREE_rad, INCH_PER_POUND_m_per_N
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result
@@ -155,8 +155,8 @@ def print_plan(
     for head in (f"gradient, N/{d}", "q̄, Pa", f"deflection, {d}", "force, N", "readings"):
         table.add_column(head, justify="right")
     for s, count in chosen:
-        cells = (s.gradient, s.pressure_Pa, s.deflection, s.force)
-        table.add_row(*(f"{cell:.5g}" for cell in cells), str(count))
+        place = (s.gradient, s.pressure_Pa, s.deflection, s.force)
+        table.add_row(*(f"{number:.5g}" for number in place), str(count))
     console.print(table)
     console.print(
         "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
