@@ -22,10 +22,11 @@ from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
 from coupled.calibration.readings import Readings
 from coupled.channels import ControlName
 from coupled.rig.parameters import Rig
-from coupled.rig.told import nodes_of, run_told, supply_told
+from coupled.rig.told import nodes_of, run_told, smooth, supply_told
 
 Floats = NDArray[np.float64]
 PULL_s = 0.3  # the hand goes to its next force so quickly
+SLOW_s = 2.0  # and so slowly where friction must not matter
 GLANCE_s = 0.6  # from one instrument to the next
 WANDER_s = 0.2  # over which a hand forgets where it was
 TURNS = 40  # of the supply's knob at most
@@ -77,7 +78,9 @@ def _meters_rig(rig: Rig, control: ControlName) -> Rig:
 def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
     """Return how long the control needs to come to rest at its softest."""
     loader = rig.controls[control].loader
-    softest = min(*rig.controls[control].schedule.total_gradient, loader.basic_gradient)
+    table = rig.controls[control].schedule
+    slopes = [*table.total_gradient, *(table.second_gradient or ()), loader.basic_gradient]
+    softest = min(slopes)
     half = 0.5 * loader.damping / loader.mass
     root = half**2 - softest / loader.mass
     slowest = half - math.sqrt(root) if root > 0.0 else half
@@ -85,23 +88,28 @@ def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
 
 
 def _hold(
-    rig: Rig, bench: Bench, forces: Floats, pressures: Floats, rng: np.random.Generator
+    rig: Rig,
+    bench: Bench,
+    forces: Floats,
+    pressures: Floats,
+    rng: np.random.Generator,
+    pull_s: float = PULL_s,
 ) -> Floats:
     """Return δ, F, δc and F again as they were when each was looked at, shape (4, readings)."""
     settle = _settling_s(rig, bench.control, bench.instruments.hand == 0.0)
     rate = rig.frame_rate
-    each = math.ceil((PULL_s + settle + 3.0 * GLANCE_s) * rate) + 1
+    each = math.ceil((pull_s + settle + 3.0 * GLANCE_s) * rate) + 2
     frames = each * len(forces)
     held = np.repeat(forces, each)
     before = np.concatenate(([0.0], forces[:-1]))
-    pull = np.minimum(np.arange(each) / (PULL_s * rate), 1.0)
+    pull = smooth(np.arange(each) / (pull_s * rate))
     held += np.outer(before - forces, 1.0 - pull).ravel()
     if bench.instruments.hand > 0.0:
         held = held * (1.0 + bench.instruments.hand * _wander(frames, rate, rng))
     ends = np.append(np.arange(frames), frames) / rate
     nodes = np.interp(nodes_of(rig, frames), ends, np.append(held, held[-1]))
     told = run_told(rig, bench.control, nodes, np.repeat(pressures, each))
-    first = np.arange(len(forces)) * each + math.ceil((PULL_s + settle) * rate)
+    first = np.arange(len(forces)) * each + math.ceil((pull_s + settle) * rate)
     looks = [first + round(i * GLANCE_s * rate) for i in range(4)]
     return np.stack(
         (
@@ -137,14 +145,17 @@ def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
     loader = data.loader
     room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
     forces = np.linspace(0.5, 1.0, bench.nulls) * room
-    held = _hold(plain, bench, forces, np.zeros(bench.nulls), rng)
+    # From rest each time, and slowly, as the supply is: then friction is the same in both.
+    held = np.hstack(
+        [_hold(plain, bench, forces[i : i + 1], np.zeros(1), rng, SLOW_s) for i in range(bench.nulls)]
+    )
     scales, tools = real_scales(bench.rig.controls[control]), bench.instruments
     v1 = _reading(scales.s1 * held[2], tools.meter, tools.meter_step, rng)
     v3 = _reading(scales.s3 * held[3], tools.meter, tools.meter_step, rng)
-    settle = _settling_s(plain, control, tools.hand == 0.0) + PULL_s
+    settle = _settling_s(plain, control, tools.hand == 0.0)
 
     def shown(v2: float) -> float:
-        computed = supply_told(plain, control, v2 / scales.s2, settle)
+        computed = supply_told(plain, control, v2 / scales.s2, SLOW_s, settle)
         volts = np.array(scales.s1 * computed)
         return float(_reading(volts, tools.meter, tools.meter_step, rng))
 

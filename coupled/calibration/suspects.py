@@ -22,6 +22,7 @@ FEWEST = 5  # readings below which nothing can be told apart
 MOST_PAIRS = 600
 BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
 TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
+SLIP = 1e-4  # of the largest value: no mistyped digit is smaller
 NORMAL = 1.4826  # of a median absolute deviation to a standard deviation
 
 
@@ -71,7 +72,7 @@ def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -
     beta = _least_median(design, target)
     for _ in range(50):
         residual = target - design @ beta
-        scale = _scale(residual)
+        scale = _scale(residual) + 1e-12 * float(np.max(np.abs(target)))
         weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0)
         before = beta
         beta = np.asarray(
@@ -113,8 +114,7 @@ def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
     d, f, v = readings.deflection, readings.force, readings.v1
     a, b = robust_line(d, f, v, np.ones_like(v))
     spread = np.sqrt(error_variance(a, b, d, f, v, instruments))
-    floor = 1e-9 * np.max(np.abs(v))
-    spread = np.maximum(spread, floor)
+    spread = np.maximum(spread, SLIP * np.max(np.abs(v)))
     a, b = robust_line(d, f, v, spread)
     return _deviations((v - a * d - b * f) / spread)
 
@@ -126,7 +126,7 @@ def _off_the_ratio(
     there = bottom != 0.0
     slope = float(np.median(top[there] / bottom[there])) if there.any() else 0.0
     spread = np.sqrt(top_variance + slope**2 * bottom_variance)
-    spread = np.maximum(spread, 1e-9 * np.max(np.abs(top), initial=1e-300))
+    spread = np.maximum(spread, SLIP * np.max(np.abs(top), initial=1e-300))
     return _deviations((top - slope * bottom) / spread)
 
 

@@ -68,18 +68,24 @@ def run_told(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> To
     return Told(time_s, force, computed, deflection, estimate, gradient, modifying, surface)
 
 
-def supply_told(rig: Rig, control: str, supply_N: float, seconds: float) -> float:
-    """Return δc in d of a free control after so long under a supply in the multiplier's place.
+def smooth(share: Floats) -> Floats:
+    """Return a half cosine from 0 to 1 over shares of the way from 0 to 1."""
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(share, 0.0, 1.0)))
+
+
+def supply_told(rig: Rig, control: str, supply_N: float, rise_s: float, rest_s: float) -> float:
+    """Return δc in d of a free control under a supply in the multiplier's place.
 
     `supply_N` is the force that the supply's voltage v₂ stands for, v₂/S₂, positive with the
-    pilot's. The control starts at rest at neutral, with no hand on it (v₃ = 0).
+    pilot's, turned up over `rise_s` and left for `rest_s`. The control starts at rest at
+    neutral, with no hand on it (v₃ = 0).
     """
     controls = pack(alone(rig, control))
     p, s = controls["parameters"], controls["state"]
     p["loader"]["digital"] = 1  # F_mod is what is held, not a product
-    s["modification"]["held"] = -supply_N
-    nodes = max(1, round(seconds * rig.frame_rate * rig.substeps))
-    _supplied(p, s, nodes, 1.0 / (rig.frame_rate * rig.substeps))
+    h = 1.0 / (rig.frame_rate * rig.substeps)
+    nodes = np.arange(1, round((rise_s + rest_s) / h) + 1)
+    _supplied(p, s, supply_N * smooth(nodes * h / rise_s), h)
     return float(s["loader"]["computed"][0])
 
 
@@ -90,9 +96,10 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 
 
 @entry
-def _supplied(parameters: Any, states: Any, nodes: int, h: float) -> None:
+def _supplied(parameters: Any, states: Any, supply: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
     start_delay(p.loader, s.loader, 0.0)
     set_external(p.loader, s.loader, 1.0)
-    for _ in range(nodes):
+    for node in range(len(supply)):
+        s.modification.held = -supply[node]
         move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, h)
