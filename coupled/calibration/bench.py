@@ -147,7 +147,7 @@ def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
     forces = np.linspace(0.5, 1.0, bench.nulls) * room
     # From rest each time, and slowly, as the supply is: then friction is the same in both.
     held = np.hstack(
-        [_hold(plain, bench, forces[i : i + 1], np.zeros(1), rng, SLOW_s) for i in range(bench.nulls)]
+        [_hold(plain, bench, force, np.zeros(1), rng, SLOW_s) for force in forces[:, None]]
     )
     scales, tools = real_scales(bench.rig.controls[control]), bench.instruments
     v1 = _reading(scales.s1 * held[2], tools.meter, tools.meter_step, rng)

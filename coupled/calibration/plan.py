@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import t as student
 
 from coupled.calibration.belief import real_scales
@@ -82,24 +83,31 @@ def stations(
     strongest_N: float = STRONGEST_N,
 ) -> list[Station]:
     """Return a grid: so many gradients, each at as many deflections as hand and travel allow."""
-    data = rig.controls[control]
     grid = []
     for number, (pressure, gradient) in enumerate(gradient_sets(rig, control, gradients), start=1):
-        full = FULL_TRAVEL * data.travel
-        most = static_point(rig, control, pressure, full)
-        if float(most.force[0]) > strongest_N:
-            full *= max(strongest_N - data.loader.breakout, 0.0) / (
-                float(most.force[0]) - data.loader.breakout
-            )
-        if full <= 0.0:
-            problem = f"{strongest_N:g} N does not overcome the breakout; give more"
-            raise InputError(rig.name, "--strongest-N", problem)
+        full = _reach(rig, control, pressure, strongest_N)
         shares = np.linspace(NEAREST, FARTHEST, deflections) if deflections > 1 else [FARTHEST]
         for share in shares:
             point = static_point(rig, control, pressure, float(share * full))
             force = float(point.force[0])
             grid.append(Station(str(number), pressure, gradient, float(share * full), force))
     return grid
+
+
+def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) -> float:
+    """Return how far out a control can be held with so many N, d."""
+    full = FULL_TRAVEL * rig.controls[control].travel
+    tiny = 1e-3 * full
+
+    def excess(deflection: float) -> float:
+        return float(static_point(rig, control, pressure, deflection).force[0]) - strongest_N
+
+    if excess(full) <= 0.0:
+        return full
+    if excess(tiny) >= 0.0:
+        problem = f"{strongest_N:g} N does not overcome the breakout; give more"
+        raise InputError(rig.name, "--strongest-N", problem)
+    return float(brentq(excess, tiny, full, rtol=1e-6))
 
 
 def precision(

@@ -36,6 +36,12 @@ def bench(
     gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = 5,
     deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = 5,
     nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 5,
+    precision: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of a grid, the readings that a plan wants for K to ± %.", min=0.1, max=100
+        ),
+    ] = None,
     strongest: StrongestOption = 150.0,
     seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0, max=2**62)] = 1,
     output: Annotated[
@@ -56,7 +62,7 @@ def bench(
     """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does."""
     from coupled.calibration.bench import Bench, take_readings
     from coupled.calibration.estimate import perfect_instruments
-    from coupled.calibration.plan import stations
+    from coupled.calibration.plan import fewest, stations
     from coupled.calibration.readings import write_readings
 
     file, data, name = rig_and_control(rig, control)
@@ -67,9 +73,11 @@ def bench(
         check_target(path, [file])
     check_json(json_file, [file, path])
     tools = instruments(name, error)
-    tools = perfect_instruments() if perfect else tools
     grid = stations(data, name, gradients, deflections, strongest)
-    made = Bench(data, name, grid, tools, nulls)
+    if precision is not None:
+        planned = fewest(data, name, tools, precision / 100.0, strongest)
+        grid = [station for station, count in planned for _ in range(count)]
+    made = Bench(data, name, grid, perfect_instruments() if perfect else tools, nulls)
     if repeat:
         _repeat(made, repeat, seed, json_file)
         return

@@ -85,7 +85,7 @@ def supply_told(rig: Rig, control: str, supply_N: float, rise_s: float, rest_s: 
     p["loader"]["digital"] = 1  # F_mod is what is held, not a product
     h = 1.0 / (rig.frame_rate * rig.substeps)
     nodes = np.arange(1, round((rise_s + rest_s) / h) + 1)
-    _supplied(p, s, supply_N * smooth(nodes * h / rise_s), h)
+    _supplied(p, s, supply_N * smooth(np.asarray(nodes * (h / rise_s), np.float64)), h)
     return float(s["loader"]["computed"][0])
 
 
