@@ -79,7 +79,6 @@ def read_readings(path: Path, control: str) -> Readings:
         raise InputError(path, "", "holds no readings below its column names")
     if len(rows) > MOST_ROWS:
         raise InputError(path, "", f"holds more than {MOST_ROWS} rows")
-    seen: dict[tuple[str, ...], int] = {}
     parsed = []
     for number, cells in rows:
         if not any(cells):
@@ -87,10 +86,6 @@ def read_readings(path: Path, control: str) -> Readings:
         if len(cells) != len(heads):
             problem = f"has {len(cells)} cells, the columns are {len(heads)}"
             raise InputError(path, f"row {number}", problem)
-        if tuple(cells) in seen:
-            problem = f"is the same as row {seen[tuple(cells)]}; no two readings are, take one out"
-            raise InputError(path, f"row {number}", problem)
-        seen[tuple(cells)] = number
         parsed.append((number, dict(zip(heads, cells, strict=True))))
     return _assembled(path, parsed, units)
 
@@ -152,6 +147,7 @@ def _assembled(
 ) -> Readings:
     taken: list[tuple[int, str, tuple[float, ...]]] = []
     nulls: list[tuple[int, float, float, float]] = []
+    seen: dict[tuple[str, ...], int] = {}
     for number, cells in rows:
         null = "v2" in units and cells["v2_V"] != ""
         loose = ("deflection", "force") if null else ()
@@ -160,6 +156,10 @@ def _assembled(
             for quantity, (column, factor) in units.items()
             if cells[column] or (quantity not in loose and quantity != "v2")
         }
+        same = seen.setdefault(tuple(cells.values()), number)
+        if same != number:
+            problem = f"is the same as row {same}; no two readings are, take one out"
+            raise InputError(path, f"row {number}", problem)
         if null:
             if value["v2"] == 0.0 or value["v3"] == 0.0:
                 problem = "a null at 0 V tells nothing of S2; hold the control off neutral"
