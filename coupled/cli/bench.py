@@ -17,6 +17,7 @@ from coupled.cli.rigs import (
     StrongestOption,
     instruments,
     rig_and_control,
+    say_stale,
 )
 from coupled.errors import InputError
 from coupled.files import check_target
@@ -43,10 +44,10 @@ def bench(
         ),
     ] = None,
     strongest: StrongestOption = 150.0,
-    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0, max=2**62)] = 1,
+    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0)] = 1,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Readings, CSV.  [default: out/RIG-readings.csv]"),
+        typer.Option("--output", "-o", help="Readings, CSV (default: out/RIG-readings.csv)."),
     ] = None,
     inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
     perfect: Annotated[bool, typer.Option("--perfect", help="Without any error.")] = False,
@@ -72,6 +73,7 @@ def bench(
     if not repeat:
         check_target(path, [file])
     check_json(json_file, [file, path])
+    say_stale(data)
     tools = instruments(name, error)
     grid = stations(data, name, gradients, deflections, strongest)
     if precision is not None:

@@ -9,7 +9,7 @@ import typer
 
 from coupled.channels import ControlName
 from coupled.cli.app import JsonOption, app
-from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control
+from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.resources import find, shipped_rigs
@@ -26,19 +26,18 @@ if TYPE_CHECKING:
 )
 def document(
     rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
-    control: Annotated[str, typer.Option(help="One control only.  [default: all]")] = "",
+    control: Annotated[str, typer.Option(help="One control only (default: all).")] = "",
     readings: Annotated[
-        Path | None, typer.Option(help="Readings to draw.  [default: a virtual bench's]")
+        Path | None, typer.Option(help="Readings to draw (default: a virtual bench's).")
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder.  [default: out/RIG-document]"),
+        typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Print every check.")] = False,
     json_file: JsonOption = "",
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks."""
-    from coupled.calibration.belief import stale
     from coupled.calibration.documentation import controls_of, surface_travels
     from coupled.calibration.documentation import document as gather
     from coupled.rig.rigfile import read_rig
@@ -54,6 +53,7 @@ def document(
         raise InputError(folder, "--output", "is a file; give a folder")
     check_target(pdf, inputs)
     check_json(json_file, [*inputs, pdf])
+    say_stale(data)
     fits = {name: _fit_for(readings, data, name, chosen) for name in chosen}
     travels = surface_travels(data, file)
     documents = []
@@ -68,9 +68,6 @@ def document(
             print_checks(out, found.control, found.checks, every)
         if not travels:
             out.print("no aircraft: the surface's position is not judged\n")
-        for name in chosen:
-            for change in stale(data.controls[name]):
-                say(f"stale calibration of the {name}: {change}")
         say(f"{len(written)} figures and {pdf.name} in {folder}")
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
     give_json(table, json_file)

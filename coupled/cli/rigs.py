@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coupled.channels import CONTROL_NAMES, ControlName
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
+from coupled.terminal import err
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
@@ -27,8 +29,8 @@ ErrorOption = Annotated[
         "--error",
         metavar="NAME=VALUE",
         help="Standard deviation of ruler (mm; ° on a wheel), scale (N), meter (V), or of the hand"
-        " (% of its force).  [default: ruler=0.3 scale=0.3 meter=0.01 hand=0.3; ruler=0.2 on a"
-        " wheel]",
+        " (% of its force); may be repeated (default: ruler=0.3 scale=0.3 meter=0.01 hand=0.3;"
+        " ruler=0.2 on a wheel).",
     ),
 ]
 StrongestOption = Annotated[
@@ -46,6 +48,15 @@ def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
         if known == control and known in rig.controls:
             return file, rig, known
     raise InputError(file, "--control", f"no {control!r}; {nearest(control, rig.controls)}")
+
+
+def say_stale(rig: Rig) -> None:
+    """Say on the terminal's error side what has changed since a rig's calibrations."""
+    from coupled.calibration.belief import stale
+
+    for name, control in rig.controls.items():
+        for change in stale(control):
+            err.print(f"[yellow]stale calibration:[/] {name}: {escape(change)}", soft_wrap=True)
 
 
 def instruments(control: str, errors: Sequence[str] | None) -> Instruments:

@@ -20,6 +20,12 @@ def scale(control: str) -> tuple[float, str]:
     return (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
 
 
+def plain(text: str, longest: int = 20) -> str:
+    """Return a user's words cut to length, where a dollar sign would begin a formula."""
+    cut = text if len(text) <= longest else text[: longest - 1] + "…"
+    return "".join(c if c.isprintable() else "?" for c in cut).replace("$", r"\$")
+
+
 def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
     """Return a figure of so many panels, each `height` inches tall, and their axes."""
     figure = Figure(figsize=(1.4 + 3.6 * columns, 1.1 + height * rows), layout="constrained")

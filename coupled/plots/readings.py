@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.channels import unit_of
-from coupled.plots.pages import scale
+from coupled.plots.pages import plain, scale
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def draw_readings(found: Result, source: str) -> Figure:
         if unit == "cm":
             shown += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
-        top.plot(factor * d, readings.v1[ours], label=f"set {label}: {shown}"[:60], **style)
+        top.plot(factor * d, readings.v1[ours], label=f"set {plain(label)}: {shown}", **style)
         reach = np.array([0.0, d[np.argmax(np.abs(d))]])
         top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
         below.plot(factor * d, line.residual[ours], **style)
@@ -45,7 +45,8 @@ def draw_readings(found: Result, source: str) -> Figure:
     below.set_xlabel(f"deflection δ, {unit}")
     for axes in (top, below):
         axes.grid(alpha=0.25)
-    top.legend(fontsize=8, loc="upper left")
+    many = len(set(readings.label)) > 8
+    top.legend(fontsize=6 if many else 8, ncols=2 if many else 1, loc="upper left")
     d_unit = unit_of(found.control)
     s1, bend = line.s1, line.bend
     text = f"S₁ = {s1.value:.5g} ± {s1.half_width:.2g} V/{d_unit}\n"
@@ -55,6 +56,7 @@ def draw_readings(found: Result, source: str) -> Figure:
         text += f"\n   = {inches.value:.4f} ± {inches.half_width:.4f} in/lb"
     text += f"\n{found.count} readings, ± 95 %"
     top.annotate(text, (0.98, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=9)
-    name = source.replace("$", r"\$")
-    figure.suptitle(f"{found.control}: v₁ = S₁·(δ − K·F) fitted to {name}"[:90], fontsize=12)
+    figure.suptitle(
+        f"{found.control}: v₁ = S₁·(δ − K·F) fitted to {plain(source, 50)}", fontsize=12
+    )
     return figure

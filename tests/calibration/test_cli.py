@@ -68,7 +68,14 @@ def test_a_stale_calibration_is_said(folder: Path) -> None:
     (folder / "new.toml").write_text(text)
     done = coupled(folder, "calibrate", "r.csv", "--rig", "new.toml")
     assert "stale calibration" in done.stdout
-    assert "the column's length (m) was 0.9 and is 0.8" in " ".join(done.stdout.split())
+    change = "the column's length (m) was 0.9 and is 0.8"
+    assert change in " ".join(done.stdout.split())
+    run = """name = "r"\ncard = "c"\nrig = "new.toml"\nduration_s = 0.2\n
+[pilot.column]\nkind = "step"\nforce_N = 10.0\n"""
+    (folder / "run.toml").write_text(run)
+    flown = coupled(folder, "fly", "run.toml", "-o", "f.csv")
+    assert flown.returncode == 0
+    assert flown.stderr == f"stale calibration: column: {change}\n"
 
 
 def test_a_plan_and_its_form(folder: Path) -> None:
