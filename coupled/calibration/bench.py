@@ -188,7 +188,7 @@ def _turn_until(shown: Callable[[float], float], wanted: float, tools: Instrumen
     Up until it is passed; then where two settings on either side say that it should be, or
     half-way between them where that has not helped (within a breakout, or at a stop).
     """
-    near = max(0.5 * (tools.meter + tools.meter_step), 1e-13 * wanted)
+    near = max(tools.meter + tools.meter_step, 1e-13 * wanted)
     low, high = (0.0, shown(0.0)), (wanted, shown(wanted))
     while high[1] < wanted and high[0] < MOST_VOLTS:
         low, high = high, (2.0 * high[0], shown(2.0 * high[0]))

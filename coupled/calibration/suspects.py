@@ -78,7 +78,7 @@ def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -
         beta = np.asarray(
             np.linalg.lstsq(design * weight[:, None], target * weight, rcond=None)[0], float
         )
-        if np.allclose(beta, before, rtol=1e-10, atol=0.0):
+        if np.allclose(beta, before, rtol=1e-6, atol=0.0):
             break
     return beta
 

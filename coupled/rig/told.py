@@ -7,6 +7,7 @@ loader with its multiplier replaced by a voltage supply, as the null of eq. (14)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -84,9 +85,15 @@ def supply_told(rig: Rig, control: str, supply_N: float, rise_s: float, rest_s: 
     p, s = controls["parameters"], controls["state"]
     p["loader"]["digital"] = 1  # F_mod is what is held, not a product
     h = 1.0 / (rig.frame_rate * rig.substeps)
-    nodes = np.arange(1, round((rise_s + rest_s) / h) + 1)
-    _supplied(p, s, supply_N * smooth(np.asarray(nodes * (h / rise_s), np.float64)), h)
+    _supplied(p, s, supply_N, _turned_up(rise_s, rest_s, h), h)
     return float(s["loader"]["computed"][0])
+
+
+@lru_cache(maxsize=8)
+def _turned_up(rise_s: float, rest_s: float, h: float) -> Floats:
+    """Return how far up a supply is at the nodes after the first, 0 to 1."""
+    nodes = np.arange(1.0, round((rise_s + rest_s) / h) + 1.0)
+    return smooth(nodes * (h / rise_s))
 
 
 @entry
@@ -96,10 +103,10 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 
 
 @entry
-def _supplied(parameters: Any, states: Any, supply: Floats, h: float) -> None:
+def _supplied(parameters: Any, states: Any, supply: float, share: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
     start_delay(p.loader, s.loader, 0.0)
     set_external(p.loader, s.loader, 1.0)
-    for node in range(len(supply)):
-        s.modification.held = -supply[node]
+    for node in range(len(share)):
+        s.modification.held = -supply * share[node]
         move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, h)
