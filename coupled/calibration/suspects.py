@@ -1,7 +1,7 @@
 """Mistyped readings, found by a robust loss and named by their row.
 
-Tukey's biweight, started from the line through two readings that leaves the least median
-residual, so that nearly half of the readings may be wrong. v₃ against F is held to S₃ in
+Tukey's biweight, started from the line through two readings that most others agree with, so
+that a third of the readings may be wrong. v₃ against F is held to S₃ in
 the same way: a force with swapped digits shows there and hardly in v₁.
 """
 
@@ -19,7 +19,8 @@ from coupled.calibration.readings import Readings
 
 Floats = NDArray[np.float64]
 FEWEST = 5  # readings below which nothing can be told apart
-MOST_PAIRS = 600
+MOST_PAIRS = 400
+APART = 0.3  # of the greatest angle between two readings' (δ, F)
 BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
 TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
 SLIP = 1e-4  # of the largest value: no mistyped digit is smaller
@@ -69,10 +70,9 @@ def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -
     """Return (a, b) by the biweight; `spread` are the readings' relative standard deviations."""
     design = np.column_stack((deflection, force)) / spread[:, None]
     target = v1 / spread
-    beta = _least_median(design, target)
+    beta, scale = _most_agreed(design, target)
     for _ in range(50):
         residual = target - design @ beta
-        scale = _scale(residual) + 1e-12 * float(np.max(np.abs(target)))
         weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0)
         before = beta
         beta = np.asarray(
@@ -83,24 +83,26 @@ def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -
     return beta
 
 
-def _least_median(design: Floats, target: Floats) -> Floats:
-    """Return the line through two readings whose residuals have the least median size."""
+def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
+    """Return the line through two readings that most others agree with, and their scale.
+
+    Only readings of gradients well apart make a line: two of one gradient would fit all of
+    that gradient whatever the others are. The scale is that of the least median residual.
+    """
     pairs = np.array(list(combinations(range(len(target)), 2)))
+    unit = design / np.linalg.norm(design, axis=0)
+    one, two = unit[pairs[:, 0]], unit[pairs[:, 1]]
+    turn = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+    turn /= np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1) + 1e-300
+    pairs = pairs[turn >= APART * turn.max()]
     if len(pairs) > MOST_PAIRS:
         pairs = np.random.default_rng(0).choice(pairs, MOST_PAIRS, replace=False)
-    one, two = design[pairs[:, 0]], design[pairs[:, 1]]
-    determinant = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    size = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
-    good = np.abs(determinant) > 1e-9 * size
-    if not good.any():
-        return np.asarray(np.linalg.lstsq(design, target, rcond=None)[0])
-    one, two, pairs, determinant = one[good], two[good], pairs[good], determinant[good]
-    first, second = target[pairs[:, 0]], target[pairs[:, 1]]
-    a = (first * two[:, 1] - second * one[:, 1]) / determinant
-    b = (second * one[:, 0] - first * two[:, 0]) / determinant
-    betas = np.column_stack((a, b))
-    medians = np.median(np.abs(target - betas @ design.T), axis=1)
-    return np.asarray(betas[np.argmin(medians)])
+    betas = np.linalg.solve(design[pairs], target[pairs][:, :, None])[:, :, 0]
+    residuals = np.abs(target - betas @ design.T)
+    floor = 1e-12 * float(np.max(np.abs(target)))
+    scale = min(_scale(residual) for residual in residuals) + floor
+    agreed = np.sum(np.minimum((residuals / (BIWEIGHT * scale)) ** 2, 1.0), axis=1)
+    return np.asarray(betas[np.argmin(agreed)]), scale
 
 
 def _scale(residual: Floats) -> float:

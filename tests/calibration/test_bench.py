@@ -175,3 +175,11 @@ def test_full_circle(tmp_path: Path) -> None:
         print(f"full circle: loss {100 * after.loss:+.2f} %, felt {after.felt_ratio:.4f}")
         assert abs(after.loss) < 0.005
         assert after.felt_ratio == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
+    """A fault crosses from a worker as the one line that it is."""
+    rig = report_rig()
+    few = stations(rig, "column", 3, 1)
+    with pytest.raises(InputError, match="holds 3 readings"):
+        measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)

@@ -179,3 +179,28 @@ def test_a_calibration_changes_beliefs_and_not_the_hardware() -> None:
     taken = with_calibration(rig, "column", found, hardware=True).controls["column"]
     assert taken.loader.bend == found.line.bend.value
     assert taken.sensing.deflection_scale == taken.sensing.force_scale == 1.0
+
+
+@pytest.mark.parametrize("counts", [(5, 8), (8, 5), (3, 9), (12, 4)])
+def test_repeated_corners_are_not_taken_for_mistyped(counts: tuple[int, int]) -> None:
+    """A plan repeats two corners: the smaller group must not look like outliers to the larger."""
+    delta = np.repeat([0.169, 0.0685], counts)
+    force = np.repeat([94.7, 150.0], counts)
+    rng = np.random.default_rng(6)
+    for _ in range(40):
+        good = with_errors(delta, force, USUAL, rng)
+        good = replace(good, label=tuple(np.repeat(["soft", "stiff"], counts)))
+        assert fit(good).suspects == ()
+    typed = good.v1.copy()
+    typed[-1] *= 1.2
+    typed[0] *= 0.8
+    found = fit(replace(good, v1=typed))
+    assert [s.row for s in found.suspects] == [2, 1 + sum(counts)]
+
+
+def test_a_reading_at_neutral_does_no_harm() -> None:
+    good = readings(np.append(grid()[0], 0.0), np.append(grid()[1], 0.0))
+    found = fit(good)
+    assert found.suspects == ()
+    assert found.line.bend.value == pytest.approx(K, rel=1e-9)
+    assert found.s3.value == pytest.approx(0.26, rel=1e-12)
