@@ -52,7 +52,6 @@ def take_readings(bench: Bench, seed: int) -> Readings:
     pressures = np.array([station.pressure_Pa for station in bench.stations])
     forces = np.array([station.force for station in bench.stations])
     read = _hold(rig, bench, forces, pressures, rng)
-    null = _null(rig, bench, rng)
     scales = real_scales(bench.rig.controls[control])
     tools = bench.instruments
     count, labels = len(forces), tuple(station.label for station in bench.stations)
@@ -60,6 +59,7 @@ def take_readings(bench: Bench, seed: int) -> Readings:
     force = _reading(read[1], tools.scale, tools.scale_step, rng)
     v1 = _reading(scales.s1 * read[2], tools.meter, tools.meter_step, rng)
     v3 = _reading(scales.s3 * read[3], tools.meter, tools.meter_step, rng)
+    null = _null(rig, bench, rng)
     rows = np.arange(2, count + 2)
     null_rows = np.arange(count + 2, count + 2 + null.shape[1])
     return Readings(rows, labels, deflection, force, v1, v3, null_rows, *null)

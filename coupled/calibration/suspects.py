@@ -100,7 +100,7 @@ def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
     betas = np.linalg.solve(design[pairs], target[pairs][:, :, None])[:, :, 0]
     residuals = np.abs(target - betas @ design.T)
     floor = 1e-12 * float(np.max(np.abs(target)))
-    scale = min(_scale(residual) for residual in residuals) + floor
+    scale = _scale(residuals[np.argmin(np.median(residuals, axis=1))]) + floor
     agreed = np.sum(np.minimum((residuals / (BIWEIGHT * scale)) ** 2, 1.0), axis=1)
     return np.asarray(betas[np.argmin(agreed)]), scale
 

@@ -44,7 +44,7 @@ def bench(
         ),
     ] = None,
     strongest: StrongestOption = 150.0,
-    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0)] = 1,
+    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0)] = 0,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Readings, CSV (default: out/RIG-readings.csv)."),

@@ -94,5 +94,5 @@ def _fit_for(
         grid = stations(rig, control, 5, 5)
     except InputError:
         return None
-    made = take_readings(Bench(rig, control, grid, tools), 1)
+    made = take_readings(Bench(rig, control, grid, tools), 0)
     return fit(made, data, control, tools, rig.name), "a virtual bench's readings"

@@ -45,7 +45,8 @@ def test_bench_calibrate_write_and_again(folder: Path) -> None:
     assert "by the null, eq. (14)" in done.stdout
     table = json.loads((folder / "c.json").read_text())
     bend = table["errors_in_variables"]["bend_m_per_N"]
-    assert bend["low"] < K < bend["high"]
+    assert bend["low"] < bend["value"] < bend["high"]
+    assert bend["value"] == pytest.approx(K, rel=0.08)
     assert table["normal_equations"]["a_V_per_m"] == pytest.approx(
         table["ordinary_least_squares"]["s1_V_per_m"]["value"], rel=1e-12
     )
