@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,10 @@ from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
+from coupled.rig.statics import static_line
 from coupled.rig.told import run_told, supply_told
 from tests.calibration.made import report_rig
+from tests.rigs import G_STIFF, K_REPORT
 from tests.rigs import bench as bench_rig
 
 CHANGES: dict[str, Any] = {
@@ -183,3 +186,27 @@ def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
     few = stations(rig, "column", 3, 1)
     with pytest.raises(InputError, match="holds 3 readings"):
         measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)
+
+
+def test_a_wandering_hand_parts_the_instruments_readings() -> None:
+    """Perfect instruments, read one after the other: what is left is the hand's 1 %."""
+    rig = report_rig()
+    tools = replace(perfect_instruments(), hand=0.01)
+    readings = take_readings(Bench(rig, "column", stations(rig, "column", 5, 5), tools, 0), 2)
+    found = calibrate(readings, rig.controls["column"], "column", tools, "bench")
+    assert 0.6 < found.line.excess < 1.3
+    assert np.std(readings.v3 / readings.force) / 0.25 == pytest.approx(0.014, rel=0.4)
+
+
+def test_statics_and_frames_agree_on_scales_that_are_off() -> None:
+    """The host's δ̂ and F_mod, breakout's term and all, in closed form and stepped to rest."""
+    rig = bench_rig({**CHANGES, "controls.column.sensing.word_length_bits": 0})
+    told = run_told(rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0))
+    line = static_line(rig, "column", 3000.0, told.computed[-1:] / 0.93)
+    assert line.force[0] == pytest.approx(70.0, rel=1e-9)
+    assert told.estimate[-1] == pytest.approx(line.estimate[0], rel=1e-9)
+    control = rig.controls["column"]
+    asked = (line.force[0] - 8.0 - 560.0 * line.computed[0]) * 1.1
+    felt = G_STIFF / (1.0 - K_REPORT * G_STIFF)
+    extra = felt * K_REPORT * control.loader.breakout
+    assert asked == pytest.approx((felt - 560.0) * line.computed[0] + extra, rel=1e-9)

@@ -122,3 +122,16 @@ def test_other_units_give_the_same_figures(metres: float, newtons: float, volts:
     ):
         assert there.value == pytest.approx(unit * here.value, rel=1e-7)
         assert there.error == pytest.approx(unit * here.error, rel=1e-6)
+
+
+def test_the_standard_errors_are_the_scatter() -> None:
+    rng = np.random.default_rng(9)
+    fits = []
+    for _ in range(500):
+        r = with_errors(*grid(), USUAL, rng)
+        fits.append(errors_in_variables(r.deflection, r.force, r.v1, USUAL))
+    for name in ("s1", "bend"):
+        values = [getattr(fit, name).value for fit in fits]
+        errors = [getattr(fit, name).error for fit in fits]
+        assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(values), rel=0.2)
+    assert np.mean([fit.excess for fit in fits]) == pytest.approx(1.0, abs=0.05)
