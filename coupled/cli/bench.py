@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    epilog="[dim]Examples: coupled bench · coupled bench --rig 737 --control wheel -o out/w.csv"
+    epilog="[dim]Examples: coupled bench · coupled bench --rig c172p --control wheel -o out/w.csv"
     " · coupled bench --repeat 1000[/]"
 )
 def bench(
