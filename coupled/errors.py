@@ -26,6 +26,10 @@ class InputError(ValueError):
         where = f"{self.file}: {self.key}: " if key else f"{self.file}: "
         super().__init__(where + " ".join(problem.split()))
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+        """Let it pass from one process to another."""
+        return InputError, (self.file, self.key, self.problem)
+
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a hint that names the known word most like `word`, or lists them all."""

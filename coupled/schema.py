@@ -52,13 +52,20 @@ def file_keys(section: type[Section], d: str) -> dict[str, str]:
 def load_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's tables."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "is not text in UTF-8; a TOML file is wanted") from None
+    return loads_toml(text, path)
+
+
+def loads_toml(text: str, file: object) -> dict[str, Any]:
+    """Return the tables of a TOML text; `file` is named in faults."""
+    try:
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"is not valid TOML: {error}") from None
+        raise InputError(file, "", f"is not valid TOML: {error}") from None
 
 
 def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) -> dict[str, Any]:

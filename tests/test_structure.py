@@ -92,13 +92,16 @@ def test_every_key_of_the_files_is_documented() -> None:
     text = (PACKAGE.parent / "docs" / "files.md").read_text(encoding="utf-8")
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
-    sections += [parameters.Sensing, parameters.Rigging, RunFile, Bench, Wind, Measure]
+    sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
+    sections += [RunFile, Bench, Wind, Measure]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
             if key in ("controls", "flight", "loader", "schedule", "compensation", "sensing"):
                 continue
-            if key in ("rigging", "noise", "measure", "bench", "wind", "case", "kind"):
+            if key in ("gains", "calibration", "rigging", "noise", "measure"):
+                continue
+            if key in ("bench", "wind", "case", "kind"):
                 continue
             if section is LogMap:
                 assert f"[{key}" in text, key

@@ -41,7 +41,9 @@ def main() -> None:
         say_error(str(error))
         code = 2
     except TyperException as error:  # a word of the command line that it does not know
-        say_error(" ".join(str(error).split()) + " (coupled --help shows what there is)")
+        say_error(
+            " ".join(error.format_message().split()) + " (coupled --help shows what there is)"
+        )
         code = 2
     except (typer.Abort, KeyboardInterrupt):
         code = 130

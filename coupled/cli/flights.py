@@ -9,6 +9,7 @@ import typer
 from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, app
+from coupled.cli.rigs import say_stale
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
@@ -44,6 +45,7 @@ def compare(
         check_format(path)
         check_target(path, inputs)
     check_json(json_file, [*inputs, path])
+    say_stale(scenarios[0].rig)
     with progress() as advance:
         flights = compare_flights(scenarios, advance)
     if json_file != "-":
@@ -97,6 +99,7 @@ def fly(
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
     check_json(json_file, [*inputs, path, manifest_path(path)])
+    say_stale(scenario.rig)
     with progress() as advance:
         record = fly_scenario(scenario, lambda done, total: advance(scenario.label, done, total))
     write_record(record, path)

@@ -13,6 +13,7 @@ since the loader sees δc = δ − K·F. With a breakout, solving that for δ gi
 
 which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too
 little at every deflection, G being the slope there. The break lies at δc₁ = δ₁ − K·F(δ₁).
+The host asks for ΔF in volts, v₂ = S₂·ΔF: a scale S₂ that is off makes another force of it.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ class ModificationParameters(Protocol):
     compensated: int  # gradient compensation, eq. (12), on or off
     exact: int  # with the breakout's term, or as printed
     digital: int  # the product ΔG·δc is made by the host and held over a frame
+    made: float  # ΔF as made over ΔF as asked for: S₂ believed over real
 
 
 class ModificationState(Protocol):
@@ -68,8 +70,9 @@ def set_gradients(
             s.breakout = total_to_computed(first, p.bend) * p.bend * p.breakout
         first = total_to_computed(first, p.bend)
         second = total_to_computed(second, p.bend)
-    s.first = first - p.basic_gradient
-    s.second = second - p.basic_gradient
+    s.first = p.made * (first - p.basic_gradient)
+    s.second = p.made * (second - p.basic_gradient)
+    s.breakout *= p.made
 
 
 @stage

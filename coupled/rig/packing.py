@@ -73,6 +73,7 @@ def _pack_host(p: Any, control: Control, frame_s: float) -> None:
     m["break_deflection"] = table.break_deflection
     m["exact"] = host.breakout_term == "exact"
     m["digital"] = loader.multiplier == "digital"
+    m["made"] = 1.0 / control.sensing.modifying_scale
     p["compensation"]["bend"] = host.bend if host.deflection else 0.0
 
 
@@ -99,7 +100,7 @@ def _pack_linkage(p: Any, control: Control, h: float) -> None:
 
 def _pack_sensing(p: Any, control: Control) -> None:
     sensing = control.sensing
-    p["deflection_scale"] = sensing.deflection_scale
+    p["deflection_scale"], p["force_scale"] = sensing.deflection_scale, sensing.force_scale
     if sensing.word_length == 0:
         return
     step_V = 2.0 * sensing.full_scale / 2**sensing.word_length

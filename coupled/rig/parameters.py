@@ -68,6 +68,8 @@ class Sensing(Section):
     """Scales and converters between loader and host (figure 3); 0 bits is no converter."""
 
     deflection_scale: float = quantity("", 1.0, gt=0)
+    modifying_scale: float = quantity("", 1.0, gt=0)
+    force_scale: float = quantity("", 1.0, gt=0)
     word_length: int = quantity("bits", 0, ge=0, le=24)
     full_scale: float = quantity("V", 100.0, gt=0)
     s1: float = quantity("V_per_{d}", 0.0, ge=0)
@@ -85,6 +87,36 @@ class Rigging(Section):
     offset: float = quantity("norm", 0.0, ge=-1, le=1)
 
 
+class Gains(Section):
+    """What is fixed before any readings are taken; 0 for a ratio that is not known (figure 3)."""
+
+    mechanical_advantage: float = quantity("", 1.0, gt=0)
+    s1_over_s2: float = quantity("N_per_{d}", 0.0, ge=0)
+    s3_over_s2: float = quantity("", 0.0, ge=0)
+
+
+class Calibration(Section):
+    """What a calibration found, with standard errors, and the gains it was made under.
+
+    `readings` is 0 where there has been none; S2 is 0 where it was not found.
+    """
+
+    readings: int = quantity("", 0, ge=0)
+    date: str = quantity("", "", pattern=r"^[^\x00-\x1f\x7f]{0,40}$")
+    s1: float = quantity("V_per_{d}", 0.0, ge=0)
+    s1_error: float = quantity("V_per_{d}", 0.0, ge=0)
+    s2: float = quantity("V_per_N", 0.0, ge=0)
+    s2_error: float = quantity("V_per_N", 0.0, ge=0)
+    s3: float = quantity("V_per_N", 0.0, ge=0)
+    s3_error: float = quantity("V_per_N", 0.0, ge=0)
+    bend: float = quantity("{d}_per_N", 0.0)
+    bend_error: float = quantity("{d}_per_N", 0.0, ge=0)
+    length: float = quantity("m", 0.0, ge=0)
+    mechanical_advantage: float = quantity("", 1.0, gt=0)
+    s1_over_s2: float = quantity("N_per_{d}", 0.0, ge=0)
+    s3_over_s2: float = quantity("", 0.0, ge=0)
+
+
 class Control(Section):
     """One control of the rig."""
 
@@ -95,7 +127,9 @@ class Control(Section):
     schedule: Schedule
     compensation: Compensation
     sensing: Sensing = Sensing()
+    gains: Gains = Gains()
     rigging: Rigging = Rigging()
+    calibration: Calibration = Calibration()
 
 
 class Flight(Section):

@@ -2,7 +2,7 @@
 
 Volts stand for metres and newtons: v₁ = S₁·δc, v₂ = S₂·ΔF, v₃ = S₃·F, eq. (2). A
 converter of a given word length rounds them to its step and holds them at its full
-scale. A scale S₁ that is off makes the δc read that factor too large.
+scale. A scale S₁ or S₃ that is off makes the δc or F read that factor too large.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ class SensingParameters(Protocol):
     """Scales and converter steps, already divided into the quantity's own unit."""
 
     deflection_scale: float  # S₁ real over believed
+    force_scale: float  # S₃ real over believed
     computed_step: float  # converter step of δc, d; 0 for none
     computed_range: float  # converter range of δc, d
     force_step: float  # of F, N
@@ -48,4 +49,4 @@ def read_computed(p: SensingParameters, computed: float, noise: float) -> float:
 @stage
 def read_force(p: SensingParameters, force: float, noise: float) -> float:
     """Return F as the host reads it, N."""
-    return converted(force + noise, p.force_step, p.force_range)
+    return converted(p.force_scale * force + noise, p.force_step, p.force_range)

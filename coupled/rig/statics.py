@@ -72,8 +72,9 @@ def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) ->
     )
     deflection = computed + np.array([bend(p["linkage"], f) for f in force])
     read = p["sensing"]["deflection_scale"] * computed
+    force_read = p["sensing"]["force_scale"] * force
     believed = np.array(
-        [estimate(p["compensation"], x, f) for x, f in zip(read, force, strict=True)]
+        [estimate(p["compensation"], x, f) for x, f in zip(read, force_read, strict=True)]
     )
     return Statics(
         computed,

@@ -68,6 +68,13 @@ def test_a_rig_written_is_read_back_the_same(name: str, tmp_path: Path) -> None:
         ("flight", {"model": "c172p"}, "is missing"),
         ("flight", 3, "should be a table"),
         ("controls.column.sensing.word_length_bits", 12, "must be given"),
+        ("controls.column.sensing.force_scale", 0.0, "greater than 0"),
+        ("controls.column.gains.mechanical_advantage", -1.0, "greater than 0"),
+        ("controls.column.gains.s1_over_s2_N_per_m", "1", "valid number"),
+        ("controls.column.gains.s1_over_s3", 1.0, "unknown key"),
+        ("controls.column.calibration.bend_in_per_lb", 0.016, "give bend_m_per_N instead"),
+        ("controls.column.calibration.readings", -1, "greater than or equal to 0"),
+        ("controls.column.calibration.date", "a\nb", "match pattern"),
     ],
 )
 def test_a_fault_is_one_line_with_its_key(key: str, value: Any, says: str) -> None:

@@ -1,0 +1,204 @@
+"""The virtual bench: a person with ruler, spring scale and voltmeter at a simulated rig.
+
+The rig is the one that flies, stage by stage. The hand holds a force that wanders; the
+person reads one instrument after the other, each with its error and rounding. For S₂ the
+null is really performed: the force of a held control is noted without the multiplier,
+then, hands off, the supply in its place is turned until v₁ is back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from coupled.calibration.belief import real_scales
+from coupled.calibration.estimate import Instruments
+from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
+from coupled.calibration.readings import Readings
+from coupled.channels import ControlName
+from coupled.rig.parameters import Rig
+from coupled.rig.told import nodes_of, run_told, smooth, supply_told
+
+Floats = NDArray[np.float64]
+PULL_s = 0.3  # the hand goes to its next force so quickly
+SLOW_s = 2.0  # and so slowly where friction must not matter
+GLANCE_s = 0.6  # from one instrument to the next
+WANDER_s = 0.2  # over which a hand forgets where it was
+TURNS = 40  # of the supply's knob at most
+MOST_VOLTS = 1e4
+NULLS = 5
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A rig on the bench, without its converters: what to hold, when, and when to read it."""
+
+    rig: Rig
+    control: ControlName
+    stations: Sequence[Station]
+    instruments: Instruments
+    nulls: int = NULLS
+
+
+def take_readings(bench: Bench, seed: int) -> Readings:
+    """Return the readings of one bench session; the same seed gives the same ones."""
+    rng = np.random.default_rng(seed)
+    rig, control = _meters_rig(bench.rig, bench.control), bench.control
+    pressures = np.array([station.pressure_Pa for station in bench.stations])
+    forces = np.array([station.force for station in bench.stations])
+    read = _hold(rig, bench, forces, pressures, rng)
+    scales = real_scales(bench.rig.controls[control])
+    tools = bench.instruments
+    count, labels = len(forces), tuple(station.label for station in bench.stations)
+    deflection = _reading(read[0], tools.ruler, tools.ruler_step, rng)
+    force = _reading(read[1], tools.scale, tools.scale_step, rng)
+    v1 = _reading(scales.s1 * read[2], tools.meter, tools.meter_step, rng)
+    v3 = _reading(scales.s3 * read[3], tools.meter, tools.meter_step, rng)
+    null = _null(rig, bench, rng)
+    rows = np.arange(2, count + 2)
+    null_rows = np.arange(count + 2, count + 2 + null.shape[1])
+    return Readings(rows, labels, deflection, force, v1, v3, null_rows, *null)
+
+
+def _meters_rig(rig: Rig, control: ControlName) -> Rig:
+    """Return the rig as a voltmeter meets it: no converters, δc and F in real volts over belief."""
+    data = rig.controls[control]
+    sensing = data.sensing.model_copy(
+        update={"word_length": 0, "deflection_scale": 1.0, "force_scale": 1.0}
+    )
+    controls = {**rig.controls, control: data.model_copy(update={"sensing": sensing})}
+    return rig.model_copy(update={"controls": controls})
+
+
+def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
+    """Return how long the control needs to come to rest at its softest."""
+    loader = rig.controls[control].loader
+    table = rig.controls[control].schedule
+    slopes = [*table.total_gradient, *(table.second_gradient or ()), loader.basic_gradient]
+    softest = min(slopes)
+    half = 0.5 * loader.damping / loader.mass
+    root = half**2 - softest / loader.mass
+    slowest = half - math.sqrt(root) if root > 0.0 else half
+    return min(max((24.0 if precise else 9.0) / max(slowest, 1e-3), 0.5), 60.0)
+
+
+def _hold(
+    rig: Rig,
+    bench: Bench,
+    forces: Floats,
+    pressures: Floats,
+    rng: np.random.Generator,
+    pull_s: float = PULL_s,
+) -> Floats:
+    """Return δ, F, δc and F again as they were when each was looked at, shape (4, readings)."""
+    settle = _settling_s(rig, bench.control, bench.instruments.hand == 0.0)
+    rate = rig.frame_rate
+    each = math.ceil((pull_s + settle + 3.0 * GLANCE_s) * rate) + 2
+    frames = each * len(forces)
+    held = np.repeat(forces, each)
+    before = np.concatenate(([0.0], forces[:-1]))
+    pull = smooth(np.arange(each) / (pull_s * rate))
+    held += np.outer(before - forces, 1.0 - pull).ravel()
+    if bench.instruments.hand > 0.0:
+        held = held * (1.0 + bench.instruments.hand * _wander(frames, rate, rng))
+    ends = np.append(np.arange(frames), frames) / rate
+    nodes = np.interp(nodes_of(rig, frames), ends, np.append(held, held[-1]))
+    told = run_told(rig, bench.control, nodes, np.repeat(pressures, each))
+    first = np.arange(len(forces)) * each + math.ceil((pull_s + settle) * rate)
+    looks = [first + round(i * GLANCE_s * rate) for i in range(4)]
+    return np.stack(
+        (
+            told.deflection[looks[0]],
+            told.force[looks[1]],
+            told.computed[looks[2]],
+            told.force[looks[3]],
+        )
+    )
+
+
+def _wander(frames: int, rate: float, rng: np.random.Generator) -> Floats:
+    """Return a wander of unit variance that forgets exponentially (an Ornstein-Uhlenbeck one)."""
+    memory = math.exp(-1.0 / (WANDER_s * rate))
+    pushes = rng.standard_normal(frames)
+    pushes[1:] *= math.sqrt(1.0 - memory**2)
+    return np.asarray(lfilter([1.0], [1.0, -memory], pushes))
+
+
+def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) -> Floats:
+    """Return what is read of true values: with the instrument's error, rounded to its step."""
+    seen = true + error * rng.standard_normal(np.shape(true))
+    return np.asarray(step * np.round(seen / step) if step > 0.0 else seen)
+
+
+def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
+    """Return v₁ as noted, v₂ that brought it back and v₃ as noted, shape (3, nulls)."""
+    control = bench.control
+    data = rig.controls[control]
+    if bench.nulls == 0 or data.loader.basic_gradient <= 0.0:
+        return np.empty((3, 0))
+    plain = _without_multiplier(rig, control)
+    loader = data.loader
+    room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
+    forces = np.linspace(0.5, 1.0, bench.nulls) * room
+    # From rest each time, and slowly, as the supply is: then friction is the same in both.
+    held = np.hstack(
+        [_hold(plain, bench, force, np.zeros(1), rng, SLOW_s) for force in forces[:, None]]
+    )
+    scales, tools = real_scales(bench.rig.controls[control]), bench.instruments
+    v1 = _reading(scales.s1 * held[2], tools.meter, tools.meter_step, rng)
+    v3 = _reading(scales.s3 * held[3], tools.meter, tools.meter_step, rng)
+    settle = _settling_s(plain, control, tools.hand == 0.0)
+
+    def shown(v2: float) -> float:
+        computed = supply_told(plain, control, v2 / scales.s2, SLOW_s, settle)
+        volts = np.array(scales.s1 * computed)
+        return float(_reading(volts, tools.meter, tools.meter_step, rng))
+
+    v2 = [_turn_until(shown, wanted, tools) for wanted in v1]
+    # What was turned is read as well.
+    return np.stack((v1, _reading(np.array(v2), tools.meter, tools.meter_step, rng), v3))
+
+
+def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
+    """Return the rig with v₂ = 0: asked for the gradient that the host believes is basic."""
+    data = rig.controls[control]
+    host, table = data.compensation, data.schedule
+    basic = data.loader.basic_gradient if host.basic_gradient is None else host.basic_gradient
+    flat = {
+        "total_gradient": [basic] * len(table.dynamic_pressure),
+        "second_gradient": None,
+        "break_deflection": 0.0,
+    }
+    changed = {
+        "schedule": table.model_copy(update=flat),
+        "compensation": host.model_copy(update={"gradient": False}),
+    }
+    controls = {**rig.controls, control: data.model_copy(update=changed)}
+    return rig.model_copy(update={"controls": controls})
+
+
+def _turn_until(shown: Callable[[float], float], wanted: float, tools: Instruments) -> float:
+    """Return the supply's voltage at which the meter shows v₁ as wanted, as a person finds it.
+
+    Up until it is passed; then where two settings on either side say that it should be, or
+    half-way between them where that has not helped (within a breakout, or at a stop).
+    """
+    near = max(tools.meter + tools.meter_step, 1e-13 * wanted)
+    low, high = (0.0, shown(0.0)), (wanted, shown(wanted))
+    while high[1] < wanted and high[0] < MOST_VOLTS:
+        low, high = high, (2.0 * high[0], shown(2.0 * high[0]))
+    setting = high[0]
+    for turn in range(TURNS):
+        span, rise = high[0] - low[0], high[1] - low[1]
+        share = (wanted - low[1]) / rise if rise > 0.0 and turn % 3 < 2 else 0.5
+        setting = low[0] + min(max(share, 0.0), 1.0) * span
+        sees = shown(setting)
+        if abs(sees - wanted) <= near:
+            break
+        low, high = ((setting, sees), high) if sees < wanted else (low, (setting, sees))
+    return setting

@@ -1,0 +1,113 @@
+"""A figure with its standard error and 95 % interval, and the errors of the instruments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from coupled.units import DEGREE_rad
+
+Floats = NDArray[np.float64]
+COVERAGE = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure, its standard error, the degrees of freedom of that, and a 95 % interval."""
+
+    value: float
+    error: float
+    freedom: float
+
+    @property
+    def half_width(self) -> float:
+        """Half of the 95 % interval, by Student's t."""
+        return float(student.ppf(0.5 + 0.5 * COVERAGE, self.freedom)) * self.error
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval."""
+        return self.value - self.half_width
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval."""
+        return self.value + self.half_width
+
+    def scaled(self, factor: float) -> Estimate:
+        """Return the estimate in another unit."""
+        return Estimate(factor * self.value, abs(factor) * self.error, self.freedom)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON takes it."""
+        ends = {"low": self.low, "high": self.high}
+        return {"value": self.value, "standard_error": self.error, **ends}
+
+
+def mean_of(values: Floats) -> Estimate:
+    """Return the mean of independent values, with the error that their scatter shows."""
+    n = len(values)
+    return Estimate(float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(n)), n - 1.0)
+
+
+def product(first: Estimate, second: Estimate) -> Estimate:
+    """Return the product of independent estimates; degrees of freedom by Welch-Satterthwaite."""
+    value = first.value * second.value
+    one, two = (first.error * second.value) ** 2, (second.error * first.value) ** 2
+    spread = one**2 / first.freedom + two**2 / second.freedom
+    freedom = (one + two) ** 2 / spread if spread > 0.0 else first.freedom + second.freedom
+    return Estimate(value, float(np.sqrt(one + two)), freedom)
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What ruler, spring scale, voltmeter and hand err by.
+
+    `ruler` in d, `scale` in N and `meter` in V are standard deviations of a reading, apart
+    from rounding to the `_step`; `hand` is the share by which a held force wanders (standard
+    deviation) from one instrument's reading to the next.
+    """
+
+    ruler: float
+    scale: float
+    meter: float
+    hand: float
+    ruler_step: float
+    scale_step: float
+    meter_step: float
+
+    def deflection_variance(self, deflection: Floats) -> Floats:
+        """Return the variance of a ruler's reading in d²: own error, rounding, wander."""
+        own = self.ruler**2 + self.ruler_step**2 / 12.0
+        return own + (self.hand * deflection) ** 2
+
+    def force_variance(self, force: Floats) -> Floats:
+        """Return the variance of a spring scale's reading in N²."""
+        own = self.scale**2 + self.scale_step**2 / 12.0
+        return own + (self.hand * force) ** 2
+
+    def voltage_variance(self, voltage: Floats) -> Floats:
+        """Return the variance of a voltmeter's reading in V²."""
+        own = self.meter**2 + self.meter_step**2 / 12.0
+        return own + (self.hand * voltage) ** 2
+
+
+def usual_instruments(control: str) -> Instruments:
+    """Return a careful person's instruments.
+
+    A ruler read to half a millimetre (a protractor to half a degree), a spring scale to half
+    a newton, a voltmeter to 10 mV of 100 V, and a hand that wanders by 0.3 %: chosen, no
+    source gives them.
+    """
+    ruler = 0.2 * DEGREE_rad if control == "wheel" else 0.3e-3
+    ruler_step = 0.5 * DEGREE_rad if control == "wheel" else 0.5e-3
+    return Instruments(ruler, 0.3, 0.01, 0.003, ruler_step, 0.5, 0.01)
+
+
+def perfect_instruments() -> Instruments:
+    """Return instruments without any error."""
+    return Instruments(*(0.0,) * 7)

@@ -1,0 +1,137 @@
+"""Mistyped readings, found by a robust loss and named by their row.
+
+Tukey's biweight, started from the line through two readings that most others agree with, so
+that a third of the readings may be wrong. v₃ against F is held to S₃ in
+the same way: a force with swapped digits shows there and hardly in v₁.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.calibration.estimate import Instruments
+from coupled.calibration.fit import error_variance
+from coupled.calibration.readings import Readings
+
+Floats = NDArray[np.float64]
+FEWEST = 5  # readings below which nothing can be told apart
+MOST_PAIRS = 400
+APART = 0.3  # of the greatest angle between two readings' (δ, F)
+BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
+TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
+SLIP = 1e-4  # of the largest value: no mistyped digit is smaller
+NORMAL = 1.4826  # of a median absolute deviation to a standard deviation
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A reading that is far off: its row, which of its columns, and by how many deviations."""
+
+    row: int
+    columns: str
+    deviations: float
+
+
+def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]:
+    """Return the readings that are no slips of ruler, scale or meter."""
+    suspects = []
+    if len(readings.row) >= FEWEST:
+        line = _off_the_line(readings, instruments)
+        ratio = _off_the_ratio(
+            readings.v3,
+            readings.force,
+            instruments.voltage_variance(readings.v3),
+            instruments.force_variance(readings.force),
+        )
+        for row, one, two in zip(readings.row, line, ratio, strict=True):
+            if max(one, two) > TOO_FAR:
+                where = "force" if min(one, two) > TOO_FAR else "deflection or v1"
+                where = "force or v3" if one <= TOO_FAR else where
+                suspects.append(Suspect(int(row), where, float(max(one, two))))
+    if len(readings.null_row) >= FEWEST:
+        volts = instruments.voltage_variance
+        off = _off_the_ratio(
+            readings.null_v2,
+            readings.null_v3,
+            volts(readings.null_v2),
+            volts(readings.null_v3) + instruments.voltage_variance(readings.null_v1),
+        )
+        for row, far in zip(readings.null_row, off, strict=True):
+            if far > TOO_FAR:
+                suspects.append(Suspect(int(row), "v2 or v3", float(far)))
+    return suspects
+
+
+def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -> Floats:
+    """Return (a, b) by the biweight; `spread` are the readings' relative standard deviations."""
+    design = np.column_stack((deflection, force)) / spread[:, None]
+    target = v1 / spread
+    beta, scale = _most_agreed(design, target)
+    for _ in range(50):
+        residual = target - design @ beta
+        weight = np.maximum(1.0 - (residual / (BIWEIGHT * scale)) ** 2, 0.0)
+        before = beta
+        beta = np.asarray(
+            np.linalg.lstsq(design * weight[:, None], target * weight, rcond=None)[0], float
+        )
+        if np.allclose(beta, before, rtol=1e-6, atol=0.0):
+            break
+    return beta
+
+
+def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
+    """Return the line through two readings that most others agree with, and their scale.
+
+    Only readings of gradients well apart make a line: two of one gradient would fit all of
+    that gradient whatever the others are. The scale is that of the least median residual.
+    """
+    pairs = np.array(list(combinations(range(len(target)), 2)))
+    unit = design / np.linalg.norm(design, axis=0)
+    one, two = unit[pairs[:, 0]], unit[pairs[:, 1]]
+    turn = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
+    turn /= np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1) + 1e-300
+    pairs = pairs[turn >= APART * turn.max()]
+    if len(pairs) > MOST_PAIRS:
+        pairs = np.random.default_rng(0).choice(pairs, MOST_PAIRS, replace=False)
+    betas = np.linalg.solve(design[pairs], target[pairs][:, :, None])[:, :, 0]
+    residuals = np.abs(target - betas @ design.T)
+    floor = 1e-12 * float(np.max(np.abs(target)))
+    scale = _scale(residuals[np.argmin(np.median(residuals, axis=1))]) + floor
+    agreed = np.sum(np.minimum((residuals / (BIWEIGHT * scale)) ** 2, 1.0), axis=1)
+    return np.asarray(betas[np.argmin(agreed)]), scale
+
+
+def _scale(residual: Floats) -> float:
+    """Return the residuals' robust standard deviation, widened for few readings."""
+    n = len(residual)
+    return float(NORMAL * (1.0 + 5.0 / (n - 2)) * np.median(np.abs(residual)) + 1e-300)
+
+
+def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
+    """Return how many deviations each v₁ is off the robust line."""
+    d, f, v = readings.deflection, readings.force, readings.v1
+    a, b = robust_line(d, f, v, np.ones_like(v))
+    spread = np.sqrt(error_variance(a, b, d, f, v, instruments))
+    spread = np.maximum(spread, SLIP * np.max(np.abs(v)))
+    a, b = robust_line(d, f, v, spread)
+    return _deviations((v - a * d - b * f) / spread)
+
+
+def _off_the_ratio(
+    top: Floats, bottom: Floats, top_variance: Floats, bottom_variance: Floats
+) -> Floats:
+    """Return how many deviations each of `top` is off the median ratio times `bottom`."""
+    there = bottom != 0.0
+    slope = float(np.median(top[there] / bottom[there])) if there.any() else 0.0
+    spread = np.sqrt(top_variance + slope**2 * bottom_variance)
+    spread = np.maximum(spread, SLIP * np.max(np.abs(top), initial=1e-300))
+    return _deviations((top - slope * bottom) / spread)
+
+
+def _deviations(whitened: Floats) -> Floats:
+    """Return residuals over their robust scale, which is at least half of the declared one."""
+    return np.asarray(np.abs(whitened) / max(_scale(whitened), 0.5))

@@ -1,0 +1,99 @@
+"""What a force documentation is drawn from: slow sweeps both ways, and releases.
+
+A sweep goes from neutral to one stop, to the other and back, slowly and at an even rate, as
+a static control check is flown (14 CFR Part 60, table A2A: 95 to 105 s). The force is the
+one that the rig's statics ask for there, friction with the motion; what the control does
+under it is the rig's own business.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.calibration.plan import gradient_sets
+from coupled.channels import ControlName
+from coupled.errors import InputError
+from coupled.rig.parameters import Rig
+from coupled.rig.statics import static_line, static_point
+from coupled.rig.told import Told, nodes_of, run_told
+
+Floats = NDArray[np.float64]
+SWEEP_s = 100.0
+TURN_s = 2.0  # in which the hand's friction force changes sides
+BEYOND = 1.02  # of the travel: the sweep pushes a little into the stops
+HELD_s = 6.0
+RELEASE_s = 4.0
+FINE_Hz = 1000.0
+THROW = 0.4  # of the travel, from which a control is released; the rule says 25 to 50 %
+
+
+@dataclass(frozen=True)
+class Release:
+    """A control let go: time from the release in s, deflection in d, and where it was held."""
+
+    time_s: Floats
+    deflection: Floats
+    start: float
+
+
+def feel_pressures(rig: Rig, control: ControlName) -> list[float]:
+    """Return q̄ in Pa at the least, the middle and the greatest gradient of the schedule."""
+    try:
+        return [pressure for pressure, _ in gradient_sets(rig, control, 3)]
+    except InputError:  # one gradient at every q̄
+        return [float(rig.controls[control].schedule.dynamic_pressure[0])]
+
+
+def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> Told:
+    """Return a slow sweep to both stops at a dynamic pressure."""
+    data = rig.controls[control]
+    frames = round(SWEEP_s * rig.frame_rate)
+    ends = np.arange(frames + 1) / rig.frame_rate
+    quarter, half, last = 0.25 * SWEEP_s, 0.5 * SWEEP_s, SWEEP_s - TURN_s
+    stops = [TURN_s, quarter, half - TURN_s, half + TURN_s, 3.0 * quarter, last]
+    path = np.interp(ends, stops, [0.0, BEYOND, 0.0, 0.0, -BEYOND, 0.0]) * data.travel
+    # At neutral the static line jumps by the breakout, and the hand takes its time over it.
+    turns = [0.0, TURN_s, half - TURN_s, half + TURN_s, last, SWEEP_s]
+    preload = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+    tiny = 1e-9 * data.travel
+    outward = np.where(np.abs(path) < tiny, tiny, path)
+    force = static_line(rig, control, pressure_Pa, outward).force
+    force = np.where(np.abs(path) < tiny, preload * force, force)
+    turns = [0.0, TURN_s, quarter, quarter + TURN_s, 3.0 * quarter, 3.0 * quarter + TURN_s]
+    side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+    force = force + side * max(data.loader.friction, data.loader.breakaway)
+    nodes = np.interp(nodes_of(rig, frames), ends, force)
+    return run_told(rig, control, nodes, np.full(frames, pressure_Pa))
+
+
+def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> Release:
+    """Return what a control does that is held at `THROW` of its travel and let go.
+
+    `side` is +1 or −1. It is let go from rest; its grip springs back by the bend at once.
+    """
+    rig = _finely_read(rig, control)
+    held = side * THROW * rig.controls[control].travel
+    force = float(static_point(rig, control, pressure_Pa, held).force[0])
+    frames = round((HELD_s + RELEASE_s) * rig.frame_rate)
+    last = round(HELD_s * rig.frame_rate)
+    nodes = np.zeros(frames * rig.substeps + 1)
+    times = nodes_of(rig, frames)
+    pull = np.minimum(times / (0.25 * HELD_s), 1.0)
+    held_nodes = last * rig.substeps + 1
+    nodes[:held_nodes] = force * pull[:held_nodes]
+    friction = max(rig.controls[control].loader.friction, rig.controls[control].loader.breakaway)
+    nodes[:held_nodes] += side * friction * pull[:held_nodes]
+    told = run_told(rig, control, nodes, np.full(frames, pressure_Pa))
+    start = float(told.deflection[last])
+    time_s = told.time_s[last:] - told.time_s[last]
+    return Release(time_s, told.deflection[last:], start)
+
+
+def _finely_read(rig: Rig, control: ControlName) -> Rig:
+    """Return the rig read a thousand times a second, unless its frame makes the product."""
+    if rig.controls[control].loader.multiplier == "digital":
+        return rig
+    return rig.model_copy(update={"frame_rate": max(rig.frame_rate, FINE_Hz)})

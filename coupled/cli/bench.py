@@ -1,0 +1,104 @@
+"""The command of the virtual bench: bench."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coupled.cli.app import JsonOption, app
+from coupled.cli.rigs import (
+    DEFAULT_RIG,
+    ControlOption,
+    ErrorOption,
+    RigOption,
+    StrongestOption,
+    instruments,
+    rig_and_control,
+    say_stale,
+)
+from coupled.errors import InputError
+from coupled.files import check_target
+from coupled.terminal import check_json, give_json, out, progress, say
+
+if TYPE_CHECKING:
+    from coupled.calibration.bench import Bench
+
+
+@app.command(
+    epilog="[dim]Examples: coupled bench · coupled bench --rig c172p --control wheel -o out/w.csv"
+    " · coupled bench --repeat 1000[/]"
+)
+def bench(
+    rig: RigOption = DEFAULT_RIG,
+    control: ControlOption = "column",
+    gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = 5,
+    deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = 5,
+    nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 5,
+    precision: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of a grid, the readings that a plan wants for K to ± %.", min=0.1, max=100
+        ),
+    ] = None,
+    strongest: StrongestOption = 150.0,
+    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0)] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Readings, CSV (default: out/RIG-readings.csv)."),
+    ] = None,
+    inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
+    perfect: Annotated[bool, typer.Option("--perfect", help="Without any error.")] = False,
+    repeat: Annotated[
+        int,
+        typer.Option(
+            help="Fit so many benches and count how often they are right.", min=0, max=100_000
+        ),
+    ] = 0,
+    error: ErrorOption = None,
+    json_file: JsonOption = "",
+) -> None:
+    """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does."""
+    from coupled.calibration.bench import Bench, take_readings
+    from coupled.calibration.estimate import perfect_instruments
+    from coupled.calibration.plan import fewest, stations
+    from coupled.calibration.readings import write_readings
+
+    file, data, name = rig_and_control(rig, control)
+    path = output or Path("out") / f"{data.name}-readings.csv"
+    if path.suffix.lower() != ".csv":
+        raise InputError(path, "--output", "readings are written as .csv")
+    if not repeat:
+        check_target(path, [file])
+    check_json(json_file, [file, path])
+    say_stale(data)
+    tools = instruments(name, error)
+    grid = stations(data, name, gradients, deflections, strongest)
+    if precision is not None:
+        planned = fewest(data, name, tools, precision / 100.0, strongest)
+        grid = [station for station, count in planned for _ in range(count)]
+    made = Bench(data, name, grid, perfect_instruments() if perfect else tools, nulls)
+    if repeat:
+        _repeat(made, repeat, seed, json_file)
+        return
+    readings = take_readings(made, seed)
+    write_readings(path, readings, name, inches)
+    if json_file != "-":
+        say(f"readings: {path}  ({len(readings.row)} readings, {len(readings.null_row)} nulls)")
+    give_json(
+        {"readings": str(path), "rows": len(readings.row) + len(readings.null_row)}, json_file
+    )
+
+
+def _repeat(made: Bench, repeat: int, seed: int, json_file: str) -> None:
+    from coupled.calibration.coverage import measure_coverage
+    from coupled.tables.calibration import print_coverage
+
+    with progress() as advance:
+        workers = min(os.cpu_count() or 1, 8, -(-repeat // 50))
+        coverage = measure_coverage(made, repeat, seed, workers, advance)
+    if json_file != "-":
+        print_coverage(out, coverage)
+    give_json(coverage.as_dict(), json_file)

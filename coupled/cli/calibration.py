@@ -1,0 +1,159 @@
+"""The command that calibrates from readings, or plans them: calibrate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coupled.channels import ControlName
+from coupled.cli.app import JsonOption, app
+from coupled.cli.rigs import (
+    DEFAULT_RIG,
+    ControlOption,
+    ErrorOption,
+    RigOption,
+    StrongestOption,
+    instruments,
+    rig_and_control,
+)
+from coupled.errors import InputError
+from coupled.files import check_target, write_text
+from coupled.terminal import check_json, give_json, out, say
+
+if TYPE_CHECKING:
+    from coupled.calibration.estimate import Instruments
+    from coupled.rig.parameters import Rig
+
+
+@app.command(
+    epilog="[dim]Examples: coupled calibrate out/report-column-readings.csv"
+    " · coupled calibrate my.csv --rig my.toml --write new.toml --date 1974-02-04"
+    " · coupled calibrate --plan --precision 5[/]"
+)
+def calibrate(
+    readings: Annotated[Path | None, typer.Argument(help="Readings, CSV.")] = None,
+    rig: RigOption = DEFAULT_RIG,
+    control: ControlOption = "column",
+    write: Annotated[
+        Path | None,
+        typer.Option(metavar="NEW", help="Write the calibrated rig, .toml; a plan's form, .csv."),
+    ] = None,
+    hardware: Annotated[
+        bool,
+        typer.Option("--hardware", help="Take what is found for the rig's own hardware, too."),
+    ] = False,
+    date: Annotated[str, typer.Option(help="Noted in the rig file as given.")] = "",
+    plan: Annotated[bool, typer.Option("--plan", help="Choose readings to take.")] = False,
+    precision: Annotated[
+        float, typer.Option(help="Wanted of K by a plan, ± % (95 %).", min=0.1, max=100)
+    ] = 5.0,
+    strongest: StrongestOption = 150.0,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw readings and fit (figure 4): PNG, PDF or SVG.")
+    ] = None,
+    error: ErrorOption = None,
+    json_file: JsonOption = "",
+) -> None:
+    """Find S1, S2, S3 and K from readings, with their errors; or plan the readings."""
+    file, data, name = rig_and_control(rig, control)
+    tools = instruments(name, error)
+    if plan:
+        if readings is not None or figure is not None:
+            raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
+        _plan(data, name, tools, (precision / 100.0, strongest), (write, json_file))
+        return
+    if readings is None:
+        raise InputError("calibrate", "", "give a file of readings, or --plan for which to take")
+    inputs = [readings, file]
+    for target, suffix in ((write, ".toml"), (figure, "")):
+        if target is not None:
+            if suffix and target.suffix.lower() != suffix:
+                raise InputError(target, "--write", "a rig file ends in .toml")
+            check_target(target, inputs)
+    if figure is not None:
+        from coupled.plots.saving import check_format
+
+        check_format(figure)
+    check_json(json_file, [*inputs, *(path for path in (write, figure) if path)])
+    _calibrate(readings, (file, data, name), tools, (write, figure, json_file), (date, hardware))
+
+
+def _calibrate(
+    path: Path,
+    rig: tuple[Path, Rig, ControlName],
+    tools: Instruments,
+    targets: tuple[Path | None, Path | None, str],
+    noted: tuple[str, bool],
+) -> None:
+    from coupled.calibration.belief import with_calibration
+    from coupled.calibration.calibrate import calibrate as fit
+    from coupled.calibration.readings import read_readings
+    from coupled.rig.rigfile import rig_from_table
+    from coupled.rig.rigwrite import rig_text
+    from coupled.schema import loads_toml
+    from coupled.tables.calibration import print_calibration
+
+    (file, data, name), (write, figure, json_file), (date, hardware) = rig, targets, noted
+    found = fit(read_readings(path, name), data.controls[name], name, tools, path)
+    text = ""
+    if write is not None:
+        new = with_calibration(data, name, found, date, hardware)
+        text = rig_text(new, f"{file.name}, its {name} calibrated from {path.name}")
+        rig_from_table(loads_toml(text, write), write)  # a rig that cannot be flown is refused
+    if json_file != "-":
+        print_calibration(out, found)
+    if write is not None:
+        write_text(write, text)
+        if json_file != "-":
+            say(f"calibrated rig: {write}")
+    if figure is not None:
+        from coupled.plots.readings import draw_readings
+        from coupled.plots.saving import save
+
+        save(draw_readings(found, path.name), figure)
+        if json_file != "-":
+            say(f"figure: {figure}")
+    give_json(found.as_dict(), json_file)
+
+
+def _plan(
+    rig: Rig,
+    control: ControlName,
+    tools: Instruments,
+    wanted: tuple[float, float],
+    targets: tuple[Path | None, str],
+) -> None:
+    from coupled.calibration.plan import fewest, form, precision, stations
+    from coupled.tables.calibration import print_plan
+
+    (share, strongest), (write, json_file) = wanted, targets
+    if write is not None:
+        if write.suffix.lower() != ".csv":
+            raise InputError(write, "--write", "a form for readings ends in .csv")
+        check_target(write)
+    check_json(json_file, [write] if write else [])
+    sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
+    grids = {
+        size: precision(rig, control, stations(rig, control, *size, strongest), tools)
+        for size in sizes
+    }
+    chosen = fewest(rig, control, tools, share, strongest)
+    reached = precision(rig, control, [s for s, count in chosen for _ in range(count)], tools)
+    if json_file != "-":
+        print_plan(out, control, grids, chosen, reached)
+    if write is not None:
+        write_text(write, form(chosen, control))
+        if json_file != "-":
+            say(f"form: {write}")
+    table = {
+        "half_width": reached.half_width,
+        "bend": reached.bend,
+        "readings": [{**s.__dict__, "count": count} for s, count in chosen],
+        "grids": [
+            {"gradients": few, "deflections": many, "half_width": grid.half_width}
+            for (few, many), grid in grids.items()
+        ],
+    }
+    give_json(table, json_file)

@@ -1,0 +1,98 @@
+"""The command of the force documentation: document."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coupled.channels import ControlName
+from coupled.cli.app import JsonOption, app
+from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
+from coupled.errors import InputError
+from coupled.files import check_target
+from coupled.resources import find, shipped_rigs
+from coupled.terminal import check_json, give_json, out, progress, say
+
+if TYPE_CHECKING:
+    from coupled.calibration.calibrate import Result
+    from coupled.rig.parameters import Rig
+
+
+@app.command(
+    epilog="[dim]Examples: coupled document · coupled document 737 --control column"
+    " · coupled document new.toml --readings my.csv --output doc[/]"
+)
+def document(
+    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
+    control: Annotated[str, typer.Option(help="One control only (default: all).")] = "",
+    readings: Annotated[
+        Path | None, typer.Option(help="Readings to draw (default: a virtual bench's).")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Print every check.")] = False,
+    json_file: JsonOption = "",
+) -> None:
+    """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks."""
+    from coupled.calibration.documentation import controls_of, surface_travels
+    from coupled.calibration.documentation import document as gather
+    from coupled.rig.rigfile import read_rig
+    from coupled.tables.calibration import print_checks
+
+    file = find(rig, shipped_rigs(), "rig")
+    data = read_rig(file)
+    chosen = [rig_and_control(rig, control)[2]] if control else controls_of(data)
+    folder = output or Path("out") / f"{data.name}-document"
+    pdf = folder / f"{data.name}.pdf"
+    inputs = [file, *([readings] if readings else [])]
+    if folder.is_file():
+        raise InputError(folder, "--output", "is a file; give a folder")
+    check_target(pdf, inputs)
+    check_json(json_file, [*inputs, pdf])
+    say_stale(data)
+    fits = {name: _fit_for(readings, data, name, chosen) for name in chosen}
+    travels = surface_travels(data, file)
+    documents = []
+    with progress() as advance:
+        for name in chosen:
+            documents.append(gather(data, name, travels.get(name), advance))
+    from coupled.plots.documentation import draw_pages
+
+    written = draw_pages(documents, fits, folder, pdf)
+    if json_file != "-":
+        for found in documents:
+            print_checks(out, found.control, found.checks, every)
+        if not travels:
+            out.print("no aircraft: the surface's position is not judged\n")
+        say(f"{len(written)} figures and {pdf.name} in {folder}")
+    table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
+    give_json(table, json_file)
+
+
+def _fit_for(
+    readings: Path | None, rig: Rig, control: ControlName, chosen: list[ControlName]
+) -> tuple[Result, str] | None:
+    """Return the fit to draw of a control, and where its readings are from; none for one gradient.
+
+    A user's readings are those of the first control chosen.
+    """
+    from coupled.calibration.bench import Bench, take_readings
+    from coupled.calibration.calibrate import calibrate as fit
+    from coupled.calibration.plan import stations
+    from coupled.calibration.readings import read_readings
+
+    data, tools = rig.controls[control], instruments(control, None)
+    if readings is not None:
+        if control != chosen[0]:
+            return None
+        return fit(read_readings(readings, control), data, control, tools, readings), readings.name
+    try:
+        grid = stations(rig, control, 5, 5)
+    except InputError:
+        return None
+    made = take_readings(Bench(rig, control, grid, tools), 0)
+    return fit(made, data, control, tools, rig.name), "a virtual bench's readings"

@@ -1,0 +1,81 @@
+"""What the bench's commands share: a rig, its control, and the instruments' errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from coupled.channels import CONTROL_NAMES, ControlName
+from coupled.errors import InputError, nearest
+from coupled.resources import find, shipped_rigs
+from coupled.terminal import err
+
+if TYPE_CHECKING:
+    from coupled.calibration.estimate import Instruments
+    from coupled.rig.parameters import Rig
+
+DEFAULT_RIG = "report-column"
+RigOption = Annotated[str, typer.Option(help="A rig file, or the name of a shipped one.")]
+ControlOption = Annotated[str, typer.Option(help="column, wheel or pedals.")]
+ErrorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--error",
+        metavar="NAME=VALUE",
+        help="Standard deviation of ruler (mm; ° on a wheel), scale (N), meter (V), or of the hand"
+        " (% of its force); may be repeated (default: ruler=0.3 scale=0.3 meter=0.01 hand=0.3;"
+        " ruler=0.2 on a wheel).",
+    ),
+]
+StrongestOption = Annotated[
+    float, typer.Option("--strongest-N", help="The greatest force to hold, N.", min=1, max=2000)
+]
+
+
+def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
+    """Return a rig's file, the rig, and the control that is meant."""
+    from coupled.rig.rigfile import read_rig
+
+    file = find(name, shipped_rigs(), "rig")
+    rig = read_rig(file)
+    for known in CONTROL_NAMES:
+        if known == control and known in rig.controls:
+            return file, rig, known
+    raise InputError(file, "--control", f"no {control!r}; {nearest(control, rig.controls)}")
+
+
+def say_stale(rig: Rig) -> None:
+    """Say on the terminal's error side what has changed since a rig's calibrations."""
+    from coupled.calibration.belief import stale
+
+    for name, control in rig.controls.items():
+        for change in stale(control):
+            err.print(f"[yellow]stale calibration:[/] {name}: {escape(change)}", soft_wrap=True)
+
+
+def instruments(control: str, errors: Sequence[str] | None) -> Instruments:
+    """Return a control's usual instruments with the errors that a user gives as NAME=VALUE."""
+    from coupled.calibration.estimate import usual_instruments
+    from coupled.units import DEGREE_rad
+
+    factors = {"ruler": DEGREE_rad if control == "wheel" else 1e-3, "scale": 1.0}
+    factors |= {"meter": 1.0, "hand": 0.01}
+    given = {}
+    for word in errors or ():
+        name, _, value = word.partition("=")
+        if name not in factors:
+            raise InputError("--error", name, f"no such instrument; {nearest(name, factors)}")
+        try:
+            number = float(value)
+        except ValueError:
+            raise InputError("--error", name, f"{value!r} is no number; as {name}=0.3") from None
+        if not (math.isfinite(number) and 0.0 <= factors[name] * number <= 10.0):
+            raise InputError("--error", name, f"{value} is no error of an instrument")
+        given[name] = factors[name] * number
+    return replace(usual_instruments(control), **given)

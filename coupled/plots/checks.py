@@ -1,0 +1,133 @@
+"""Figures of the control checks of 14 CFR Part 60, their tolerances drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from coupled.calibration.checks import TIME_SHARE, SURFACE_rad, Swing, band, legs, swing_of
+from coupled.plots.pages import BLUE, ORANGE, panels, pressure, scale, title, with_legend
+from coupled.units import DEGREE_rad
+
+if TYPE_CHECKING:
+    from coupled.calibration.documentation import Documentation
+    from coupled.calibration.sweeps import Release
+
+
+def draw_static_checks(found: Documentation) -> Figure:
+    """Draw the static control check: force, and surface, within their tolerance bands."""
+    factor, unit = scale(found.control)
+    data = found.rig.controls[found.control]
+    rows = 1 if found.surface_rad is None else 2
+    figure, grid = panels(rows, len(found.conditions), 3.0)
+    for i, condition in enumerate(found.conditions):
+        axes = grid[0, i]
+        for (d, f, _), name in zip(
+            legs(condition.specified), ("tolerance", "", "", ""), strict=True
+        ):
+            allowed = band(found.control, f)
+            axes.fill_between(
+                factor * d, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
+            )
+        told = condition.felt
+        axes.plot(factor * told.deflection, told.force, color=BLUE, linewidth=1.2, label="rig")
+        x = factor * condition.specified.deflection
+        axes.plot(x, condition.specified.force, "k:", linewidth=1.0, label="specified")
+        axes.set_title(_verdict(found, condition.pressure_Pa, ("breakout", "force")), fontsize=9)
+        if found.surface_rad is not None:
+            ends = np.array([-1.0, 1.0])
+            degrees = found.surface_rad / DEGREE_rad * ends
+            below = grid[1, i]
+            wide = SURFACE_rad / DEGREE_rad
+            x = factor * data.travel * ends
+            below.fill_between(x, degrees - wide, degrees + wide, color="0.85", linewidth=0)
+            side = np.sign(np.dot(told.surface, told.deflection))
+            moved = side * told.surface * found.surface_rad / DEGREE_rad
+            below.plot(factor * told.deflection, moved, color=BLUE, linewidth=1.2)
+            below.plot(x, degrees, "k:", linewidth=1.0)
+            below.set_title(_verdict(found, condition.pressure_Pa, ("surface",)), fontsize=9)
+        for panel in grid[:, i]:
+            panel.grid(alpha=0.25)
+        grid[-1, i].set_xlabel(f"true deflection δ, {unit}")
+    grid[0, 0].set_ylabel("force at the grip F, N")
+    if rows > 1:
+        grid[1, 0].set_ylabel(f"{data.surface} from trim, °")
+    what = "static control check, 14 CFR Part 60, 2.a"
+    figure.suptitle(title(found, what), fontsize=12)
+    with_legend(figure, grid[0, 0], 3)
+    return figure
+
+
+def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> str:
+    """Return the q̄, and whether the checks of these kinds pass there, the least margin named."""
+    ours = [
+        check
+        for check in found.checks
+        if check.pressure_Pa == pressure_Pa and check.name.split(",")[0].split(" ")[0] in kinds
+    ]
+    worst = min(ours, key=lambda check: check.margin)
+    word = "pass" if worst.passed else "FAIL"
+    return f"{pressure(pressure_Pa)}: {word}, least margin {100 * worst.margin:.0f} %"
+
+
+def draw_releases(found: Documentation) -> Figure:
+    """Draw the dynamic control check: releases, with the tolerance of crossings and overshoots."""
+    figure, grid = panels(2, len(found.conditions), 2.7)
+    for i, condition in enumerate(found.conditions):
+        for axes, (side, (now, wanted)) in zip(grid[:, i], condition.let_go.items(), strict=True):
+            swing = swing_of(wanted)
+            for let_go, style in (
+                (wanted, {"color": "black", "linestyle": "dotted", "label": "specified"}),
+                (now, {"color": BLUE, "label": "rig"}),
+            ):
+                share = 100.0 * let_go.deflection / let_go.start
+                axes.plot(let_go.time_s, share, linewidth=1.3, **style)
+            _draw_tolerance(axes, wanted, swing)
+            axes.grid(alpha=0.25)
+            kinds = [c for c in found.checks if c.pressure_Pa == condition.pressure_Pa]
+            kinds = [c for c in kinds if c.name.endswith(side) and c.unit in ("s", "%", "")]
+            worst = min(kinds, key=lambda check: check.margin)
+            word = "pass" if worst.passed else f"FAIL: {worst.name.removesuffix(', ' + side)}"
+            axes.set_title(f"{pressure(condition.pressure_Pa)}, {side}: {word}", fontsize=9)
+            axes.set_xlim(0.0, _span(wanted, swing))
+        grid[1, i].set_xlabel("time from the release, s")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("δ, % of displacement")
+    what = "release, 14 CFR Part 60, 2.b"
+    figure.suptitle(title(found, what), fontsize=12)
+    with_legend(figure, grid[0, 0], 4)
+    return figure
+
+
+def _span(wanted: Release, swing: Swing) -> float:
+    last = swing.crossings[min(len(swing.crossings), 5) - 1] if swing.crossings.size else 0.0
+    fall = swing.fall_s if np.isfinite(swing.fall_s) else wanted.time_s[-1] / 2.0
+    return float(min(max(1.5 * last, 3.0 * fall), wanted.time_s[-1]))
+
+
+def _draw_tolerance(axes: Any, wanted: Release, swing: Swing) -> None:
+    """Draw where the rule lets the specified curve's 10 %, crossings and overshoots lie."""
+    share = wanted.deflection / wanted.start
+    begin = wanted.time_s[int(np.argmax(share <= 0.9))]
+    style = {"color": ORANGE, "linewidth": 5.0, "alpha": 0.55, "solid_capstyle": "butt"}
+    if not swing.peaks.size:
+        low, high = (begin + swing.fall_s * (1.0 + s * TIME_SHARE) for s in (-1.0, 1.0))
+        axes.plot([low, high], [10.0, 10.0], label="tolerance", **style)
+        return
+    for n, crossing in enumerate(swing.crossings[: len(swing.peaks) + 1]):
+        if n == 1:  # half a period: the rule leaves it free
+            continue
+        wide = TIME_SHARE * swing.crossings[0]
+        if n >= 2:
+            wide += TIME_SHARE * (n - 1) * (crossing - swing.crossings[n - 2])
+        at = begin + crossing
+        axes.plot([at - wide, at + wide], [0.0, 0.0], label=None if n else "tolerance", **style)
+    starts = np.append(swing.crossings, np.inf) + begin
+    for n in range(len(swing.peaks)):
+        inside = (wanted.time_s >= starts[n]) & (wanted.time_s < starts[n + 1])
+        at = int(np.argmax(np.where(inside, np.abs(share), -1.0)))
+        top, wide = 100.0 * share[at], 10.0 * swing.peaks[0]
+        axes.plot([wanted.time_s[at]] * 2, [top - wide, top + wide], **style)

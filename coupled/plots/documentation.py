@@ -1,0 +1,145 @@
+"""Figures of a calibration and of a force documentation: SI, with inches and pounds beside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+
+from coupled.channels import ControlName
+from coupled.files import write_whole
+from coupled.plots.checks import draw_releases, draw_static_checks
+from coupled.plots.pages import (
+    BLUE,
+    GRAY,
+    GREEN,
+    ORANGE,
+    panels,
+    pressure,
+    scale,
+    title,
+    with_legend,
+)
+from coupled.plots.readings import draw_readings
+from coupled.plots.saving import save
+from coupled.units import POUND_N, INCH_m
+
+if TYPE_CHECKING:
+    from coupled.calibration.calibrate import Result
+    from coupled.calibration.documentation import Documentation
+
+
+def _in_pounds(axes: Any) -> None:
+    """Give an axis of newtons one in pounds on its right."""
+    other = axes.secondary_yaxis("right", functions=(lambda x: x / POUND_N, lambda x: x * POUND_N))
+    other.set_ylabel("lb", fontsize=8)
+    other.tick_params(labelsize=7)
+
+
+def _in_inches(axes: Any) -> None:
+    """Give an axis of centimetres one in inches above it."""
+    factor = 100.0 * INCH_m
+    other = axes.secondary_xaxis("top", functions=(lambda x: x / factor, lambda x: x * factor))
+    other.set_xlabel("in", fontsize=8)
+    other.tick_params(labelsize=7)
+
+
+def draw_forces(found: Documentation) -> Figure:
+    """Draw force against true deflection at each q̄, swept both ways."""
+    factor, unit = scale(found.control)
+    figure, grid = panels(1, len(found.conditions), 3.5)
+    for axes, condition in zip(grid[0], found.conditions, strict=True):
+        sweeps = (
+            ("specified (rigid structure)", condition.specified, GRAY, 4.5),
+            ("uncompensated", condition.uncompensated, ORANGE, 1.3),
+            ("compensated", condition.compensated, GREEN, 1.3),
+        )
+        for name, told, color, width in sweeps:
+            x = factor * told.deflection
+            axes.plot(x, told.force, color=color, linewidth=width, label=name)
+        axes.set_title(pressure(condition.pressure_Pa), fontsize=10)
+        axes.set_xlabel(f"true deflection δ, {unit}")
+        axes.grid(alpha=0.25)
+        _in_pounds(axes)
+        if unit == "cm":
+            _in_inches(axes)
+    grid[0, 0].set_ylabel("force at the grip F, N")
+    figure.suptitle(title(found, "force against deflection, slow sweep both ways"), fontsize=12)
+    with_legend(figure, grid[0, 0], 3)
+    return figure
+
+
+def draw_deflections(found: Documentation) -> Figure:
+    """Draw computed against true deflection, and what the host's estimate lacks."""
+    factor, unit = scale(found.control)
+    travel = found.rig.controls[found.control].travel
+    figure, grid = panels(1, 2, 3.7)
+    left, right = grid[0]
+    for condition, color in zip(found.conditions, (BLUE, ORANGE, GREEN), strict=False):
+        bent = condition.compensated
+        name = pressure(condition.pressure_Pa)
+        left.plot(
+            factor * bent.deflection, factor * bent.computed, color=color, linewidth=1.3, label=name
+        )
+        sweeps = ((condition.uncompensated, "solid", "δ̂ = δc"), (bent, "dashed", "δ̂ = δc + K̂·F"))
+        for told, style, estimate in sweeps:
+            lacks = 100.0 * (told.deflection - told.estimate) / travel
+            right.plot(
+                factor * told.deflection,
+                lacks,
+                color=color,
+                linestyle=style,
+                linewidth=1.3,
+                label=f"{estimate}, {name}",
+            )
+    ends = np.array([-1.0, 1.0]) * factor * travel
+    left.plot(ends, ends, color=GRAY, linewidth=4.0, zorder=0, label="δc = δ")
+    left.set_ylabel(f"computed deflection δc, {unit}")
+    right.set_ylabel("δ − δ̂, % of travel")
+    for axes in (left, right):
+        axes.set_xlabel(f"true deflection δ, {unit}")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=7, loc="best")
+    right.margins(y=0.35)
+    figure.suptitle(title(found, "true against computed deflection"), fontsize=12)
+    return figure
+
+
+def save_pages(figures: Sequence[Figure], path: Path) -> None:
+    """Write figures as the pages of one PDF, whole; the same figures give the same bytes."""
+
+    def write(part: Path) -> None:
+        with PdfPages(part, metadata={"CreationDate": None}) as pages:
+            for figure in figures:
+                pages.savefig(figure)
+
+    write_whole(path, write)
+
+
+def draw_pages(
+    documents: Sequence[Documentation],
+    fits: Mapping[ControlName, tuple[Result, str] | None],
+    folder: Path,
+    pdf: Path,
+) -> list[Path]:
+    """Draw each control's pages as PNG in a folder, and all of them in one PDF."""
+    pages: dict[Path, Figure] = {}
+    for found in documents:
+        drawn = {
+            "forces": draw_forces(found),
+            "deflections": draw_deflections(found),
+            "static": draw_static_checks(found),
+            "release": draw_releases(found),
+        }
+        fit = fits.get(found.control)
+        if fit is not None:
+            drawn["readings"] = draw_readings(*fit)
+        pages |= {folder / f"{found.control}-{name}.png": page for name, page in drawn.items()}
+    for path, page in pages.items():
+        save(page, path)
+    save_pages(list(pages.values()), pdf)
+    return list(pages)

@@ -1,0 +1,48 @@
+"""What the pages of a documentation share: units, panels, titles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from coupled.channels import unit_of
+from coupled.units import DEGREE_rad
+
+if TYPE_CHECKING:
+    from coupled.calibration.documentation import Documentation
+
+GRAY, ORANGE, GREEN, BLUE = "0.62", "#d55e00", "#009e73", "#0072b2"
+
+
+def scale(control: str) -> tuple[float, str]:
+    """Return the factor and unit in which a control's deflection is drawn."""
+    return (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
+
+
+def plain(text: str, longest: int = 20) -> str:
+    """Return a user's words cut to length, where a dollar sign would begin a formula."""
+    cut = text if len(text) <= longest else text[: longest - 1] + "…"
+    return "".join(c if c.isprintable() else "?" for c in cut).replace("$", r"\$")
+
+
+def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
+    """Return a figure of so many panels, each `height` inches tall, and their axes."""
+    figure = Figure(figsize=(1.4 + 3.6 * columns, 1.1 + height * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def pressure(pressure_Pa: float) -> str:
+    """Return a dynamic pressure as a title has it."""
+    return f"q̄ = {pressure_Pa / 1000.0:.2f} kPa"
+
+
+def title(found: Documentation, what: str) -> str:
+    """Return a page's title."""
+    return f"{found.rig.name}, {found.control}: {what}"
+
+
+def with_legend(figure: Figure, axes: Any, columns: int) -> None:
+    """Put one legend for all panels below them."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)

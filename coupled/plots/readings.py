@@ -1,0 +1,62 @@
+"""The report's figure 4: readings at each gradient with the fit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from coupled.channels import unit_of
+from coupled.plots.pages import plain, scale
+from coupled.units import POUND_N, INCH_m
+
+if TYPE_CHECKING:
+    from coupled.calibration.calibrate import Result
+
+_SETS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "black", "0.5")
+_MARKS = "osD^vP*X"
+
+
+def draw_readings(found: Result, source: str) -> Figure:
+    """Draw the report's figure 4: readings at each gradient with the fit, and what is left."""
+    factor, unit = scale(found.control)
+    figure = Figure(figsize=(8.2, 6.8), layout="constrained")
+    top, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
+    readings, line = found.readings, found.line
+    a, b = line.s1.value, -line.bend.value * line.s1.value
+    labels = np.array(readings.label)
+    for i, label in enumerate(dict.fromkeys(readings.label)):
+        ours = labels == label
+        d, f = readings.deflection[ours], readings.force[ours]
+        color, mark = _SETS[i % len(_SETS)], _MARKS[i % len(_MARKS)]
+        gradient = float(f @ d / (d @ d))
+        shown = f"{gradient:.4g} N/{unit_of(found.control)}"
+        if unit == "cm":
+            shown += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
+        style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
+        top.plot(factor * d, readings.v1[ours], label=f"set {plain(label)}: {shown}", **style)
+        reach = np.array([0.0, d[np.argmax(np.abs(d))]])
+        top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
+        below.plot(factor * d, line.residual[ours], **style)
+    below.axhline(0.0, color="black", linewidth=0.8)
+    top.set_ylabel("v₁, V")
+    below.set_ylabel("v₁ − fit, V")
+    below.set_xlabel(f"deflection δ, {unit}")
+    for axes in (top, below):
+        axes.grid(alpha=0.25)
+    many = len(set(readings.label)) > 8
+    top.legend(fontsize=6 if many else 8, ncols=2 if many else 1, loc="upper left")
+    d_unit = unit_of(found.control)
+    s1, bend = line.s1, line.bend
+    text = f"S₁ = {s1.value:.5g} ± {s1.half_width:.2g} V/{d_unit}\n"
+    text += f"K = {bend.value:.4g} ± {bend.half_width:.2g} {d_unit}/N"
+    if unit == "cm":
+        inches = bend.scaled(POUND_N / INCH_m)
+        text += f"\n   = {inches.value:.4f} ± {inches.half_width:.4f} in/lb"
+    text += f"\n{found.count} readings, ± 95 %"
+    top.annotate(text, (0.98, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=9)
+    figure.suptitle(
+        f"{found.control}: v₁ = S₁·(δ − K·F) fitted to {plain(source, 50)}", fontsize=12
+    )
+    return figure

@@ -1,0 +1,112 @@
+"""One control on the bench, whole: a hand's force on its grip, and a host that is told q̄.
+
+The frame step that flies, run over a told dynamic pressure without an aircraft; and the
+loader with its multiplier replaced by a voltage supply, as the null of eq. (14) needs it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import ControlName
+from coupled.rig.compiled import entry
+from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
+from coupled.rig.loader import move_loader, set_external, start_delay
+from coupled.rig.packing import pack
+from coupled.rig.parameters import Rig
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was so at each frame, in SI; d is m, or rad for a wheel.
+
+    `force` F and `modifying` F_mod in N, `computed` δc and `deflection` δ as read, `estimate`
+    δ̂ in d, `gradient` G_T in N/d, `surface` the command about trim in ±1.
+    """
+
+    time_s: Floats
+    force: Floats
+    computed: Floats
+    deflection: Floats
+    estimate: Floats
+    gradient: Floats
+    modifying: Floats
+    surface: Floats
+
+
+def alone(rig: Rig, control: str) -> Rig:
+    """Return the rig with one control only, no aircraft and no noise."""
+    one = {cast(ControlName, control): rig.controls[cast(ControlName, control)]}
+    return rig.model_copy(update={"controls": one, "flight": None, "noise": {}})
+
+
+def nodes_of(rig: Rig, frames: int) -> Floats:
+    """Return the times of the loader's nodes over so many frames, s."""
+    return np.arange(frames * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
+
+
+def run_told(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> Told:
+    """Return what a control does from rest under a hand's force, as the host is told q̄.
+
+    `nodes_N` has `rig.substeps` values a frame and one more, straight between; `pressure_Pa`
+    one a frame. No noise: what is read is what is so, but for scales and converters.
+    """
+    rig = alone(rig, control)
+    controls = pack(rig)
+    script = np.zeros((1, 2, len(nodes_N)))
+    script[0, 0] = nodes_N
+    record = np.zeros((len(pressure_Pa), 2 + CHANNELS_PER_CONTROL))
+    _frames(controls, script, record, pressure_Pa)
+    force, computed, deflection, estimate, gradient, modifying, _, surface = record[:, 1:9].T
+    time_s = np.arange(len(pressure_Pa)) / rig.frame_rate
+    return Told(time_s, force, computed, deflection, estimate, gradient, modifying, surface)
+
+
+def smooth(share: Floats) -> Floats:
+    """Return a half cosine from 0 to 1 over shares of the way from 0 to 1."""
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(share, 0.0, 1.0)))
+
+
+def supply_told(rig: Rig, control: str, supply_N: float, rise_s: float, rest_s: float) -> float:
+    """Return δc in d of a free control under a supply in the multiplier's place.
+
+    `supply_N` is the force that the supply's voltage v₂ stands for, v₂/S₂, positive with the
+    pilot's, turned up over `rise_s` and left for `rest_s`. The control starts at rest at
+    neutral, with no hand on it (v₃ = 0).
+    """
+    controls = pack(alone(rig, control))
+    p, s = controls["parameters"], controls["state"]
+    p["loader"]["digital"] = 1  # F_mod is what is held, not a product
+    h = 1.0 / (rig.frame_rate * rig.substeps)
+    _supplied(p, s, supply_N, _turned_up(rise_s, rest_s, h), h)
+    return float(s["loader"]["computed"][0])
+
+
+@lru_cache(maxsize=8)
+def _turned_up(rise_s: float, rest_s: float, h: float) -> Floats:
+    """Return how far up a supply is at the nodes after the first, 0 to 1."""
+    nodes = np.arange(1.0, round((rise_s + rest_s) / h) + 1.0)
+    return smooth(nodes * (h / rise_s))
+
+
+@entry
+def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> None:
+    for k in range(len(pressure)):
+        step_frame(controls, script, record, k, pressure[k], 1.0)
+
+
+@entry
+def _supplied(parameters: Any, states: Any, supply: float, share: Floats, h: float) -> None:
+    p, s = parameters[0], states[0]
+    start_delay(p.loader, s.loader, 0.0)
+    set_external(p.loader, s.loader, 1.0)
+    for node in range(len(share)):
+        s.modification.held = -supply * share[node]
+        move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, h)

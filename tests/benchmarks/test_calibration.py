@@ -1,0 +1,57 @@
+"""How often the intervals of 1000 benches hold the truth, and what a fit takes.
+
+Run alone, with its figures printed:  pytest tests/benchmarks/test_calibration.py -s
+"""
+
+from __future__ import annotations
+
+import os
+import time
+
+from coupled.calibration.bench import Bench, take_readings
+from coupled.calibration.calibrate import calibrate
+from coupled.calibration.coverage import measure_coverage
+from coupled.calibration.estimate import usual_instruments
+from coupled.calibration.plan import stations
+from tests.calibration.made import report_rig
+
+USUAL = usual_instruments("column")
+
+
+def usual_bench() -> Bench:
+    rig = report_rig()
+    return Bench(rig, "column", stations(rig, "column", 5, 5), USUAL)
+
+
+def test_1000_benches_in_30_s_whose_intervals_hold_the_truth() -> None:
+    made = usual_bench()
+    take_readings(made, 0)  # the first compiles the physics
+    start, before = time.perf_counter(), os.times()
+    found = measure_coverage(made, 1000, workers=2)
+    taken, after = time.perf_counter() - start, os.times()
+    worked = after.children_user + after.children_system
+    worked -= before.children_user + before.children_system
+    print(f"\n1000 benches and fits: {taken:.1f} s, {worked:.1f} s of two cores' work")
+    for name, share in found.covered.items():
+        print(f"  95 % interval of {name} holds the truth in {100 * share:.1f} %")
+        wide = 0.01 if name == "S2" else 0.0  # from five nulls
+        assert 0.93 - wide <= share <= 0.97 + wide
+    print(f"  K within 5 % in {100 * found.within:.1f} %; bias {100 * found.bias:+.2f} %")
+    print(f"  a good reading accused in {100 * found.accused:.1f} %")
+    assert found.within > 0.95
+    assert abs(found.bias) < 0.003
+    assert found.accused < 0.01
+    assert worked / 2.0 < 30.0  # so that what else the machine does is not counted
+
+
+def test_a_calibration_fits_in_under_50_ms() -> None:
+    made = usual_bench()
+    readings = take_readings(made, 1)
+    data = made.rig.controls["column"]
+    taken = []
+    for _ in range(30):
+        start = time.perf_counter()
+        calibrate(readings, data, "column", USUAL, "bench")
+        taken.append(time.perf_counter() - start)
+    print(f"\na calibration from 25 readings and 5 nulls: {1e3 * min(taken):.1f} ms")
+    assert min(taken) < 0.05

@@ -1,0 +1,212 @@
+"""The virtual bench: exact without errors, honest with them, and the full circle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coupled.authority import compare
+from coupled.calibration.belief import real_scales, with_calibration
+from coupled.calibration.bench import Bench, take_readings
+from coupled.calibration.calibrate import calibrate
+from coupled.calibration.coverage import measure_coverage
+from coupled.calibration.estimate import perfect_instruments, usual_instruments
+from coupled.calibration.plan import fewest, stations
+from coupled.channels import ControlName
+from coupled.errors import InputError
+from coupled.flight.loop import fly
+from coupled.flight.scenario import Scenario, read_run
+from coupled.resources import shipped_rigs
+from coupled.rig.parameters import Rig
+from coupled.rig.rigfile import read_rig
+from coupled.rig.rigwrite import rig_text
+from coupled.rig.statics import static_line
+from coupled.rig.told import run_told, supply_told
+from tests.calibration.made import report_rig
+from tests.rigs import G_STIFF, K_REPORT
+from tests.rigs import bench as bench_rig
+
+CHANGES: dict[str, Any] = {
+    "controls.column.loader.breakout_N": 8.0,
+    "controls.column.sensing.deflection_scale": 0.93,
+    "controls.column.sensing.force_scale": 1.04,
+    "controls.column.sensing.modifying_scale": 1.1,
+    "controls.column.sensing.word_length_bits": 12,
+}
+
+
+def without_errors(rig: Rig, control: ControlName) -> tuple[Any, Any]:
+    grid = stations(rig, control, 4, 4)
+    readings = take_readings(Bench(rig, control, grid, perfect_instruments()), 0)
+    data = rig.controls[control]
+    return calibrate(readings, data, control, perfect_instruments(), "bench"), data
+
+
+@pytest.mark.parametrize("changes", [{}, CHANGES], ids=["as shipped", "off in every scale"])
+def test_noise_free_readings_give_s1_s2_s3_and_k_to_1e_9(changes: dict[str, Any]) -> None:
+    rig = read_rig(shipped_rigs()["report-column"], changes)
+    found, data = without_errors(rig, "column")
+    true = real_scales(data)
+    assert found.line.s1.value == pytest.approx(true.s1, rel=1e-9)
+    assert found.line.bend.value == pytest.approx(data.loader.bend, rel=1e-9)
+    assert found.s3.value == pytest.approx(true.s3, rel=1e-9)
+    assert found.s2["the null, eq. (14)"].value == pytest.approx(true.s2, rel=1e-9)
+    assert not found.suspects
+
+
+@pytest.mark.parametrize(
+    ("name", "control"), [("bench", "column"), ("c172p", "wheel"), ("c172p", "pedals")]
+)
+def test_breakout_friction_two_segments_and_other_controls(name: str, control: ControlName) -> None:
+    found, data = without_errors(read_rig(shipped_rigs()[name]), control)
+    true = real_scales(data)
+    assert found.line.bend.value == pytest.approx(data.loader.bend, rel=1e-8)
+    assert found.line.s1.value == pytest.approx(true.s1, rel=1e-9)
+    assert found.s2_chosen.value == pytest.approx(true.s2, rel=1e-8)
+
+
+def test_friction_is_the_same_with_hand_and_supply() -> None:
+    """15 N of friction in 100 N of force: the null still finds S₂ to 1e-5."""
+    found, data = without_errors(read_rig(shipped_rigs()["737"]), "column")
+    assert found.s2_chosen.value == pytest.approx(real_scales(data).s2, rel=1e-5)
+
+
+def test_one_gradient_at_every_pressure_cannot_be_benched() -> None:
+    with pytest.raises(InputError, match="has one gradient only"):
+        stations(read_rig(shipped_rigs()["737"]), "wheel", 3, 3)
+
+
+def test_the_bench_is_the_rig_that_flies() -> None:
+    """A told run is what the frame loop gives on a rig without aircraft, to the last bit."""
+    scenario = read_run("appendix-c")[0]
+    rig = scenario.rig
+    flown = fly(scenario)
+    pressure = flown["dynamic_pressure_Pa"]
+    action = scenario.pilots["column"].act(
+        rig.controls["column"], 0.0, "column", scenario.file.parent
+    )
+    frames = scenario.frames
+    times = np.arange(frames * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
+    assert action.force is not None
+    told = run_told(rig, "column", action.force(times), pressure)
+    np.testing.assert_array_equal(told.computed, flown["column_computed_m"])
+    np.testing.assert_array_equal(told.deflection, flown["column_deflection_m"])
+    np.testing.assert_array_equal(told.estimate, flown["column_estimate_m"])
+
+
+def test_a_supply_moves_the_control_as_the_hands_force_does() -> None:
+    """At rest G_B·δc = v₂/S₂, with v₃ = 0: appendix B."""
+    rig = bench_rig()
+    assert supply_told(rig, "column", 28.0, 0.5, 4.0) == pytest.approx(0.05, rel=1e-9)
+    assert supply_told(rig, "column", -28.0, 0.5, 4.0) == pytest.approx(-0.05, rel=1e-9)
+
+
+def test_scales_that_are_off_are_felt_by_the_host() -> None:
+    changes = {
+        "controls.column.sensing.force_scale": 1.1,
+        "controls.column.sensing.modifying_scale": 1.25,
+    }
+    rig = bench_rig(changes)
+    force = np.full(400 * rig.substeps + 1, 50.0)
+    told = run_told(rig, "column", force, np.full(400, 3000.0))
+    assert told.force[-1] == pytest.approx(55.0)
+    plain = run_told(bench_rig(), "column", force, np.full(400, 3000.0))
+    ratio = (told.modifying[-1] / told.computed[-1]) / (plain.modifying[-1] / plain.computed[-1])
+    assert ratio == pytest.approx(1.0 / 1.25, rel=1e-9)
+
+
+def test_a_seed_repeats_a_bench_and_another_does_not() -> None:
+    rig = report_rig()
+    made = Bench(rig, "column", stations(rig, "column", 2, 2), usual_instruments("column"))
+    one, two, other = (take_readings(made, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.v1, two.v1)
+    assert np.any(one.v1 != other.v1)
+    assert np.allclose(one.deflection / 0.5e-3, np.round(one.deflection / 0.5e-3))
+    assert np.allclose(one.force / 0.5, np.round(one.force / 0.5))
+
+
+def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
+    """120 benches of 25 readings; the benchmark counts 1000."""
+    rig = report_rig()
+    made = Bench(rig, "column", stations(rig, "column", 5, 5), usual_instruments("column"))
+    found = measure_coverage(made, 120, seed=5000)
+    print("\n" + str(found))
+    for name, share in found.covered.items():
+        assert share > 0.89, name  # 3 standard deviations of a binomial below 0.95
+    assert found.within > 0.93
+    assert abs(found.bias) < 0.01
+    assert found.accused < 0.03
+
+
+def flown(rig: Rig, configuration: str) -> Any:
+    base = read_run("worst-case")[0]
+    chosen = base.run.model_copy(update={"configurations": [configuration]})
+    made = Scenario(chosen, base.file, rig, base.rig_file, base.pilots, base.label, base.changes)
+    [flight] = compare([made])
+    return flight.outcome
+
+
+def test_full_circle(tmp_path: Path) -> None:
+    """Bench, calibrate, write, fly: a rig that lost 20 % gives its authority and feel back.
+
+    The rig's S₁ is 4 % off and its host knows of no bend: 1 − 0.96/1.2 = 20 % is lost.
+    """
+    base = read_run("worst-case")[0].rig
+    control = base.controls["column"]
+    never = control.model_copy(
+        update={
+            "compensation": control.compensation.model_copy(update={"bend": 0.0}),
+            "sensing": control.sensing.model_copy(
+                update={"deflection_scale": 0.96, "force_scale": 1.03, "modifying_scale": 0.97}
+            ),
+        }
+    )
+    rig = base.model_copy(update={"controls": {"column": never}})
+    assert flown(rig, "compensated").loss == pytest.approx(0.20, abs=0.012)
+    tools = usual_instruments("column")
+    planned = [s for s, count in fewest(rig, "column", tools, 0.05) for _ in range(count)]
+    for seed in range(5):
+        readings = take_readings(Bench(rig, "column", planned, tools), seed)
+        found = calibrate(readings, never, "column", tools, "bench")
+        path = tmp_path / "new.toml"
+        path.write_text(rig_text(with_calibration(rig, "column", found)), encoding="utf-8")
+        after = flown(read_rig(path), "compensated")
+        print(f"full circle: loss {100 * after.loss:+.2f} %, felt {after.felt_ratio:.4f}")
+        assert abs(after.loss) < 0.005
+        assert after.felt_ratio == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
+    """A fault crosses from a worker as the one line that it is."""
+    rig = report_rig()
+    few = stations(rig, "column", 3, 1)
+    with pytest.raises(InputError, match="holds 3 readings"):
+        measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)
+
+
+def test_a_wandering_hand_parts_the_instruments_readings() -> None:
+    """Perfect instruments, read one after the other: what is left is the hand's 1 %."""
+    rig = report_rig()
+    tools = replace(perfect_instruments(), hand=0.01)
+    readings = take_readings(Bench(rig, "column", stations(rig, "column", 5, 5), tools, 0), 2)
+    found = calibrate(readings, rig.controls["column"], "column", tools, "bench")
+    assert 0.6 < found.line.excess < 1.3
+    assert np.std(readings.v3 / readings.force) / 0.25 == pytest.approx(0.014, rel=0.4)
+
+
+def test_statics_and_frames_agree_on_scales_that_are_off() -> None:
+    """The host's δ̂ and F_mod, breakout's term and all, in closed form and stepped to rest."""
+    rig = bench_rig({**CHANGES, "controls.column.sensing.word_length_bits": 0})
+    told = run_told(rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0))
+    line = static_line(rig, "column", 3000.0, told.computed[-1:] / 0.93)
+    assert line.force[0] == pytest.approx(70.0, rel=1e-9)
+    assert told.estimate[-1] == pytest.approx(line.estimate[0], rel=1e-9)
+    control = rig.controls["column"]
+    asked = (line.force[0] - 8.0 - 560.0 * line.computed[0]) * 1.1
+    felt = G_STIFF / (1.0 - K_REPORT * G_STIFF)
+    extra = felt * K_REPORT * control.loader.breakout
+    assert asked == pytest.approx((felt - 560.0) * line.computed[0] + extra, rel=1e-9)

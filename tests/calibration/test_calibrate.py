@@ -1,0 +1,206 @@
+"""A calibration as a whole: what it refuses, whom it accuses, when it is stale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coupled.calibration.belief import believed_scales, real_scales, stale, with_calibration
+from coupled.calibration.calibrate import calibrate
+from coupled.calibration.estimate import perfect_instruments, usual_instruments
+from coupled.calibration.readings import Readings, read_readings
+from coupled.errors import InputError
+from coupled.rig.parameters import Control
+from coupled.rig.rigfile import read_rig
+from coupled.rig.rigwrite import rig_text
+from tests.calibration.made import S1, K, column, csv_file, grid, readings, report_rig, with_errors
+
+USUAL = usual_instruments("column")
+
+
+def fit(r: Readings, control: Control | None = None, **tools: Any) -> Any:
+    return calibrate(r, control or column(), "column", tools.get("tools", USUAL), "r.csv")
+
+
+def altered(section: str, **values: Any) -> Control:
+    data = column()
+    changed = getattr(data, section).model_copy(update=values)
+    return data.model_copy(update={section: changed})
+
+
+def test_typed_readings_give_k_in_inches_a_pound(tmp_path: Path) -> None:
+    """Made by hand from K = 0.016 in/lb and 14.286 V/in, to the last digit that a meter shows."""
+    found = fit(read_readings(csv_file(tmp_path), "column"))
+    assert found.line.bend.value == pytest.approx(K, rel=0.01)
+    assert found.line.s1.value == pytest.approx(14.286 / 0.0254, rel=1e-3)
+    assert found.s2["the null, eq. (14)"].value == pytest.approx(0.96 * found.s3.value)
+
+
+@pytest.mark.parametrize("labels", ["one", "several"])
+def test_one_gradient_is_refused_with_the_reading_that_would_separate(labels: str) -> None:
+    delta, force = grid(1, 8)
+    r = readings(delta, force, per_set=8 if labels == "one" else 2)
+    with pytest.raises(InputError) as caught:
+        fit(r)
+    text = str(caught.value)
+    assert "S1 and K are inseparable" in text
+    assert "add a reading at 2189 N/m, at 0.0433 m (94.7 N)" in text
+    assert "rows 2 to 9" in text
+    assert "\n" not in text
+
+
+def test_the_reading_that_is_asked_for_does_separate() -> None:
+    delta, force = grid(1, 8)
+    more = readings(np.append(delta, 0.0432), np.append(force, 94.6), per_set=8)
+    assert fit(more, tools=perfect_instruments()).line.bend.value == pytest.approx(K, rel=1e-9)
+
+
+def test_noise_does_not_pass_for_a_second_gradient() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        with pytest.raises(InputError, match="to within the instruments' errors"):
+            fit(with_errors(*grid(1, 12), USUAL, rng))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"force": np.full(25, 40.0)}, "rows 2 to 26: every force is the same"),
+        ({"deflection": np.full(25, 0.04)}, "every deflection is the same"),
+        ({"v1": np.full(25, 4.0)}, "every v1 is the same"),
+        ({"force": np.zeros(25)}, "is not 0 in 0 rows"),
+        ({"v1": -readings(*grid()).v1}, "check its sign"),
+    ],
+)
+def test_readings_that_tell_nothing_are_refused(change: Any, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        fit(replace(readings(*grid()), **change))
+
+
+def test_too_few_readings() -> None:
+    with pytest.raises(InputError, match="holds 3 readings"):
+        fit(readings(*grid(3, 1), per_set=1))
+
+
+@pytest.mark.parametrize(
+    ("field", "index", "factor", "columns"),
+    [
+        ("deflection", 7, 10.0, "deflection or v1"),
+        ("v1", 12, 0.1, "deflection or v1"),
+        ("v1", 3, 1.27, "deflection or v1"),
+        ("force", 18, 10.0, "force"),
+        ("force", 20, 0.7, "force or v3"),
+        ("v3", 4, -1.0, "force or v3"),
+    ],
+)
+def test_a_mistyped_reading_is_named_by_its_row(
+    field: str, index: int, factor: float, columns: str
+) -> None:
+    good = with_errors(*grid(), USUAL, np.random.default_rng(11))
+    assert fit(good).suspects == ()
+    typed = getattr(good, field).copy()
+    typed[index] *= factor
+    found = fit(replace(good, **{field: typed}))
+    [suspect] = found.suspects
+    assert (suspect.row, suspect.columns) == (index + 2, columns)
+    assert index + 2 not in found.readings.row
+    assert found.line.bend.low < K < found.line.bend.high
+
+
+def test_a_third_of_the_readings_may_be_wrong() -> None:
+    good = with_errors(*grid(), USUAL, np.random.default_rng(12))
+    typed = good.v1.copy()
+    typed[::3] *= 1.5
+    found = fit(replace(good, v1=typed))
+    assert {s.row for s in found.suspects} == set(range(2, 27, 3))
+    assert found.line.bend.value == pytest.approx(K, rel=0.1)
+
+
+def test_an_arc_is_corrected_and_what_is_beyond_14_degrees_named() -> None:
+    length = 0.5
+    control = altered("loader", arc_geometry=True).model_copy(update={"length": length})
+    delta, force = grid()
+    level = replace(
+        readings(delta, force),
+        deflection=length * np.sin(delta / length),  # eq. (15)
+    )
+    found = fit(level, control, tools=perfect_instruments())
+    assert found.line.s1.value == pytest.approx(S1, rel=1e-10)
+    assert found.line.bend.value == pytest.approx(K, rel=1e-9)
+    far = np.flatnonzero(delta / length > np.radians(14.0)) + 2
+    assert found.beyond == far.tolist()
+    assert len(far) > 3
+    left_alone = fit(level, altered("loader").model_copy(update={"length": length}))
+    assert left_alone.level is None
+    assert left_alone.beyond
+    assert abs(left_alone.line.s1.value / S1 - 1.0) > 5e-3
+    with pytest.raises(InputError, match=r"on an arc of 0\.1 m, which no ruler reads"):
+        fit(level, control.model_copy(update={"length": 0.1}))
+
+
+def test_a_calibration_carries_its_gains_and_goes_stale_with_them(tmp_path: Path) -> None:
+    rig = report_rig()
+    found = fit(with_errors(*grid(), USUAL, np.random.default_rng(1)))
+    written = with_calibration(rig, "column", found, date="1974-02-04")
+    path = tmp_path / "new.toml"
+    path.write_text(rig_text(written), encoding="utf-8")
+    again = read_rig(path)
+    assert again == written
+    control = again.controls["column"]
+    assert control.calibration.date == "1974-02-04"
+    assert stale(control) == []
+    assert stale(column()) == []  # there is none
+    longer = control.model_copy(update={"length": 1.0})
+    assert stale(longer) == ["the column's length (m) was 0.9 and is 1"]
+    gains = control.gains.model_copy(update={"s1_over_s2": 2000.0})
+    [change] = stale(control.model_copy(update={"gains": gains}))
+    assert change.startswith("the gain S1/S2 was 2249.72")
+    host = control.compensation.model_copy(update={"bend": 1e-4})
+    [change] = stale(control.model_copy(update={"compensation": host}))
+    assert change.startswith("the host uses K = 0.0001")
+    assert fit(readings(*grid()), longer).changed
+
+
+def test_a_calibration_changes_beliefs_and_not_the_hardware() -> None:
+    rig = report_rig()
+    found = fit(with_errors(*grid(), USUAL, np.random.default_rng(1)))
+    before, new = rig.controls["column"], with_calibration(rig, "column", found)
+    after = new.controls["column"]
+    one, two = real_scales(before), real_scales(after)
+    for name in ("s1", "s2", "s3"):
+        assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-12)
+    assert after.loader == before.loader
+    assert after.compensation.bend == found.line.bend.value
+    assert believed_scales(after).s1 == found.line.s1.value
+    taken = with_calibration(rig, "column", found, hardware=True).controls["column"]
+    assert taken.loader.bend == found.line.bend.value
+    assert taken.sensing.deflection_scale == taken.sensing.force_scale == 1.0
+
+
+@pytest.mark.parametrize("counts", [(5, 8), (8, 5), (3, 9), (12, 4)])
+def test_repeated_corners_are_not_taken_for_mistyped(counts: tuple[int, int]) -> None:
+    """A plan repeats two corners: the smaller group must not look like outliers to the larger."""
+    delta = np.repeat([0.169, 0.0685], counts)
+    force = np.repeat([94.7, 150.0], counts)
+    rng = np.random.default_rng(6)
+    for _ in range(40):
+        good = with_errors(delta, force, USUAL, rng)
+        good = replace(good, label=tuple(np.repeat(["soft", "stiff"], counts)))
+        assert fit(good).suspects == ()
+    typed = good.v1.copy()
+    typed[-1] *= 1.2
+    typed[0] *= 0.8
+    found = fit(replace(good, v1=typed))
+    assert [s.row for s in found.suspects] == [2, 1 + sum(counts)]
+
+
+def test_a_reading_at_neutral_does_no_harm() -> None:
+    good = readings(np.append(grid()[0], 0.0), np.append(grid()[1], 0.0))
+    found = fit(good)
+    assert found.suspects == ()
+    assert found.line.bend.value == pytest.approx(K, rel=1e-9)
+    assert found.s3.value == pytest.approx(0.26, rel=1e-12)

@@ -1,0 +1,189 @@
+"""The bench's commands as their users meet them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.calibration.documentation import document
+from coupled.cli import main
+from coupled.plots.checks import draw_releases, draw_static_checks
+from coupled.plots.documentation import draw_deflections, draw_forces, save_pages
+from coupled.plots.saving import save
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+from tests.calibration.made import CSV, K
+from tests.rigs import bench as bench_rig
+from tests.test_cli import coupled, files
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "r.csv").write_text(CSV)
+    return tmp_path
+
+
+def test_help_has_examples(folder: Path) -> None:
+    for command in ("bench", "calibrate", "document"):
+        done = coupled(folder, command, "--help")
+        assert done.returncode == 0
+        assert "Examples" in done.stdout
+
+
+def test_bench_calibrate_write_and_again(folder: Path) -> None:
+    done = coupled(folder, "bench", "-o", "b.csv")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "readings: b.csv  (25 readings, 5 nulls)\n"
+    words = ["calibrate", "b.csv", "--write", "new.toml", "--date", "1974-02-04"]
+    done = coupled(folder, *words, "--figure", "f.png", "--json", "c.json")
+    assert done.returncode == 0, done.stderr
+    assert files(folder) == {"r.csv", "b.csv", "new.toml", "f.png", "c.json"}
+    assert "K, in/lb" in done.stdout
+    assert "by the null, eq. (14)" in done.stdout
+    table = json.loads((folder / "c.json").read_text())
+    bend = table["errors_in_variables"]["bend_m_per_N"]
+    assert bend["low"] < bend["value"] < bend["high"]
+    assert bend["value"] == pytest.approx(K, rel=0.08)
+    assert table["normal_equations"]["a_V_per_m"] == pytest.approx(
+        table["ordinary_least_squares"]["s1_V_per_m"]["value"], rel=1e-12
+    )
+    control = read_rig(folder / "new.toml").controls["column"]
+    assert control.compensation.bend == bend["value"]
+    assert control.calibration.date == "1974-02-04"
+    printed = coupled(folder, "calibrate", "b.csv", "--json", "-")
+    assert json.loads(printed.stdout) == table
+
+
+def test_typed_readings_in_inches(folder: Path) -> None:
+    done = coupled(folder, "calibrate", "r.csv")
+    assert done.returncode == 0, done.stderr
+    assert "6 readings of the column in 2 gradient sets, rows 2 to 7" in done.stdout
+
+
+def test_a_stale_calibration_is_said(folder: Path) -> None:
+    assert coupled(folder, "calibrate", "r.csv", "--write", "new.toml").returncode == 0
+    text = (folder / "new.toml").read_text().replace("length_m = 0.9", "length_m = 0.8", 1)
+    (folder / "new.toml").write_text(text)
+    done = coupled(folder, "calibrate", "r.csv", "--rig", "new.toml")
+    assert "stale calibration" in done.stdout
+    change = "the column's length (m) was 0.9 and is 0.8"
+    assert change in " ".join(done.stdout.split())
+    run = """name = "r"\ncard = "c"\nrig = "new.toml"\nduration_s = 0.2\n
+[pilot.column]\nkind = "step"\nforce_N = 10.0\n"""
+    (folder / "run.toml").write_text(run)
+    flown = coupled(folder, "fly", "run.toml", "-o", "f.csv")
+    assert flown.returncode == 0
+    assert flown.stderr == f"stale calibration: column: {change}\n"
+
+
+def test_a_plan_and_its_form(folder: Path) -> None:
+    done = coupled(folder, "calibrate", "--plan", "--write", "form.csv", "--json", "p.json")
+    assert done.returncode == 0, done.stderr
+    assert "fewest for" in done.stdout
+    table = json.loads((folder / "p.json").read_text())
+    rows = sum(reading["count"] for reading in table["readings"])
+    assert len((folder / "form.csv").read_text().splitlines()) == rows + 1
+    assert all(np.isfinite(grid["half_width"]) for grid in table["grids"])
+    unfilled = coupled(folder, "calibrate", "form.csv")
+    assert unfilled.returncode == 2
+    assert "row 2: v1_V: is empty" in unfilled.stderr
+
+
+def test_many_benches_are_counted(folder: Path) -> None:
+    done = coupled(folder, "bench", "--repeat", "6", "--json", "-")
+    table = json.loads(done.stdout)
+    assert table["benches"] == 6
+    assert 0.0 <= table["within"] <= 1.0
+    assert files(folder) == {"r.csv"}
+
+
+def test_a_document_has_its_pages_and_checks(folder: Path) -> None:
+    done = coupled(folder, "document", "-o", "doc", "--readings", "r.csv", "--json", "d.json")
+    assert done.returncode == 0, done.stderr
+    pages = ("forces", "deflections", "static", "release", "readings")
+    made = {f"doc/column-{page}.png" for page in pages} | {"doc/report-column.pdf"}
+    assert files(folder) == made | {"r.csv", "d.json"}
+    assert (folder / "doc/report-column.pdf").read_bytes().startswith(b"%PDF")
+    checks = json.loads((folder / "d.json").read_text())["column"]
+    assert {c["unit"] for c in checks} == {"N", "°", "s", "%", ""}
+    assert all(c["passed"] == (c["margin"] >= 0.0) for c in checks)
+
+
+def test_a_documents_pages_are_the_same_bytes_again(tmp_path: Path) -> None:
+    found = document(bench_rig(), "column", 0.3)
+    for name in ("one", "two"):
+        figures = [draw(found) for draw in (draw_deflections, draw_releases)]
+        save_pages(figures, tmp_path / f"{name}.pdf")
+        save(draw_static_checks(found), tmp_path / f"{name}.png")
+    for suffix in ("pdf", "png"):
+        one, two = (tmp_path / f"{name}.{suffix}" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
+
+
+HOSTILE = [
+    (["calibrate"], "give a file of readings, or --plan"),
+    (["calibrate", "none.csv"], "none.csv: cannot be read"),
+    (["calibrate", "."], "cannot be read"),
+    (["calibrate", "r.csv", "--rig", "nothing"], "is no shipped rig"),
+    (["calibrate", "r.csv", "--rig", "none.toml"], "there is no such rig file"),
+    (["calibrate", "r.csv", "--control", "wheel"], "--control: no 'wheel'"),
+    (["calibrate", "r.csv", "--control", "colum"], "did you mean column?"),
+    (["calibrate", "r.csv", "--write", "new.csv"], "a rig file ends in .toml"),
+    (["calibrate", "r.csv", "--write", "r.csv/new.toml"], "cannot be written"),
+    (["calibrate", "r.csv", "--figure", "f.bmp"], "a figure ends in"),
+    (["calibrate", "r.csv", "--json", "r.csv"], "is a file that this reads"),
+    (["calibrate", "r.csv", "--write", "a.toml", "--json", "a.toml"], "is another file"),
+    (["calibrate", "r.csv", "--plan"], "give no readings"),
+    (["calibrate", "--plan", "--write", "form.toml"], "ends in .csv"),
+    (["calibrate", "--plan", "--precision", "0"], "'--precision': Input should be"),
+    (["calibrate", "--plan", "--precision", "0.1"], "ask for less"),
+    (["calibrate", "--plan", "--rig", "737", "--control", "wheel"], "has one gradient only"),
+    (["calibrate", "--plan", "--rig", "737", "--strongest-N", "20"], "overcome the breakout"),
+    (["calibrate", "r.csv", "--error", "ruler"], "--error: ruler: '' is no number"),
+    (["calibrate", "r.csv", "--error", "rular=1"], "did you mean ruler?"),
+    (["calibrate", "r.csv", "--error", "hand=nan"], "is no error of an instrument"),
+    (["calibrate", "r.csv", "--error", "scale=-1"], "is no error of an instrument"),
+    (["calibrate", "r.csv", "--date", "a\nb", "--write", "n.toml"], "calibration.date"),
+    (["bench", "--deflections", "0"], "'--deflections': Input should be greater"),
+    (["bench", "-o", "r.txt"], "readings are written as .csv"),
+    (["bench", "-o", "r.csv/x.csv"], "cannot be written"),
+    (["bench", "--rig", "737", "--control", "pedals"], "has one gradient only"),
+    (["bench", "--repeat", "-1"], "'--repeat': Input should be"),
+    (["bench", "--seed", "-1"], "'--seed': Input should be"),
+    (["document", "nothing"], "is no shipped rig"),
+    (["document", "-o", "r.csv"], "is a file; give a folder"),
+    (["document", "--control", "wheel"], "no 'wheel'"),
+    (["document", "--readings", "none.csv"], "cannot be read"),
+    (["document", "--json", "."], "is a folder"),
+]
+
+
+@pytest.mark.parametrize(("words", "says"), HOSTILE, ids=[" ".join(w)[:40] for w, _ in HOSTILE])
+def test_words_that_lead_nowhere_end_in_one_line(
+    folder: Path,
+    words: list[str],
+    says: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.argv", ["coupled", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    printed = capsys.readouterr()
+    assert ended.value.code == 2, printed.out
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    assert says in printed.err
+    assert printed.out == ""
+    assert files(folder) == {"r.csv"}
+
+
+def test_every_control_of_a_shipped_rig_is_drawn(tmp_path: Path) -> None:
+    rig = read_rig(shipped_rigs()["c172p"])
+    found = document(rig, "wheel", 0.3)
+    assert "°" in draw_forces(found).axes[0].get_xlabel()
+    assert len(draw_static_checks(document(bench_rig(), "column", None)).axes) == 3

@@ -1,0 +1,90 @@
+"""Plans: the error that is promised is the error that comes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.calibration.errors_in_variables import errors_in_variables
+from coupled.calibration.estimate import usual_instruments
+from coupled.calibration.plan import fewest, form, gradient_sets, precision, stations
+from coupled.errors import InputError
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+from tests.calibration.made import K, report_rig, with_errors
+from tests.rigs import bench as bench_rig
+
+USUAL = usual_instruments("column")
+
+
+def test_gradients_are_even_over_the_schedule() -> None:
+    found = gradient_sets(report_rig(), "column", 5)
+    np.testing.assert_allclose([g for _, g in found], np.linspace(560.4, 2189.1, 5), rtol=1e-3)
+    assert [q for q, _ in found] == sorted(q for q, _ in found)
+
+
+def test_a_schedule_that_falls_is_followed_down() -> None:
+    key = "controls.column.schedule.total_gradient_N_per_m"
+    found = gradient_sets(bench_rig({key: [2000.0, 500.0]}), "column", 3)
+    assert [round(g) for _, g in found] == [500, 1250, 2000]
+    assert [round(q) for q, _ in found] == [3000, 1500, 0]
+
+
+@pytest.mark.parametrize("name", ["report-column", "c172p", "bench"])
+def test_stations_keep_within_travel_and_force(name: str) -> None:
+    rig = read_rig(shipped_rigs()[name])
+    for station in stations(rig, "column", 4, 4, 60.0):
+        assert station.force <= 60.0 * 1.01
+        assert 0.0 < station.deflection <= 0.95 * rig.controls["column"].travel
+
+
+def test_the_promised_error_is_the_one_that_comes() -> None:
+    grid = stations(report_rig(), "column", 4, 5)
+    promised = precision(report_rig(), "column", grid, USUAL)
+    delta = np.array([s.deflection for s in grid])
+    force = np.array([s.force for s in grid])
+    rng = np.random.default_rng(8)
+    found = []
+    for _ in range(600):
+        r = with_errors(delta, force, USUAL, rng)
+        found.append(errors_in_variables(r.deflection, r.force, r.v1, USUAL).bend.value)
+    assert promised.bend == pytest.approx(K, rel=1e-3)
+    assert np.std(found) / K == pytest.approx(promised.error, rel=0.09)
+
+
+def test_the_fewest_readings_reach_what_is_wanted_and_no_grid_does_better() -> None:
+    rig = report_rig()
+    for share in (0.1, 0.05, 0.03):
+        chosen = fewest(rig, "column", USUAL, share)
+        design = [s for s, count in chosen for _ in range(count)]
+        reached = precision(rig, "column", design, USUAL)
+        assert reached.half_width <= share
+        smaller = precision(rig, "column", design[:-1], USUAL)
+        assert smaller.half_width > share
+        for size in ((3, 3), (4, 4), (5, 5)):
+            grid = precision(rig, "column", stations(rig, "column", *size), USUAL)
+            if grid.half_width <= share:
+                assert reached.readings <= grid.readings
+
+
+def test_the_reports_advice_is_enough_for_5_percent() -> None:
+    """Four or five gradients by four or five deflections: K to ± 4 to 6 % (95 %)."""
+    widths = [
+        precision(report_rig(), "column", stations(report_rig(), "column", n, n), USUAL).half_width
+        for n in (4, 5)
+    ]
+    assert 0.04 < widths[1] < widths[0] < 0.065
+
+
+def test_what_no_number_of_readings_gives_is_refused() -> None:
+    with pytest.raises(InputError, match=r"400 readings do not give K to ±0\.1 %"):
+        fewest(report_rig(), "column", USUAL, 0.001)
+    with pytest.raises(InputError, match="does not overcome the breakout"):
+        stations(read_rig(shipped_rigs()["737"]), "column", 3, 3, 40.0)
+
+
+def test_a_form_has_a_row_a_reading() -> None:
+    chosen = fewest(report_rig(), "column", USUAL, 0.05)
+    lines = form(chosen, "column").splitlines()
+    assert len(lines) == 1 + sum(count for _, count in chosen)
+    assert lines[0].startswith("gradient_set,deflection_m,force_N,v1_V,v3_V,v2_V")
