@@ -24,7 +24,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from coupled.channels import LONGITUDINAL
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.airframe import SPEED, JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.output import Output, white
 from coupled.gap.smooth import smoothed
@@ -46,6 +46,19 @@ def vertical_air(record: Record, frame_s: float) -> Floats | None:
     """Return how fast the air rises in m/s at each frame, or None where channels lack."""
     rough = _rough_air(record, frame_s)
     return None if rough is None else smoothed(rough)
+
+
+def _air(record: Record, frame_s: float) -> tuple[Floats | None, float]:
+    """Return the air as told, and its rms, m/s: the rough one's less its noise.
+
+    The smoother takes some of a faint gust with the noise, which its own rms would miss.
+    """
+    rough = _rough_air(record, frame_s)
+    if rough is None:
+        return None, 0.0
+    calm = smoothed(rough)
+    true = max(float(np.var(rough)) - white(rough) ** 2, float(np.var(calm)))
+    return calm, math.sqrt(true)
 
 
 def _rough_air(record: Record, frame_s: float) -> Floats | None:
@@ -76,6 +89,7 @@ class Model:
     elevator: Floats
     points: tuple[Floats, Floats]
     air: Floats | None
+    air_rms: float  # m/s
     _flown: list[tuple[Flight, Floats]] = field(default_factory=list)
 
     def motion(self, rig: Rig) -> Floats:
@@ -98,10 +112,9 @@ class Model:
         order = np.argsort(positions)
         wanted = np.interp(elevator, positions[order], commands[order])
         still = flight.model_copy(update={"gust_rms": 0.0})
-        size = 0.0 if self.air is None else float(np.std(self.air))
         air = None
-        if flight.gust_rms > 0.0 and self.air is not None and size > 0.0:
-            moves = self.air * (flight.gust_rms / size) + (0.0 if error is None else error)
+        if flight.gust_rms > 0.0 and self.air is not None and self.air_rms > 0.0:
+            moves = self.air * (flight.gust_rms / self.air_rms) + (0.0 if error is None else error)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 tells of the air over the frame before
         frame_s = 1.0 / self.rig.frame_rate
         airframe = JSBSimAirframe(still, frame_s, ["column"], [aircraft_folder()], air_m_per_s=air)
@@ -124,7 +137,8 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
         return []
     elevator = record["elevator_rad"]
     level, calm = white(elevator), smoothed(elevator)
-    model = Model(rig, calm, surface_points(rig), vertical_air(record, 1.0 / rig.frame_rate))
+    air, air_rms = _air(record, 1.0 / rig.frame_rate)
+    model = Model(rig, calm, surface_points(rig), air, air_rms)
     flown = model.motion(rig)
     rng = np.random.default_rng(43)
     hiss = smoothed(calm + rng.normal(0.0, level, len(calm)))
@@ -171,6 +185,14 @@ def spread_of_air(record: Record, frame_s: float) -> float:
 def can_tell_air(records: Sequence[Record]) -> bool:
     """Tell whether the records have what the kinematics of the air need."""
     return all(name in record for record in records for name in AIR_NEEDS)
+
+
+def trim_speed(rig: Rig) -> float:
+    """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
+    assert rig.flight is not None
+    frame_s = 1.0 / rig.frame_rate
+    airframe = JSBSimAirframe(rig.flight, frame_s, ["column"], [aircraft_folder()])
+    return airframe.motion()[SPEED]
 
 
 def surface_points(rig: Rig) -> tuple[Floats, Floats]:

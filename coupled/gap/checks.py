@@ -6,9 +6,12 @@ import numpy as np
 
 from coupled.channels import ControlName, channel
 from coupled.errors import InputError
+from coupled.logs import plausible
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 
+ANOTHER = 2.0  # factor on the gradient beyond which a rig file is another rig's
+OFF_SPEED = 0.03  # relative error of the trimmed airspeed, likewise
 LEAST_s = 10.0  # a shorter record holds too few stretches to hold any out
 
 
@@ -40,23 +43,56 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
     names = [channel(control, q) for q in ("force", "computed", "deflection")]
     present = [name for name in names if name in record]
     for i, name in enumerate(present):
-        if np.ptp(record[name]) == 0.0:
+        if plausible.is_constant(record[name]):
             raise InputError(file, name, "never changes: a sensor that is stuck")
-        for other in present[:i]:
-            if np.array_equal(record[name], record[other]):
-                raise InputError(file, name, f"is a copy of {other}")
+        other = plausible.copy_of(name, {known: record[known] for known in present[: i + 1]})
+        if other is not None:
+            raise InputError(file, name, f"is a copy of {other}")
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     told = gradient in record and pressure in record
-    if told and np.ptp(record[pressure]) == 0.0 and np.ptp(record[gradient]) > 0.0:
+    stuck = told and plausible.is_constant(record[pressure])
+    if stuck and not plausible.is_constant(record[gradient]):
         raise InputError(file, pressure, f"never changes, while {gradient} does: it is stuck")
     data = rig.controls[control]
     for name in present[1:] if names[0] in present else present:
         most = float(np.max(np.abs(record[name])))
-        if most > 3.0 * data.travel:
+        if most > plausible.FAR_BEYOND * data.travel:
             raise InputError(
                 file, name, f"reaches {most:.3g}, beyond {data.travel:g}: is it in another unit?"
             )
     _check_force_unit(rig, record, control, file)
+    _check_schedule(rig, record, control, file)
+
+
+def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object) -> None:
+    """Refuse a record whose gradients are none that this rig's table could give."""
+    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
+    if gradient not in record or pressure not in record:
+        return
+    table = rig.controls[control].schedule
+    specified = np.interp(record[pressure], table.dynamic_pressure, table.total_gradient)
+    if not specified.any():
+        return
+    ratio = float(np.median(record[gradient]) / np.median(specified))
+    if not 1.0 / ANOTHER < ratio < ANOTHER:
+        raise InputError(
+            file, gradient, f"is {ratio:.3g} times what this rig's table gives: another rig's file?"
+        )
+
+
+def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
+    """Refuse a record that does not start at the speed where the rig's aircraft is trimmed."""
+    name = "true_airspeed_m_per_s"
+    if name not in record:
+        return
+    start = float(np.median(record[name][:12]))
+    if abs(start / trim_speed_m_per_s - 1.0) > OFF_SPEED:
+        raise InputError(
+            file,
+            name,
+            f"starts at {start:.4g}, the rig's aircraft at {trim_speed_m_per_s:.4g}:"
+            " another rig's file?",
+        )
 
 
 def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: object) -> None:
@@ -65,11 +101,8 @@ def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: obje
     if any(name not in record for name in names):
         return
     force, computed, gradient = (record[name] for name in names)
-    expected = gradient * computed
-    if not expected.any():
-        return
-    ratio = float(force @ expected) / float(expected @ expected)
-    if abs(ratio * 4.448 - 1.0) < 0.25:
+    ratio = plausible.force_ratio(force, computed, gradient)
+    if ratio is not None and plausible.in_pounds(ratio):
         raise InputError(
             file, names[0], f"is {ratio:.2f} of what deflection and gradient say: it is in pounds"
         )

@@ -79,7 +79,8 @@ def closed_loop(
     if force not in record or (nominal.flight is None and pressure not in record):
         return None
     names = [channel(control, quantity) for quantity in COMPARED]
-    names = [name for name in [*names, *MOTION] if name in record]
+    motion = MOTION if nominal.flight is not None else ()
+    names = [name for name in (*names, *motion) if name in record]
     told = smoothed(record[pressure]) if pressure in record else None
     left: dict[str, dict[str, float]] = {name: {} for name in names}
     for when, rig in (("before", nominal), ("after", improved)):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from coupled.channels import ControlName
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice
 from coupled.gap.fit import touched
@@ -18,20 +16,28 @@ BOOTSTRAPS = 400
 FEW = 8  # blocks under which a bootstrap interval is not to be relied on
 
 
-def shrink(
-    rig: Rig, control: ControlName, outputs: Sequence[Output], choice: Choice
-) -> dict[str, Any]:
+def shrink(case: Case, choice: Choice) -> dict[str, Any]:
     """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
-    effects = choice.fit.effects
-    found = Case(rig, control, outputs).fit(effects, "fitted", choice.fit.values).rig
+    rig, outputs, effects = case.nominal, case.outputs, choice.fit.effects
+    found = case.fit(effects, "fitted", choice.fit.values).rig
+    floors = {}
+    if effects and case.refloored is not None:  # what noise leaves depends on the rig
+        floors = {(o.record, o.channel): o.floor for o in case.refloored(choice.fit.rig)}
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
-    result = _of(widest, rig, found, bool(effects))
-    return result | {"channels": [_of(output, rig, found, bool(effects)) for output in pool]}
+
+    def told(output: Output) -> dict[str, Any]:
+        floor = max(output.floor, floors.get((output.record, output.channel), 0.0))
+        return _of(output, rig, found, floor / output.floor, bool(effects))
+
+    return told(widest) | {"channels": [told(output) for output in pool]}
 
 
-def _of(output: Output, rig: Rig, found: Rig, improved: bool) -> dict[str, Any]:
-    """Return one channel's rms residual before and after, and its floor, in its own unit."""
+def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> dict[str, Any]:
+    """Return one channel's rms residual before and after, and its floor, in its own unit.
+
+    `floor` is that of the improved rig, over the output's own.
+    """
     number = output.stretches[output.rows("held")]
     held = np.unique(number)
     old, new = output.residual(rig, "held") ** 2, output.residual(found, "held") ** 2
@@ -41,14 +47,14 @@ def _of(output: Output, rig: Rig, found: Rig, improved: bool) -> dict[str, Any]:
         "channel": output.channel,
         "before": float(before * output.floor),
         "after": float(after * output.floor),
-        "floor": output.floor,
+        "floor": floor * output.floor,
         "blocks": len(held),
     }
-    if improved and before > 1.0:
+    if improved and before > floor:
         picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
         drawn = np.sqrt(means[picks].mean(axis=1))
-        closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - 1.0, 1e-9)
-        result["closed"] = float((before - after) / (before - 1.0))
-        result["low"], result["high"] = np.percentile(closed, [2.5, 97.5]).tolist()
+        closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
+        result["closed"] = min(1.0, float((before - after) / (before - floor)))
+        result["low"], result["high"] = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
         result["reliable"] = len(held) >= FEW
     return result

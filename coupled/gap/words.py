@@ -82,7 +82,7 @@ def _sure(diagnosis: dict[str, Any]) -> str:
     if diagnosis["verdict"] == "unexplained" or not diagnosis["effects"]:
         return ""
     least = min(effect["probability"] for effect in diagnosis["effects"])
-    return f"Probability {'over 0.99' if least > 0.99 else format(least, '.2f')}."
+    return f"Probability {least:.2f}."
 
 
 def _closes(diagnosis: dict[str, Any]) -> str:

@@ -129,7 +129,7 @@ def test_words_name_size_certainty_and_share(tmp_path: Path) -> None:
     found = diagnose(nominal, {"a": record}, "column").found
     said = in_words(found, "column")
     assert "The gap lies in the loader: coulomb friction, friction_N 2.0" in said
-    assert "Probability over 0.99." in said
+    assert "Probability 0.97." in said
     assert "% of the gap on held-out data" in said
 
 
