@@ -144,8 +144,8 @@ def _step(best: Candidate, ranked: Sequence[Candidate]) -> Step:
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
     """Return the best candidate, or one with fewer numbers that is as good.
 
-    Where the one with fewer closes the gap, the other must beat it by more than the physics of
-    a right effect may leave.
+    Where the one with fewer closes a gap of the loader, the other must beat it by more than the
+    physics of a right effect may leave: no law of dry friction is exact.
     """
     best = ranked[0]
     first = stage_gaps(case.outputs, settled.rig)
@@ -156,7 +156,8 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
         closes = all(
             left[stage] <= bar(first[stage]) for stage in shows_in(other.effect) if stage in left
         )
-        margin = max(RIVAL, SIMPLER * ranked[0].gain) if closes else RIVAL
+        doubtful = closes and best.effect.stage == "loader"
+        margin = max(RIVAL, SIMPLER * ranked[0].gain) if doubtful else RIVAL
         if other.gain > ranked[0].gain - margin:
             best = other
     return best

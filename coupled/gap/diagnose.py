@@ -135,8 +135,10 @@ def _stages(
             found[stage] |= {"left": after[stage], "guilty": guilty}
         elif stage in lacking:
             found[stage] = {"judged": False, "missing": lacking[stage]}
-        elif stage == "schedule":  # a gradient that never changes tells nothing of it
-            found[stage] = {"judged": False, "missing": []}
+        elif stage == "schedule":
+            found[stage] = {"judged": False, "missing": [], "why": "the gradient never changes"}
+        elif stage == "surface" and readers[0].rig.flight is not None:
+            found[stage] = {"judged": False, "missing": [], "why": "only the elevator is judged"}
     scale = [before[stage] for stage in ("loader", "linkage") if stage in before]
     if scale:
         found["sensing"] = {"gap": max(scale) if "sensing" in blamed else 1.0}
@@ -147,6 +149,8 @@ def _stages(
     if readers[0].rig.flight is not None and "airframe" not in before:
         missing = [name for name in NEEDS if name not in readers[0].record]
         found["airframe"] = {"judged": False, "missing": missing}
+        if not missing:
+            found["airframe"]["why"] = "only the elevator is judged"
     return found
 
 

@@ -86,15 +86,17 @@ EFFECTS: tuple[Effect, ...] = (
         "stribeck_friction",
         "loader",
         (
-            _added("friction_N", "loader", "friction", 0, 60, 1.0, 0.3),
-            _value("breakaway_N", "loader", "breakaway", 0, 120, 2.0, 3.0),
+            _added("friction_N", "loader", "friction", 0, 60, 1.0, 0.3, 0.1),
+            _value("breakaway_N", "loader", "breakaway", 0, 120, 2.0, 3.0, 3.0),
             _value("stribeck_{d}_per_s", "loader", "stribeck_rate", 2e-4, 0.05, 2e-3),
         ),
     ),
     _one("loader", "viscous_damping", _factor("loader", "damping", 1.2)),
     _one("loader", "inertia", _factor("loader", "mass", 1.2)),
     _one("loader", "gradient_error", _factor("loader", "basic_gradient", 1.05)),
-    _one("loader", "cubic_stiffness", _added("cubic_N_per_{d}3", "loader", "cubic", 0, 1e7, 2e4)),
+    _one(
+        "loader", "cubic_stiffness", _added("cubic_N_per_{d}3", "loader", "cubic", 0, 1e9, 2e4, 2e6)
+    ),
     _one("loader", "breakout", _added("breakout_N", "loader", "breakout", 0, 60, 2.0)),
     _one("loader", "bob_weight", _added("force_N_per_g", "loader", "bob_weight", -200, 200, 5.0)),
     _one("loader", "force_offset", _added("offset_N", "loader", "offset", -100, 100, 1.0)),
@@ -133,7 +135,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one("airframe", "vertical_gust", _value("rms_m_per_s", "flight", "gust_rms", 0, 30, 0.5)),
     _one("surface", "rigging_offset", _added("offset_norm", "rigging", "offset", -0.5, 0.5, 0.01)),
 )
-# A pot is set, and a servo tuned, to a few per cent: no effect, but a nuisance that fits profile
+# A pot is set, and a servo tuned, to a per cent or two: no effect, but a nuisance that fits profile
 # out. {the effect that frees the same number: the setting}
 TOLERANCE = {"inertia": 0.02, "viscous_damping": 0.02, "servo_lag": 0.02}
 

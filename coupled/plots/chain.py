@@ -82,7 +82,9 @@ def _told(found: dict[str, Any] | None) -> str:
     if found is None:
         return "not in\nthis record"
     if "gap" not in found:
-        return "not judged:\n" + ("channels lack" if found["missing"] else "never moves")
+        return "not judged:\n" + (
+            "channels lack" if found["missing"] else found.get("why", "").replace(" ", "\n", 1)
+        )
     text = f"{found['gap']:.3g} × floor"
     if not found["guilty"] and found["gap"] < CLEAR:
         return f"{text}\nclear"

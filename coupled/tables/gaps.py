@@ -17,7 +17,7 @@ def print_stages(console: Console, diagnosis: dict[str, Any]) -> None:
     for stage, found in diagnosis["stages"].items():
         if "gap" not in found:
             lacks = "lacks " + ", ".join(found["missing"])
-            table.add_row(stage, "not judged", "", lacks if found["missing"] else "at rest")
+            table.add_row(stage, "not judged", "", found.get("why", lacks))
             continue
         left = f"{found['left']:.2f}" if "left" in found else ""
         settled = found["gap"] > 1.2 and not found["guilty"] and found.get("settled", 9.0) < 1.2

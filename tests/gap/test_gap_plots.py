@@ -79,7 +79,7 @@ def told(case: Case, effects: list[Effect], rival: Effect | None = None) -> Diag
 def fit_of(nominal: Rig, effects: list[Effect]) -> Fit:
     values = {f"{e.name}.{p.name}": p.starts[0] for e in effects for p in e.free}
     rig = apply(nominal, "column", effects, values)
-    return Fit(tuple(effects), values, values, values, (), rig)
+    return Fit(tuple(effects), values, values, values, (), rig, 0.0)
 
 
 def needs_flight(effect: Effect) -> bool:

@@ -32,7 +32,7 @@ def without(record: Record, *names: str) -> Record:
 
 def test_two_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
-    effect = {"backlash": {"play_{d}": 1e-3}}
+    effect = {"backlash": {"play_{d}": 2e-4}}
     first, second = (made(tmp_path, nominal, effect, seed) for seed in (4, 5))
     one = diagnose(nominal, {"a": first}, "column").found
     both = diagnose(nominal, {"a": first, "b": second}, "column").found
