@@ -35,6 +35,7 @@ class Parameter:
     high: float = 0.0
     starts: tuple[float, ...] = (0.0,)
     on: Any = None
+    above: str = ""  # a field of the section from whose nominal value the starts count
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,16 @@ EFFECTS: tuple[Effect, ...] = (
         "loader",
         (
             _added("friction_N", "loader", "friction", 0, 60, 1.0, 0.3, 0.1),
-            _value("breakaway_N", "loader", "breakaway", 0, 120, 2.0, 3.0, 3.0),
+            Parameter(
+                "breakaway_N",
+                "loader",
+                "breakaway",
+                "value",
+                0,
+                200,
+                (2.0, 3.0, 3.0),
+                above="friction",
+            ),
             _value("stribeck_{d}_per_s", "loader", "stribeck_rate", 2e-4, 0.05, 2e-3),
         ),
     ),

@@ -92,7 +92,8 @@ def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
     """Return what a value that replaces the nominal one starts from."""
     if p.mode != "value" or p.section == "flight":
         return 0.0
-    return float(getattr(getattr(nominal.controls[control], p.section), p.field))
+    section = getattr(nominal.controls[control], p.section)
+    return float(getattr(section, p.above or p.field))
 
 
 def _signature(

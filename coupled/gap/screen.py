@@ -36,7 +36,7 @@ def screen(
         best, starts = 0.0, []
         for shape in range(max([len(p.starts) for p in effect.free], default=1)):
             least, start = np.inf, {}
-            for values in _sizes(effect, shape):
+            for values in _sizes(case, effect, shape):
                 rig = _with(case, current, effect, values)
                 left = np.concatenate([output.residual(rig) for output in ours])
                 sign = now - left
@@ -60,7 +60,7 @@ def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) ->
     return apply(case.nominal, case.control, every, known)
 
 
-def _sizes(effect: Effect, shape: int) -> list[dict[str, float]]:
+def _sizes(case: Case, effect: Effect, shape: int) -> list[dict[str, float]]:
     """Return sets of an effect's parameters to try; one where each has to be flown."""
     flown = effect.stage == "airframe"
     found = []
@@ -72,6 +72,9 @@ def _sizes(effect: Effect, shape: int) -> list[dict[str, float]]:
                 value = 1.0 + FACTORS[k] * (start - 1.0)
             elif not flown and not p.name.startswith(("bend", "stribeck")):
                 value = SIZES[k] * start
+            if p.above:
+                section = getattr(case.nominal.controls[case.control], p.section)
+                value += float(getattr(section, p.above))
             values[f"{effect.name}.{p.name}"] = float(np.clip(value, p.low, p.high))
         found.append(values)
     return found
