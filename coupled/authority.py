@@ -127,6 +127,18 @@ def judge(scenario: Scenario, configuration: str, record: Record) -> Outcome:
     )
 
 
+def held_forces(scenario: Scenario, control: ControlName, record: Record) -> tuple[float, float]:
+    """Return the mean force felt and specified where a control is held, N; NaN if it never moves.
+
+    Breakout and bob weight are taken off both.
+    """
+    deflection = record[channel(control, "deflection")]
+    if len(record) < 2 or not np.any(deflection):
+        return float("nan"), float("nan")
+    held = _where_held(record.time_s, deflection)
+    return _felt_and_specified(scenario.rig, control, record, held)
+
+
 def _where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
     """Return the rows at which the control is held: far out on the peak's side, and still.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from coupled import channels
+from coupled.flight.expectation import Expect
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Measure, RunFile
 from coupled.flight.wind import Wind
@@ -33,7 +34,17 @@ ORDER = [
     "logs",
     "flight",
 ]
-ORDER += ["authority", "calibration", "gap", "blind", "plots", "tables", "terminal", "cli"]
+ORDER += [
+    "authority",
+    "campaign",
+    "calibration",
+    "gap",
+    "blind",
+    "plots",
+    "tables",
+    "terminal",
+    "cli",
+]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 
 
@@ -93,7 +104,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
-    sections += [RunFile, Bench, Wind, Measure]
+    sections += [RunFile, Bench, Wind, Measure, Expect]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
@@ -101,7 +112,7 @@ def test_every_key_of_the_files_is_documented() -> None:
                 continue
             if key in ("gains", "calibration", "rigging", "noise", "measure"):
                 continue
-            if key in ("bench", "wind", "case", "kind"):
+            if key in ("bench", "wind", "case", "expect", "kind"):
                 continue
             if section is LogMap:
                 assert f"[{key}" in text, key

@@ -1,6 +1,6 @@
 """The command line: parses, calls, prints. A module a group of commands."""
 
-from coupled.cli import bench, blind, calibration, document, flights, gaps, logs
+from coupled.cli import bench, blind, calibration, campaign, document, flights, gaps, logs
 from coupled.cli.app import app, main
 
 __all__ = [
@@ -8,6 +8,7 @@ __all__ = [
     "bench",
     "blind",
     "calibration",
+    "campaign",
     "document",
     "flights",
     "gaps",

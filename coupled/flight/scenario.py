@@ -13,8 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from coupled.channels import CONTROL_NAMES, ControlName, channel, unit_of
+from coupled.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.errors import InputError, nearest
+from coupled.flight.expectation import Expect, check_expectations
 from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, read_force_table
 from coupled.flight.wind import Wind, check_wind
 from coupled.resources import find, shipped_rigs, shipped_runs
@@ -68,6 +69,7 @@ class RunFile(Section):
     bench: Bench | None = None
     wind: Wind | None = None
     case: list[Case] = []
+    expect: list[Expect] = []
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,12 @@ class Scenario:
         """The control that a comparison looks at."""
         named = self.run.measure.control
         return next(iter(self.pilots)) if named is None else named
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of the record."""
+        own = record_channels(list(self.rig.controls), self.rig.flight is not None)
+        return (*own, *self.run.record_properties)
 
     def configured(self, configuration: Configuration) -> Scenario:
         """Return this scenario with the rig in one of the five configurations."""
@@ -123,17 +131,22 @@ def configure(rig: Rig, configuration: Configuration) -> Rig:
 def read_run(name: str) -> list[Scenario]:
     """Return the cases of a run file, given by path or by the name of a shipped one."""
     file = find(name, shipped_runs(), "run")
-    table = load_toml(file)
+    return scenarios_from_table(load_toml(file), file)
+
+
+def scenarios_from_table(table: dict[str, Any], file: Path) -> list[Scenario]:
+    """Return the cases of a run from its file's tables; `file` is named in faults."""
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
     known_keys(table, keys, file, "")
     for key, section in (("bench", Bench), ("wind", Wind)):
         if key in table:
             table[key] = build(section, table[key], file, key)
-    cases = table.pop("case", [])
-    if not isinstance(cases, list):
-        raise InputError(file, "case", "cases are written [[case]]")
-    table["case"] = [build(Case, case, file, f"case[{i}]") for i, case in enumerate(cases)]
+    for key, each in (("case", Case), ("expect", Expect)):
+        listed = table.get(key, [])
+        if not isinstance(listed, list):
+            raise InputError(file, key, f"each is written [[{key}]]")
+        table[key] = [build(each, item, file, f"{key}[{i}]") for i, item in enumerate(listed)]
     run = build(RunFile, table, file, "")
     if run.bench is not None:
         _check_bench(run.bench, file)
@@ -141,7 +154,10 @@ def read_run(name: str) -> list[Scenario]:
         check_wind(run.wind, file)
     _refuse_doubles(run, file)
     variants = run.case or [Case(label=run.name)]
-    return [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
+    found = [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
+    channels = {scenario.label: scenario.channels for scenario in found}
+    check_expectations(run.expect, file, channels, run.configurations, run.duration)
+    return found
 
 
 def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> Scenario:

@@ -1,0 +1,154 @@
+"""An expectation held against its flight: the figure, its bounds, and the margin between.
+
+What could not be judged says why, and has failed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.authority import Flight
+from coupled.campaign.standards import judge_standard
+from coupled.channels import TIME
+from coupled.flight.expectation import Expect
+
+Floats = NDArray[np.float64]
+Bounds = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one expectation on one flight; `value` and its bounds in one unit.
+
+    `problem` says why a figure could not be had; there is none then.
+    """
+
+    run: str
+    case: str
+    configuration: str
+    what: str
+    value: float | None
+    least: float | None
+    most: float | None
+    problem: str = ""
+
+    @property
+    def margin(self) -> float | None:
+        """How far the figure is inside its nearest bound, in its unit; negative outside."""
+        return None if self.value is None else _margin(self.value, (self.least, self.most))
+
+    @property
+    def passed(self) -> bool:
+        """Whether the figure was had, and lies within its bounds."""
+        return self.margin is not None and self.margin >= 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON takes it."""
+        return {**self.__dict__, "margin": self.margin, "passed": self.passed}
+
+
+class UnjudgedError(Exception):
+    """Why a figure could not be had."""
+
+
+def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | None) -> Verdict:
+    """Return the verdict on a flight, held against `other` where the expectation says so."""
+    if flight is None or (expect.reference is not None and other is None):
+        raise UnjudgedError("was not flown")
+    value, bounds = _figure(expect, flight, other)
+    scenario = flight.scenario
+    return Verdict(
+        scenario.run.name, scenario.label, flight.configuration, expect.words, value, *bounds
+    )
+
+
+def _figure(expect: Expect, flight: Flight, other: Flight | None) -> tuple[float, Bounds]:
+    if expect.channel is None:
+        for flown in filter(None, (flight, other)):
+            if flown.outcome.ended_early:
+                raise UnjudgedError(f"the flight ended early: {flown.outcome.ended_early}")
+    if expect.standard is not None:
+        value, bounds = judge_standard(expect.standard, expect.control, flight, other)
+    elif expect.measure is not None:
+        value, bounds = _measured(expect.measure, flight), expect.bounds
+        if other is not None:
+            value -= _measured(expect.measure, other)
+    elif expect.reaches is not None:
+        value, bounds = _time_reached(expect, flight), expect.bounds
+    else:
+        value, bounds = _taken(expect, flight, other), expect.bounds
+    if not math.isfinite(value):
+        raise UnjudgedError("the flight has no such figure")
+    return value, bounds
+
+
+def _measured(name: str, flight: Flight) -> float:
+    value: float | None = getattr(flight.outcome, name)
+    return math.nan if value is None else value
+
+
+def _window(expect: Expect, flight: Flight, end_s: float) -> tuple[Floats, Floats]:
+    """Return the times in s, and the channel, from `from_s` to an end."""
+    assert expect.channel is not None
+    record = flight.record
+    rows = (record.time_s >= (expect.start or 0.0)) & (record.time_s <= end_s)
+    if not rows.any():
+        raise UnjudgedError("no row of the record lies there")
+    return record[TIME][rows], record[expect.channel][rows]
+
+
+def _refuse_early(flight: Flight, end_s: float) -> None:
+    ended = flight.record.manifest["ended_early"]
+    if ended and (not len(flight.record) or flight.record.time_s[-1] < end_s):
+        raise UnjudgedError(f"the flight ended early: {flight.outcome.ended_early}")
+
+
+def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
+    """Return what is taken of a channel: of every row, the one nearest to its bound."""
+    last_s = flight.scenario.run.duration if expect.end is None else expect.end
+    end_s = last_s if expect.at is None else expect.at
+    flights = [flight] if other is None else [flight, other]
+    for flown in flights:
+        _refuse_early(flown, end_s)
+    if expect.at is not None:
+        windows = [_window(expect, flown, math.inf) for flown in flights]
+        figures = [np.interp([expect.at], *window) for window in windows]
+    else:
+        figures = [_window(expect, flown, end_s)[1] for flown in flights]
+    values = figures[0] - figures[1] if len(figures) > 1 else figures[0]
+    lowest, greatest = float(np.min(values)), float(np.max(values))
+    figure = {
+        "mean": float(np.mean(values)),
+        "lowest": lowest,
+        "greatest": greatest,
+        "last": float(values[-1]),
+        "every": min((lowest, greatest), key=lambda value: _margin(value, expect.bounds)),
+    }
+    return figure[expect.take]
+
+
+def _time_reached(expect: Expect, flight: Flight) -> float:
+    """Return when the channel first meets or crosses the level, straight between rows, in s."""
+    assert expect.reaches is not None
+    end_s = flight.scenario.run.duration if expect.end is None else expect.end
+    times, values = _window(expect, flight, end_s)
+    over = values - expect.reaches
+    met = np.flatnonzero(np.append(over[:-1] * over[1:] <= 0.0, over[-1] == 0.0))
+    if not met.size:
+        _refuse_early(flight, end_s)
+        raise UnjudgedError(f"never reached; at last it is {values[-1]:.4g}")
+    i = int(met[0])
+    if over[i] == 0.0:
+        return float(times[i])
+    return float(times[i] + (times[i + 1] - times[i]) * over[i] / (over[i] - over[i + 1]))
+
+
+def _margin(value: float, bounds: Bounds) -> float:
+    least, most = bounds
+    margins = [] if least is None else [value - least]
+    return min(margins if most is None else [*margins, most - value])

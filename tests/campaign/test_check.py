@@ -1,0 +1,245 @@
+"""Expectations: judged by closed forms, refused where they mean nothing, and those shipped hold."""
+
+from __future__ import annotations
+
+import json
+import typing
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from coupled.authority import Flight, Outcome
+from coupled.campaign.check import check_run, read_expecting
+from coupled.campaign.standards import judge_standard
+from coupled.campaign.verdict import UnjudgedError, judge_expectation
+from coupled.errors import InputError
+from coupled.flight.expectation import Expect, Figure
+from coupled.flight.scenario import read_run
+from coupled.record import Record
+from coupled.resources import shipped_runs
+from coupled.schema import build
+from tests.test_cli import coupled, files
+
+BENCH = """
+name = "push"
+card = "A push on the bench."
+rig = "bench"
+duration_s = 2.0
+configurations = ["rigid", "compensated"]
+
+[bench]
+time_s = [0.0]
+dynamic_pressure_Pa = [3000.0]
+
+[pilot.column]
+kind = "ramp"
+start_s = 0.5
+force_N = 40.0
+ramp_s = 1.0
+"""
+
+
+def written(folder: Path, *expectations: str, text: str = BENCH) -> Path:
+    path = folder / "push.toml"
+    path.write_text(text + "".join(f"\n[[expect]]\n{each}\n" for each in expectations))
+    return path
+
+
+def expect(**keys: Any) -> Expect:
+    return build(Expect, keys, "test", "")
+
+
+def flight(values: Any, ended: bool = False) -> Flight:
+    """Return a flight of 10 Hz over 1 s whose one channel, `x`, is as given."""
+    scenario = read_run("appendix-c")[0]
+    run = scenario.run.model_copy(update={"duration": 1.0})
+    x = np.asarray(values, dtype=float)
+    manifest = {"ended_early": {"reason": "test", "time_s": 0.1 * len(x)} if ended else None}
+    record = Record(
+        ("time_s", "x", "column_force_N"),
+        np.column_stack((0.1 * np.arange(len(x)), x, 10.0 * x)),
+        manifest,
+    )
+    figures = dict.fromkeys((f.name for f in fields(Outcome)), 0.25)
+    why = "test at 0.10 s" if ended else ""
+    outcome = Outcome(**{**figures, "ended_early": why, "time_to_attitude_s": None})
+    changed = type(scenario)(**{**scenario.__dict__, "run": run})
+    return Flight(changed, "rigid", record, outcome)
+
+
+RISE = np.linspace(0.0, 0.9, 10)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "margin"),
+    [
+        ({"at_s": 0.25, "is": 0.2, "within": 0.1}, 0.25, 0.05),
+        ({"most": 1.0}, 0.9, 0.1),
+        ({"least": 0.1}, 0.0, -0.1),
+        ({"least": -0.3, "most": 1.0}, 0.9, 0.1),
+        ({"from_s": 0.2, "to_s": 0.5, "least": 0.1}, 0.2, 0.1),
+        ({"take": "mean", "is": 0.5, "within": 0.2}, 0.45, 0.15),
+        ({"take": "greatest", "least": 0.8}, 0.9, 0.1),
+        ({"take": "lowest", "most": 0.8}, 0.0, 0.8),
+        ({"take": "last", "least": 1.0}, 0.9, -0.1),
+        ({"reaches": 0.33, "by_s": 0.5}, 0.33, 0.17),
+        ({"reaches": 0.4, "by_s": 0.5, "not_before_s": 0.45}, 0.4, -0.05),
+        ({"reaches": 0.9, "by_s": 0.95}, 0.9, 0.05),
+    ],
+)
+def test_a_channel_is_judged_by_its_closed_form(
+    keys: dict[str, Any], value: float, margin: float
+) -> None:
+    verdict = judge_expectation(expect(channel="x", **keys), flight(RISE), None)
+    assert verdict.value == pytest.approx(value, abs=1e-12)
+    assert verdict.margin == pytest.approx(margin, abs=1e-12)
+    assert verdict.passed == (margin > 0.0)
+
+
+def test_a_difference_is_taken_row_by_row() -> None:
+    looked_at = expect(channel="x", minus="rigid", **{"is": 0.0, "within": 0.5})
+    verdict = judge_expectation(looked_at, flight(2.0 * RISE), flight(RISE))
+    assert verdict.value == pytest.approx(0.9)
+    assert not verdict.passed
+    measured = expect(measure="loss", minus="rigid", most=0.1)
+    assert judge_expectation(measured, flight(RISE), flight(RISE)).value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "ended", "says"),
+    [
+        ({"channel": "x", "reaches": 2.0, "by_s": 0.5}, False, "never reached; at last it is 0.9"),
+        ({"channel": "x", "most": 5.0}, True, "ended early: test"),
+        ({"channel": "x", "at_s": 0.95, "most": 5.0}, True, "ended early: test"),
+        ({"channel": "x", "from_s": 0.91, "to_s": 0.92, "most": 5.0}, False, "no row"),
+        ({"measure": "loss", "most": 5.0}, True, "ended early: test"),
+        ({"measure": "time_to_attitude_s", "most": 5.0}, False, "no such figure"),
+    ],
+)
+def test_what_cannot_be_judged_says_why(keys: dict[str, Any], ended: bool, says: str) -> None:
+    with pytest.raises(UnjudgedError, match=says):
+        judge_expectation(expect(**keys), flight(RISE, ended), None)
+
+
+def test_what_lies_before_an_early_end_is_judged() -> None:
+    kept = expect(channel="x", to_s=0.5, most=1.0)
+    assert judge_expectation(kept, flight(RISE, ended=True), None).passed
+    reached = expect(channel="x", reaches=0.45, by_s=0.5)
+    assert judge_expectation(reached, flight(RISE, ended=True), None).passed
+
+
+def test_the_limits_are_those_of_the_standards() -> None:
+    """14 CFR 25.143(d): 75, 50 and 150 lbf for two hands; 222.4 N for one hand in pitch."""
+    value, bounds = judge_standard("25.143(d) two hands", None, flight(RISE), None)
+    assert value == pytest.approx(9.0)
+    assert bounds == (None, pytest.approx(333.6, abs=0.1))
+    one = judge_standard("25.143(d) one hand", "column", flight(RISE), None)
+    assert one[1] == (None, pytest.approx(222.4, abs=0.1))
+    rate = judge_standard("Part 60 2.b.4 rate", None, flight(RISE), flight(RISE))
+    assert rate == (0.25, (pytest.approx(0.2), pytest.approx(0.3)))
+
+
+def test_every_figure_of_a_comparison_may_be_expected() -> None:
+    numbers = [f.name for f in fields(Outcome) if "float" in str(f.type)]
+    assert list(typing.get_args(Figure)) == numbers
+
+
+@pytest.mark.parametrize("name", sorted(shipped_runs()))
+def test_what_a_shipped_run_expects_holds(name: str) -> None:
+    verdicts = check_run(read_expecting(name))
+    assert verdicts
+    assert [v for v in verdicts if not v.passed] == []
+
+
+def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
+    path = written(tmp_path, 'measure = "loss"\nconfiguration = "compensated"\nmost = 0.1')
+    seen = set()
+    check_run(read_expecting(str(path)), lambda label, done, total: seen.add((label, total)))
+    assert {label for label, _ in seen} == {"push, compensated"}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('channel = "colum_force_N"\nmost = 1.0', "expect[0].channel: no 'colum_force_N'; did"),
+        ('measure = "los"\nmost = 1.0', "expect[0].measure: input should be"),
+        ('standard = "25.143"', "expect[0].standard: input should be"),
+        ("most = 1.0", "expect[0]: give one of channel, measure and standard"),
+        ('measure = "loss"', "expect[0]: has no bound"),
+        ('measure = "loss"\nis = 1.0', "expect[0]: is and within are given together"),
+        ('measure = "loss"\nis = 1.0\nwithin = 0.1\nleast = 0.0', "not both"),
+        ('measure = "loss"\nleast = 1.0\nmost = 0.0', "nothing is at least 1 and at most 0"),
+        ('measure = "loss"\nmost = 1.0\nat_s = 1.0', "at_s: has no meaning with measure"),
+        ('channel = "time_s"\nmost = 1.0\nat_s = 3.0', "at_s: 3 is not within the run's 2 s"),
+        ('channel = "time_s"\nmost = 1.0\nfrom_s = 1.0\nto_s = 0.5', "must be after from_s"),
+        ('channel = "time_s"\nreaches = 1.0', "reaches needs by_s"),
+        ('channel = "time_s"\nby_s = 1.0', "by_s: needs the level"),
+        ('channel = "time_s"\nmost = 1.0\ncase = "x"', "case: no 'x'; known: push"),
+        ('measure = "loss"\nmost = 1.0\nconfiguration = "gradient only"', "flies no 'gradient on"),
+        (
+            'measure = "loss"\nmost = 1.0\nminus = "rigid"\nconfiguration = "rigid"',
+            "holds rigid against itself",
+        ),
+        ('standard = "25.143(d) one hand"\ncontrol = "wheel"', "control: the rig has no wheel"),
+        ('standard = "25.143(d) one hand"\nmost = 1.0', "most: has no meaning with standard"),
+        ('standard = "Part 60 2.b.4 rate"', "standard: the rig has no aircraft"),
+        ('channel = "time_s"\nmost_N = 1.0', "expect[0].most_N: "),
+    ],
+)
+def test_an_expectation_that_means_nothing_is_one_line(
+    tmp_path: Path, text: str, says: str
+) -> None:
+    with pytest.raises(InputError) as fault:
+        read_run(str(written(tmp_path, text)))
+    assert says in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
+    written(
+        tmp_path,
+        'measure = "force_N"\nis = 40.0\nwithin = 0.5',
+        'measure = "force_N"\nconfiguration = "rigid"\nmost = 30.0',
+        'channel = "column_force_N"\nconfiguration = "rigid"\nreaches = 50.0\nby_s = 1.0',
+    )
+    done = coupled(tmp_path, "check", "push.toml", "--junit", "a/j.xml", "--json", "t.json")
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert "2 of 4 expectations hold" in done.stdout
+    assert done.stdout.count("FAIL") == 2
+    assert files(tmp_path) == {"push.toml", "a/j.xml", "t.json"}
+    suite = ElementTree.parse(tmp_path / "a/j.xml").getroot().find("testsuite")
+    assert suite is not None
+    assert suite.attrib == {"name": "push", "tests": "4", "failures": "1", "errors": "1"}
+    failure, error = suite.find(".//failure"), suite.find(".//error")
+    assert failure is not None
+    assert error is not None
+    assert failure.get("message") == "40 (wanted ≤ 30), margin -10"
+    assert (error.get("message") or "").startswith("never reached; at last it is 40")
+    rows = json.loads((tmp_path / "t.json").read_text())
+    assert [row["passed"] for row in rows] == [True, True, False, False]
+    assert rows[2]["margin"] == pytest.approx(-10.0)
+    written(tmp_path, 'measure = "force_N"\nis = 40.0\nwithin = 0.5')
+    assert coupled(tmp_path, "check", "push.toml").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["check", "push.toml"], "push.toml: expect: there is none: nothing could fail"),
+        (["check", "nothing"], "nothing: is no shipped run"),
+        (["check", "capture", "capture"], "capture: two of the runs have this name"),
+        (["check", "capture", "--junit", "push.toml/x.xml"], "cannot be written there"),
+    ],
+)
+def test_a_check_that_cannot_be_is_one_line(tmp_path: Path, words: list[str], says: str) -> None:
+    written(tmp_path)
+    done = coupled(tmp_path, *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert says in done.stderr
+    assert files(tmp_path) == {"push.toml"}
