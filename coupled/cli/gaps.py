@@ -51,6 +51,10 @@ def diagnose(
 ) -> None:
     """Tell where records depart from their rig, which effect causes it, and how far it shrinks."""
     if any(record.is_dir() for record in records):
+        asked = {"--improve": improve, "--plots": plots, "--power": power, "--json": json_file}
+        for option, value in asked.items():
+            if value:
+                raise InputError(records[0], option, "is for records of one rig, not for a folder")
         _diagnose_folder(records, rig, output)
         return
     if output is not None:
@@ -60,6 +64,8 @@ def diagnose(
     rig_file = find(rig, shipped_rigs(), "rig")
     name = _control(control, records[0])
     inputs = [*records, rig_file]
+    if improve is not None and improve.suffix != ".toml":
+        raise InputError(improve, "--improve", "is a rig file: its name ends in .toml")
     drawn = _plot_targets(plots)
     targets = [*drawn, *([improve] if improve else [])]
     for target in targets:

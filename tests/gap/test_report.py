@@ -30,19 +30,19 @@ def without(record: Record, *names: str) -> Record:
     return Record(tuple(keep), np.column_stack([record[name] for name in keep]))
 
 
-def test_two_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
+def test_three_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
-    effect = {"backlash": {"play_{d}": 2e-4}}
-    first, second = (made(tmp_path, nominal, effect, seed) for seed in (4, 5))
-    one = diagnose(nominal, {"a": first}, "column").found
-    both = diagnose(nominal, {"a": first, "b": second}, "column").found
+    effect = {"backlash": {"play_{d}": 1.2e-4}}
+    three = {str(seed): made(tmp_path, nominal, effect, seed) for seed in (4, 5, 6)}
+    one = diagnose(nominal, {"4": three["4"]}, "column").found
+    both = diagnose(nominal, three, "column").found
     widths = [
         found["effects"][0]["parameters"]["play_m"]["high"]
         - found["effects"][0]["parameters"]["play_m"]["low"]
         for found in (one, both)
     ]
     assert [effect["name"] for effect in both["effects"]] == ["backlash"]
-    assert widths[1] < 0.9 * widths[0]
+    assert widths[1] < 0.85 * widths[0]
 
 
 def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
@@ -155,6 +155,20 @@ def test_a_folder_is_diagnosed_by_one_command(tmp_path: Path) -> None:
     assert refused.returncode == 2
     assert "there is no c.csv" in refused.stderr
     assert not (tmp_path / "again").exists()
+    for words, says in (
+        ((".", "--output", "x", "--json", "-"), "not for a folder"),
+        (("."), "--output: is missing"),
+        ((".", "--rig", "737", "--output", "x"), "leave it out"),
+        (("a.csv", "--rig", "737", "--output", "x"), "is for a folder"),
+        (("a.csv", "a.csv", "--rig", "737"), "given twice"),
+        (("a.csv",), "--rig: is missing"),
+        (("a.csv", "--rig", "737", "--improve", "x.csv"), "ends in .toml"),
+    ):
+        refused = coupled(tmp_path, "diagnose", *words)
+        assert refused.returncode == 2, words
+        assert says in refused.stderr
+        assert refused.stderr.count("\n") == 1
+        assert not (tmp_path / "x").exists()
 
 
 def drifting(tmp_path: Path) -> Record:
