@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from coupled import channels
+from coupled.campaign.plan import SweepFile, Vary
 from coupled.flight.expectation import Expect
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Measure, RunFile
@@ -104,7 +105,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
-    sections += [RunFile, Bench, Wind, Measure, Expect]
+    sections += [RunFile, Bench, Wind, Measure, Expect, SweepFile, Vary]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
@@ -112,7 +113,7 @@ def test_every_key_of_the_files_is_documented() -> None:
                 continue
             if key in ("gains", "calibration", "rigging", "noise", "measure"):
                 continue
-            if key in ("bench", "wind", "case", "expect", "kind"):
+            if key in ("bench", "wind", "case", "expect", "kind", "vary"):
                 continue
             if section is LogMap:
                 assert f"[{key}" in text, key

@@ -1,7 +1,8 @@
-"""The commands of many flights: check."""
+"""The commands of many flights: check, sweep."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import typer
 from coupled.cli.app import JsonOption, app
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
-from coupled.terminal import check_json, give_json, out, progress, say
+from coupled.terminal import check_json, err, give_json, out, progress, say
 
 
 @app.command(
@@ -48,3 +49,61 @@ def check(
     give_json([verdict.as_dict() for verdict in verdicts], json_file)
     if not all(verdict.passed for verdict in verdicts):
         raise typer.Exit(1)
+
+
+@app.command(epilog="[dim]Examples: coupled sweep my-sweep.toml · coupled sweep s.toml -j 1[/]")
+def sweep(
+    file: Annotated[Path, typer.Argument(help="A sweep file, TOML.")],
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Of the flights and their table.  [default: out/NAME]"),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", "-j", min=1, max=512, help="Processes.  [default: all cores]"),
+    ] = None,
+    cluster: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, to fly there instead.")
+    ] = "",
+    figure: Annotated[
+        Path | None, typer.Option(help="PNG, PDF or SVG.  [default: FOLDER/sweep.png]")
+    ] = None,
+    json_file: JsonOption = "",
+) -> None:
+    """Fly a run over values of its parameters, to one table; called again, it goes on."""
+    from coupled.campaign.journal import JOURNAL, opened
+    from coupled.campaign.plan import read_plan
+    from coupled.campaign.pool import executor
+    from coupled.campaign.sweep import TABLE, fly_sweep, write_table
+    from coupled.plots.campaign import draw_sweep
+    from coupled.plots.saving import check_format, save
+    from coupled.tables.campaign import print_sweep
+
+    if cluster and workers is not None:
+        raise InputError("--workers", "", "a cluster has its own; leave it out")
+    plan = read_plan(file)
+    target = folder or Path("out") / plan.sweep.name
+    if target.is_file():
+        raise InputError(target, "", "is a file; give a folder")
+    path = figure or target / "sweep.png"
+    own = [file, plan.run_file, target / JOURNAL, target / TABLE]
+    check_format(path)
+    check_target(path, own)
+    check_json(json_file, [*own, path])
+    pool_of = workers or os.cpu_count() or 1
+    try:
+        with executor(pool_of, cluster) as pool, opened(target, plan.identity) as journal:
+            if journal.rows:
+                err.print(f"{len(journal.rows)} flights are there already", highlight=False)
+            with progress() as advance:
+                found = fly_sweep(plan, journal, pool, advance)
+            write_table(found, target / TABLE)
+    except KeyboardInterrupt:
+        err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
+        raise typer.Exit(130) from None
+    save(draw_sweep(found, plan.keys, plan.sweep.keep), path)
+    if json_file != "-":
+        print_sweep(out, found, plan.sweep.keep)
+        say(f"table: {target / TABLE}  ({len(found)} flights)")
+        say(f"figure: {path}")
+    give_json(found.to_dicts(), json_file)

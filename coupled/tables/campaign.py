@@ -1,4 +1,4 @@
-"""Verdicts on a terminal of 80 columns: a row an expectation."""
+"""Verdicts and sweeps on a terminal of 80 columns: a row an expectation, a row a figure."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+import polars as pl
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -37,3 +38,26 @@ def _cells(verdict: Verdict) -> tuple[str, ...]:
     if verdict.value is None or verdict.margin is None:
         return mark, f"{what}: {escape(verdict.problem)}", "–", wanted(verdict), "–"
     return mark, what, f"{verdict.value:.4g}", wanted(verdict), f"{verdict.margin:.2g}"
+
+
+def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -> None:
+    """Print how each figure lies over the flights that did not end early, and why others did."""
+    flown = found.filter(pl.col("ended_early") == "")
+    table = Table(box=None, pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for head in ("least", "5 %", "median", "95 %", "greatest", "flights"):
+        table.add_column(head, justify="right", no_wrap=True, min_width=7)
+    for configuration in flown["configuration"].unique(maintain_order=True):
+        rows = flown.filter(pl.col("configuration") == configuration)
+        table.add_row(f"[bold]{escape(configuration)}[/]")
+        for name in figures:
+            values = rows[name].drop_nulls()
+            shares = [values.quantile(share, "linear") for share in (0.0, 0.05, 0.5, 0.95, 1.0)]
+            cells = ["–" if value is None else f"{value:.3g}" for value in shares]
+            table.add_row(f"  {name}", *cells, str(len(values)))
+    console.print(table, highlight=False)
+    ended = found.filter(pl.col("ended_early") != "")
+    if len(ended):
+        first = ended.row(0, named=True)
+        why = f"the first, flight {first['flight']}: {first['ended_early']}"
+        console.print(f"[yellow]{len(ended)} of {len(found)} ended early[/]; {escape(why)}")

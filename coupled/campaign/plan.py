@@ -1,0 +1,273 @@
+"""A sweep file: which run, which of its keys vary, how, and what is kept of each flight.
+
+Every value is tried on the run's files before anything flies. A combination that only
+together cannot be flown becomes a row that says so.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import itertools
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from coupled.errors import InputError, nearest
+from coupled.files import sha256
+from coupled.flight.expectation import Figure
+from coupled.flight.loop import input_files, make_airframe
+from coupled.flight.scenario import Configuration, Scenario, scenarios_from_table
+from coupled.resources import find, shipped_runs
+from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.rigfile import change
+from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
+
+Floats = NDArray[np.float64]
+MOST_FLIGHTS = 1_000_000
+_NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_properties")
+FIGURES: tuple[Figure, ...] = ("loss", "felt_ratio", "force_N", "peak_rate_rad_per_s")
+
+
+class Vary(Section):
+    """A parameter and its values: a list, or a range. `also` are keys that go with it."""
+
+    key: str = quantity("", min_length=1, max_length=200)
+    also: list[str] = []
+    values: list[Any] | None = quantity("", None, min_length=1)
+    low: float | None = None
+    high: float | None = None
+    steps: int | None = quantity("", None, ge=2, le=10_000)
+    spread: Literal["even", "log"] = "even"
+
+
+class SweepFile(Section):
+    """The keys of a sweep file."""
+
+    name: str = quantity("", pattern=PLAIN_NAME)
+    run: str = quantity("", min_length=1)
+    case: str | None = None
+    configurations: list[Configuration] = []
+    method: Literal["grid", "sobol", "random"] = "grid"
+    samples: int | None = quantity("", None, ge=1, le=MOST_FLIGHTS)
+    seed: int = quantity("", 0, ge=0)
+    reseed: bool = False
+    keep: list[Figure] = quantity("", list(FIGURES), min_length=1)
+    extremes: list[str] = []
+    vary: list[Vary] = quantity("", min_length=1)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One flight of a sweep: its number, what is changed, and the run's noise seed if it has one.
+
+    `configuration` is empty for the rig as its file says.
+    """
+
+    number: int
+    changes: Mapping[str, Any]
+    configuration: Configuration | Literal[""]
+    seed: int | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep, ready to fly: `table` are the tables of the run's file."""
+
+    sweep: SweepFile
+    file: Path
+    run_file: Path
+    table: Mapping[str, Any]
+    identity: str
+
+    @property
+    def keys(self) -> list[str]:
+        """The keys that vary, one a parameter."""
+        return [vary.key for vary in self.sweep.vary]
+
+    def scenario(self, changes: Mapping[str, Any]) -> Scenario:
+        """Return the run's case with values changed, by their dotted keys."""
+        return _changed(self.table, self.run_file, self.sweep.case, changes)
+
+
+def read_plan(file: Path) -> Plan:
+    """Return the sweep of a file, every value tried, the run's own faults blamed on the run."""
+    table = load_toml(file)
+    known_keys(table, file_keys(SweepFile, "m"), file, "")
+    varied = table.get("vary", [])
+    if not isinstance(varied, list):
+        raise InputError(file, "vary", "each is written [[vary]]")
+    if varied:
+        table["vary"] = [build(Vary, item, file, f"vary[{i}]") for i, item in enumerate(varied)]
+    sweep = build(SweepFile, table, file, "")
+    _check_values(sweep, file)
+    run_file = find(sweep.run, shipped_runs(), "run", beside=file.parent)
+    run_table = load_toml(run_file)
+    try_changes = partial(_changed, run_table, run_file, sweep.case)
+    if sweep.case is not None:
+        labels = [scenario.label for scenario in scenarios_from_table(dict(run_table), run_file)]
+        if sweep.case not in labels:
+            raise InputError(file, "case", f"no {sweep.case!r}; {nearest(sweep.case, labels)}")
+    base = try_changes({})
+    files = {*input_files(base), *_check_keys(sweep, file, try_changes)}
+    for channel in sweep.extremes:
+        if channel not in base.channels:
+            hint = nearest(channel, base.channels)
+            raise InputError(file, "extremes", f"no channel {channel!r}; {hint}")
+    return Plan(sweep, file, run_file, run_table, _identity(sweep, files))
+
+
+def jobs(plan: Plan) -> list[Job]:
+    """Return every flight of a sweep; the same file gives the same flights."""
+    sweep, found = plan.sweep, list[Job]()
+    configurations: list[Any] = list(sweep.configurations) or [""]
+    for i, values in enumerate(_points(sweep)):
+        changes = {
+            key: value
+            for vary, value in zip(sweep.vary, values, strict=True)
+            for key in (vary.key, *vary.also)
+        }
+        seed = int(np.random.default_rng([sweep.seed, i]).integers(2**31)) if sweep.reseed else None
+        for configuration in configurations:
+            found.append(Job(len(found), changes, configuration, seed))
+    return found
+
+
+def _changed(
+    table: Mapping[str, Any], file: Path, label: str | None, changes: Mapping[str, Any]
+) -> Scenario:
+    tables = copy.deepcopy(dict(table))
+    tables.pop("expect", None)
+    listed = tables.get("case", []) or [{"label": str(tables.get("name", "run"))}]
+    chosen = [c for c in listed if label in (None, c.get("label"))]
+    case = chosen[0] if chosen else listed[0]
+    for key, value in changes.items():
+        head, _, rest = key.partition(".")
+        if head in ("rig", "pilot") and rest:
+            case.setdefault(head, {})[rest] = value
+        elif not change(tables, key, value):
+            raise InputError(file, key, "leads through a value, not a table")
+    tables["case"] = [case]
+    return scenarios_from_table(tables, file)[0]
+
+
+def _check_values(sweep: SweepFile, file: Path) -> None:
+    keys: list[Any] = [key for vary in sweep.vary for key in (vary.key, *vary.also)]
+    lists: dict[str, list[Any]] = {"vary": keys, "keep": sweep.keep, "extremes": sweep.extremes}
+    lists["configurations"] = sweep.configurations
+    for name, words in lists.items():
+        for word in words:
+            if words.count(word) > 1:
+                raise InputError(file, name, f"{word} stands there twice")
+    for key in keys:
+        if key.partition(".")[0] in _NO_CONDITION:
+            raise InputError(file, "vary", f"{key} changes no flight")
+    if (sweep.method != "grid") != (sweep.samples is not None):
+        raise InputError(file, "samples", "is given with sobol and random, and not with grid")
+    for i, vary in enumerate(sweep.vary):
+        place = f"vary[{i}]"
+        ranged = vary.low is not None and vary.high is not None
+        if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
+            raise InputError(file, place, "give values, or low and high")
+        if ranged and (sweep.method == "grid") != (vary.steps is not None):
+            raise InputError(
+                file, f"{place}.steps", "is given for a range in a grid, and only there"
+            )
+        low, high = vary.low or 0.0, vary.high or 0.0
+        if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
+            problem = "must be above low, and low above 0 where the spread is log"
+            raise InputError(file, f"{place}.high", problem)
+    flights = max(1, len(sweep.configurations)) * (sweep.samples or _grid_size(sweep))
+    if flights > MOST_FLIGHTS:
+        raise InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
+
+
+def _grid_size(sweep: SweepFile) -> int:
+    size = 1
+    for vary in sweep.vary:
+        size *= vary.steps or len(vary.values or ())
+    return size
+
+
+def _check_keys(
+    sweep: SweepFile, file: Path, try_changes: Callable[[dict[str, Any]], Scenario]
+) -> set[Path]:
+    """Try every value alone, and return the files that its flight would read."""
+    files = set[Path]()
+    for i, vary in enumerate(sweep.vary):
+        values = vary.values if vary.values is not None else [vary.low, vary.high]
+        for value in values:
+            changes = dict.fromkeys((vary.key, *vary.also), value)
+            try:
+                scenario = try_changes(changes)
+                if value is values[0] and "flight.properties." in vary.key:
+                    _check_property(scenario, vary.key)
+            except InputError as error:
+                where = error.key.removeprefix("case[0].")
+                named = "" if where == "" or where.endswith(vary.key) else f"{where}: "
+                problem = f"{vary.key} = {value!r}: {named}{error.problem}"
+                raise InputError(file, f"vary[{i}]", problem) from None
+            files |= set(input_files(scenario))
+    return files
+
+
+def _check_property(scenario: Scenario, key: str) -> None:
+    """Refuse a property that the aircraft lacks; one that will not trim is a row of the table."""
+    try:
+        make_airframe(scenario)
+    except InputError as error:
+        if error.key.endswith(key):
+            raise
+
+
+def _points(sweep: SweepFile) -> list[tuple[Any, ...]]:
+    """Return the values of each point, in the order of the varied keys."""
+    if sweep.samples is None:
+        return list(itertools.product(*(_grid_values(vary) for vary in sweep.vary)))
+    width = len(sweep.vary)
+    if sweep.method == "sobol":
+        power = max(0, (sweep.samples - 1).bit_length())
+        shares = qmc.Sobol(width, seed=sweep.seed).random_base2(power)[: sweep.samples]
+    else:
+        shares = np.random.default_rng(sweep.seed).random((sweep.samples, width))
+    columns = [_drawn(vary, shares[:, i]) for i, vary in enumerate(sweep.vary)]
+    return list(zip(*columns, strict=True))
+
+
+def _grid_values(vary: Vary) -> list[Any]:
+    if vary.values is not None:
+        return vary.values
+    return _drawn(vary, np.linspace(0.0, 1.0, vary.steps or 2))
+
+
+def _drawn(vary: Vary, shares: Floats) -> list[Any]:
+    """Return the values at shares from 0 to 1 of a range, or of a list."""
+    if vary.values is not None:
+        places = np.minimum((shares * len(vary.values)).astype(int), len(vary.values) - 1)
+        return [vary.values[place] for place in places]
+    assert vary.low is not None
+    assert vary.high is not None
+    if vary.spread == "log":
+        values = vary.low * (vary.high / vary.low) ** shares
+    else:
+        values = vary.low + (vary.high - vary.low) * shares
+    return [float(value) for value in values]
+
+
+def _identity(sweep: SweepFile, files: set[Path]) -> str:
+    """Return the hash of what a sweep's table depends on: its keys, its files, the versions."""
+    content = {
+        "sweep": sweep.model_dump(exclude={"name"}),
+        "files": sorted(sha256(path) for path in files if path.is_file()),
+        "versions": {name: version(name) for name in ("coupled", "jsbsim", "numpy", "scipy")},
+    }
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,98 @@
+"""Where the flights of a sweep are flown: here, on all cores, or on a dask cluster.
+
+The three have one face, that of `concurrent.futures`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+from coupled.errors import InputError
+
+_PATIENCE_s = 10.0
+
+
+class Here(Executor):
+    """An executor that does the work at once, in this process."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return a future that is done; what the work raises is raised here."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@contextmanager
+def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
+    """Give an executor of so many processes, or a cluster's where an address is given.
+
+    Work that has not begun is dropped when it is left.
+    """
+    if cluster:
+        with _cluster(cluster) as pool:
+            yield pool
+        return
+    if workers <= 1:
+        yield Here()
+        return
+    # A flight's matrices are small: threads of theirs would only take turns with the other workers.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    own = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=own, initializer=_begin_worker)
+    try:
+        yield pool
+    except BrokenExecutor:
+        problem = "a worker died; finished flights are kept, and the same command goes on"
+        raise InputError("--workers", "", problem) from None
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Leave interrupts to the parent, and end with it, even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        problem = "needs dask.distributed: pip install 'coupled[cluster]'"
+        raise InputError("--cluster", "", problem) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=_PATIENCE_s, set_as_default=False)
+    except (OSError, ValueError, TypeError):
+        raise InputError("--cluster", "", f"{address} does not answer") from None
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE_s)
+    except TimeoutError:
+        client.close()
+        raise InputError("--cluster", "", f"{address} has no workers") from None
+    pool = client.get_executor(pure=False)
+    try:
+        yield pool
+    except (distributed.KilledWorker, CancelledError, OSError):
+        problem = f"{address} was lost; finished flights are kept, and the same command goes on"
+        raise InputError("--cluster", "", problem) from None
+    finally:
+        pool.shutdown(wait=False)
+        client.close()
