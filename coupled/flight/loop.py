@@ -52,7 +52,7 @@ def fly(
     h = 1.0 / (rig.frame_rate * substeps)
     pressure_Pa = airframe.motion()[0]
     actions = {
-        name: pilot.act(
+        name: pilot.meet(rig, scenario.rig_file, scenario.file, run.seed).act(
             rig.controls[name],
             gradient_at(rig.controls[name], pressure_Pa),
             name,

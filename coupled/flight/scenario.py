@@ -16,7 +16,7 @@ from typing import Any, Literal, cast
 from coupled.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.errors import InputError, nearest
 from coupled.flight.expectation import Expect, check_expectations
-from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, read_force_table
+from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, Track, read_force_table
 from coupled.flight.wind import Wind, check_wind
 from coupled.resources import find, shipped_rigs, shipped_runs
 from coupled.rig.parameters import PLAIN_NAME, Rig
@@ -233,18 +233,32 @@ def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
         if not isinstance(kind, str) or kind not in PILOTS:
             raise InputError(file, f"{path}.kind", f"is {kind!r}; {nearest(str(kind), PILOTS)}")
         pilot = build(PILOTS[kind], table, file, path, unit_of(name))
-        if kind == "attitude" and (name != "column" or rig.flight is None):
+        if kind in ("attitude", "track") and (name != "column" or rig.flight is None):
             raise InputError(
-                file, path, "only the column of a rig that flies holds a pitch attitude"
+                file, path, "only the column of a rig that flies follows pitch, path or airspeed"
             )
         if isinstance(pilot, Sweep) and max(pilot.low, pilot.high) > 0.5 * rig.frame_rate:
             problem = f"is beyond half the frame rate, {0.5 * rig.frame_rate:g} Hz"
             raise InputError(file, f"{path}.high_Hz", problem)
         if isinstance(pilot, Table):
             read_force_table(file.parent / pilot.file, channel(name, "force"))
+        if isinstance(pilot, Track):
+            _check_tracking(pilot, table, rig.frame_rate, file)
         _check_deflection(pilot, rig, name, file)
         pilots[cast(ControlName, name)] = pilot
     return pilots
+
+
+def _check_tracking(pilot: Track, table: Any, frame_rate: float, file: Path) -> None:
+    """Refuse a target in the unit of another, and sines that no frame can follow."""
+    wrong = "rad" if pilot.what == "airspeed" else "m_per_s"
+    for key in (f"change_{wrong}", f"sine_{wrong}"):
+        if key in table:
+            problem = f"is no target for {pilot.what}; give it in its own unit"
+            raise InputError(file, f"pilot.column.{key}", problem)
+    if any(not 0.0 < rate < frame_rate for rate in pilot.sine_rates):
+        problem = f"must lie between 0 and {frame_rate:g}, the frame rate"
+        raise InputError(file, "pilot.column.sine_rates_rad_per_s", problem)
 
 
 def _check_deflection(pilot: Pilot, rig: Rig, name: str, file: Path) -> None:

@@ -11,6 +11,12 @@ The force bends the structure, so δ on the right depends on F on the left. The
 bend's local slope K is taken implicitly, which keeps a stiff hand stable at any
 K; the motion of the loader enters as it stood at the node (an exchange once a
 substep, first order in it).
+
+A hand is no stronger than it is: beyond its strength it gives way, and no impedance acts.
+Its full strength lasts for an endurance, after which it has its lasting strength only,
+until it has rested:
+
+    effort' = (|F| − F_lasting)/(F_strongest − F_lasting), within 0 and the endurance
 """
 
 from __future__ import annotations
@@ -28,6 +34,9 @@ class HandParameters(Protocol):
     damping: float  # c_h, N·s/d
     integral: float  # k_I, N/(d·s)
     lag_gain: float  # 1 − exp(−h/τ) of the muscle's lag over a substep
+    strongest: float  # N, for a short time; 0 for a hand without limit
+    lasting: float  # N, for any time
+    endurance: float  # s at full strength
 
 
 class HandState(Protocol):
@@ -37,10 +46,23 @@ class HandState(Protocol):
     command: float  # u, N, held over the frame
     muscle: float  # u behind the muscle's lag, N
     integral: float  # the integral term, N
+    effort: float  # s at full strength that the hand has behind it
 
 
 HAND_PARAMETERS = layout(HandParameters)
 HAND_STATE = layout(HandState)
+
+
+@stage
+def within_strength(p: HandParameters, s: HandState, force: float, h: float) -> float:
+    """Return the force that a hand can hold of one asked for, N, and tire it for h seconds."""
+    if p.strongest == 0.0:
+        return force
+    limit = p.strongest if s.effort < p.endurance else p.lasting
+    held = min(max(force, -limit), limit)
+    effort = s.effort + h * (abs(held) - p.lasting) / (p.strongest - p.lasting)
+    s.effort = min(max(effort, 0.0), p.endurance)
+    return held
 
 
 @stage
@@ -60,8 +82,8 @@ def grip_force(
     """
     target = script + s.muscle
     if p.stiffness == 0.0 and p.damping == 0.0 and p.integral == 0.0:
-        s.force = target
-        return target
+        s.force = within_strength(p, s, target, h)
+        return s.force
     slope = bend_slope(linkage_p, s.force)
     error = held - (linkage.grip + bend(linkage_p, s.force))
     rate_error = held_rate - linkage.rate
@@ -69,6 +91,7 @@ def grip_force(
     change = (asked - s.force) / (1.0 + slope * (p.stiffness + p.damping / h))
     s.force += change
     s.integral += p.integral * h * (error - slope * change)
+    s.force = within_strength(p, s, s.force, h)
     return s.force
 
 

@@ -18,12 +18,16 @@ class Hand:
     """The impedance of a hand on one control; all zero is a hand that only pushes.
 
     stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s.
+    `strongest` (0: no limit) and `lasting`, N, can be held for `endurance_s` and for any time.
     """
 
     stiffness: float = 0.0
     damping: float = 0.0
     integral: float = 0.0
     lag_s: float = 0.0
+    strongest: float = 0.0
+    lasting: float = 0.0
+    endurance_s: float = 0.0
 
 
 # JSBSim's sign for nose up, right wing down, nose right, confirmed by flying each model.
@@ -54,6 +58,8 @@ def first_order_gain(lag_s: float, step_s: float) -> float:
 def _pack_hand(p: Any, hand: Hand, h: float) -> None:
     p["stiffness"], p["damping"], p["integral"] = hand.stiffness, hand.damping, hand.integral
     p["lag_gain"] = first_order_gain(hand.lag_s, h)
+    p["strongest"], p["lasting"] = hand.strongest, hand.lasting
+    p["endurance"] = hand.endurance_s
 
 
 def _pack_host(p: Any, control: Control, frame_s: float) -> None:

@@ -1,0 +1,23 @@
+"""Pilots: what a run file's `[pilot.CONTROL]` may say, and what it does to the grip."""
+
+from __future__ import annotations
+
+from coupled.flight.pilot.attitude import Attitude
+from coupled.flight.pilot.base import Action, Pilot, edges
+from coupled.flight.pilot.scripted import Clamp, Doublet, Ramp, Step, Sweep, ThreeTwoOneOne
+from coupled.flight.pilot.table import Table, read_force_table
+from coupled.flight.pilot.track import Track
+
+__all__ = ["PILOTS", "Action", "Pilot", "Sweep", "Table", "Track", "edges", "read_force_table"]
+
+PILOTS: dict[str, type[Pilot]] = {
+    "step": Step,
+    "ramp": Ramp,
+    "doublet": Doublet,
+    "3211": ThreeTwoOneOne,
+    "sweep": Sweep,
+    "table": Table,
+    "clamp": Clamp,
+    "attitude": Attitude,
+    "track": Track,
+}

@@ -1,0 +1,101 @@
+"""The crossover model: what a pilot's gain and lead must be for a loop to be as set.
+
+McRuer and Jex (1967): a pilot adapts so that, around the crossover frequency, pilot and
+controlled element together are ω_c/s with a delay. Here
+
+    Y_p = K·(T_L·s + 1)/(T_I·s + 1)·(1 + ω_I/s)·e^(−τs)
+
+where lead T_L or lag T_I, never both, gives the phase margin, and K the frequency. All is
+computed in the discrete time of the frames, in which the pilot looks, so nothing is lost to
+them.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections import deque
+from dataclasses import dataclass
+
+_MOST_rad = math.radians(80.0)  # of lead or lag: T_L = 5.7/ω_c; a pilot gives no more
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """A pilot's compensation in one loop: gain, lead or lag in s, and integral rate in 1/s."""
+
+    gain: float
+    lead_s: float
+    lag_s: float
+    integral_per_s: float
+
+
+class Acting:
+    """A compensation at work, frame by frame, with the memory it needs."""
+
+    def __init__(self, pilot: Compensation, frame_s: float) -> None:
+        self._pilot, self._frame_s = pilot, frame_s
+        self._last: float | None = None
+        self._lagged = self._integral = 0.0
+
+    def __call__(self, error: float) -> float:
+        """Return what the pilot asks for on seeing an error."""
+        p, h = self._pilot, self._frame_s
+        before = error if self._last is None else self._last
+        self._last = error
+        led = error + p.lead_s * (error - before) / h
+        self._lagged += (led - self._lagged) / (1.0 + p.lag_s / h)
+        self._integral += p.integral_per_s * h * self._lagged
+        return p.gain * (self._lagged + self._integral)
+
+
+class Delay:
+    """A delay of any length, straight between frames."""
+
+    def __init__(self, delay_s: float, frame_s: float) -> None:
+        whole, self._part = divmod(delay_s / frame_s, 1.0)
+        self._past: deque[float] = deque([0.0] * (int(whole) + 2), maxlen=int(whole) + 2)
+
+    def __call__(self, value: float) -> float:
+        """Return the value of so long ago."""
+        self._past.append(value)
+        return (1.0 - self._part) * self._past[1] + self._part * self._past[0]
+
+
+def delay_response(delay_s: float, frame_s: float, rate: float) -> complex:
+    """Return what `Delay` does at a frequency in rad/s."""
+    whole, part = divmod(delay_s / frame_s, 1.0)
+    back = cmath.exp(-1j * rate * frame_s)
+    return back ** int(whole) * (1.0 - part + part * back)
+
+
+def compensation_response(pilot: Compensation, frame_s: float, rate: float) -> complex:
+    """Return what `Acting` does at a frequency in rad/s."""
+    slope = _slope(frame_s, rate)
+    shape = (1.0 + pilot.lead_s * slope) / (1.0 + pilot.lag_s * slope)
+    return pilot.gain * shape * (1.0 + pilot.integral_per_s / slope)
+
+
+def adapt(
+    element: complex, crossover: float, margin: float, integral: float, frame_s: float
+) -> Compensation | float:
+    """Return the compensation that makes the loop cross over where it should, or what it lacks.
+
+    `element` is what the pilot's compensation works on, delay and limbs among it, at the
+    crossover in rad/s; `margin` in rad. A number is the lead in rad (lag negative) that it
+    would take, beyond what a pilot gives.
+    """
+    slope = _slope(frame_s, crossover)
+    rest = element * (1.0 + integral / slope)
+    phase = cmath.phase(cmath.exp(1j * (margin - math.pi)) / rest)
+    if abs(phase) > _MOST_rad:
+        return phase
+    time = math.tan(abs(phase)) / (slope.imag - slope.real * math.tan(abs(phase)))
+    lead, lag = (time, 0.0) if phase > 0.0 else (0.0, time)
+    shape = (1.0 + lead * slope) / (1.0 + lag * slope)
+    return Compensation(1.0 / abs(rest * shape), lead, lag, integral)
+
+
+def _slope(frame_s: float, rate: float) -> complex:
+    """Return what a difference from frame to frame does, per second."""
+    return (1.0 - cmath.exp(-1j * rate * frame_s)) / frame_s

@@ -1,0 +1,102 @@
+"""How an aircraft answers its elevator at one frequency, found by flying it.
+
+Two aircraft of their own are flown from the trim, one with a small sine on the elevator
+command and one with its negative, faded in; half the difference of their motions, without
+what drifts, is the answer. So it holds whatever the model has between command and
+surface, and an even nonlinearity falls out.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import LONGITUDINAL, ControlName
+from coupled.flight.airframe import ALTITUDE, SPEED, JSBSimAirframe
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+
+Floats = NDArray[np.float64]
+
+_SIZE = 0.004  # of the elevator command: linear, and far above rounding
+_FADE, _WAIT, _MEASURED = 2.0, 2.0, 4.0  # periods
+_LEAST_WAIT_s = 10.0  # the short period of the slowest aircraft here has died down by then
+_DRIFT = 3  # order of the polynomial that takes what drifts
+PITCH = LONGITUDINAL.index("pitch_rad")
+
+
+class Response(NamedTuple):
+    """What a unit of elevator command, JSBSim's ±1, makes of the motion at one frequency."""
+
+    pitch: complex  # rad
+    flight_path: complex  # rad, over the frame before (`path_angle`)
+    airspeed: complex  # true, m/s
+    pressure_Pa: float  # q̄ of the trim
+
+
+def elevator_response(
+    flight: Flight,
+    frame_s: float,
+    controls: tuple[ControlName, ...],
+    file: Path,
+    rate_rad_per_s: float,
+) -> Response:
+    """Return the response of an aircraft in still air.
+
+    The command is set once a frame; the motion of row k is read before that of row k acts.
+    """
+    still = flight.model_copy(update={"gust_rms": 0.0})
+    return _response(still.model_dump_json(), frame_s, controls, file, rate_rad_per_s)
+
+
+@lru_cache(maxsize=64)
+def _response(
+    flight_json: str, frame_s: float, controls: tuple[ControlName, ...], file: Path, rate: float
+) -> Response:
+    flight = Flight.model_validate_json(flight_json)
+    period = 2.0 * math.pi / rate
+    wait = max(_LEAST_WAIT_s, (_FADE + _WAIT) * period)
+    times = np.arange(round((wait + _MEASURED * period) / frame_s)) * frame_s
+    fade = np.sin(0.5 * np.pi * np.clip(times / (_FADE * period), 0.0, 1.0)) ** 2
+    command = _SIZE * fade * np.sin(rate * times)
+    planes = [_aircraft(flight, frame_s, controls, file) for _ in "+-"]
+    pressure_Pa = planes[0].motion()[0]
+    up = _fly(planes[0], command, frame_s)
+    down = _fly(planes[1], -command, frame_s)
+    late = times >= wait
+    t = times[late]
+    drift = np.polynomial.chebyshev.chebvander(np.linspace(-1.0, 1.0, t.size), _DRIFT)
+    basis = np.column_stack((np.sin(rate * t), np.cos(rate * t), drift))
+    found = np.linalg.lstsq(basis, 0.5 * (up - down)[late], rcond=None)[0]
+    pitch, path, speed = (found[0] + 1j * found[1]) / _SIZE
+    return Response(complex(pitch), complex(path), complex(speed), pressure_Pa)
+
+
+def _aircraft(
+    flight: Flight, frame_s: float, controls: tuple[ControlName, ...], file: Path
+) -> JSBSimAirframe:
+    return JSBSimAirframe(flight, frame_s, controls, [aircraft_folder()], file)
+
+
+def _fly(airframe: JSBSimAirframe, command: Floats, frame_s: float) -> Floats:
+    """Return pitch, path and speed under an elevator command, shape (frames, 3)."""
+    rows = np.empty((command.size, 3))
+    before = airframe.motion()[ALTITUDE]
+    for row, value in zip(rows, command.tolist(), strict=True):
+        motion = airframe.motion()
+        path = path_angle(motion, before, frame_s)
+        before = motion[ALTITUDE]
+        row[:] = motion[PITCH], path, motion[SPEED]
+        airframe.step((value, 0.0, 0.0))
+    return rows
+
+
+def path_angle(motion: tuple[float, ...], altitude_before_m: float, frame_s: float) -> float:
+    """Return the flight path's angle over the frame before, rad, up positive."""
+    climb = (motion[ALTITUDE] - altitude_before_m) / frame_s
+    return math.asin(min(max(climb / max(motion[SPEED], 1.0), -1.0), 1.0))
