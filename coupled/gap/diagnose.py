@@ -136,9 +136,9 @@ def _stages(
         elif stage in lacking:
             found[stage] = {"judged": False, "missing": lacking[stage]}
         elif stage == "schedule":
-            found[stage] = {"judged": False, "missing": [], "why": "the gradient never changes"}
+            found[stage] = {"judged": False, "missing": [], "why": "constant gradient"}
         elif stage == "surface" and readers[0].rig.flight is not None:
-            found[stage] = {"judged": False, "missing": [], "why": "only the elevator is judged"}
+            found[stage] = {"judged": False, "missing": [], "why": "no elevator"}
     scale = [before[stage] for stage in ("loader", "linkage") if stage in before]
     if scale:
         found["sensing"] = {"gap": max(scale) if "sensing" in blamed else 1.0}
@@ -150,7 +150,7 @@ def _stages(
         missing = [name for name in NEEDS if name not in readers[0].record]
         found["airframe"] = {"judged": False, "missing": missing}
         if not missing:
-            found["airframe"]["why"] = "only the elevator is judged"
+            found["airframe"]["why"] = "no elevator"
     return found
 
 
