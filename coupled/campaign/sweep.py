@@ -6,9 +6,11 @@ The rows depend on the sweep's file alone, not on who flew them or in which orde
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, as_completed, wait
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,7 @@ from coupled.record import Record
 Progress = Callable[[str, int, int], None]
 AS_FILED = "as filed"
 TABLE = "table.parquet"
-_AHEAD = 256  # flights that wait for a worker
+_AHEAD = 64  # flights that wait for a worker
 
 
 def fly_job(plan: Plan, job: Job) -> Row:
@@ -75,12 +77,24 @@ def fly_sweep(
 def _rows(plan: Plan, todo: Sequence[Job], pool: Executor) -> Iterator[Row]:
     """Yield each row as soon as its flight is done; a bounded number of flights waits."""
     waiting: set[Future[Row]] = set()
+    packed = pickle.dumps(plan)
     for job in todo:
-        waiting.add(pool.submit(fly_job, plan, job))
+        waiting.add(pool.submit(_fly_packed, packed, job))
         patience_s = None if len(waiting) >= _AHEAD else 0.0
         done, waiting = wait(waiting, patience_s, FIRST_COMPLETED)
         yield from (future.result() for future in done)
     yield from (future.result() for future in as_completed(waiting))
+
+
+def _fly_packed(packed: bytes, job: Job) -> Row:
+    """Fly a job of a plan that is sent as bytes, which costs nothing to send again."""
+    return fly_job(_unpacked(packed), job)
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> Plan:
+    plan: Plan = pickle.loads(packed)
+    return plan
 
 
 def table(plan: Plan, rows: Mapping[int, Row]) -> pl.DataFrame:

@@ -43,18 +43,18 @@ def _cells(verdict: Verdict) -> tuple[str, ...]:
 def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -> None:
     """Print how each figure lies over the flights that did not end early, and why others did."""
     flown = found.filter(pl.col("ended_early") == "")
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
-    for head in ("least", "5 %", "median", "95 %", "greatest", "flights"):
-        table.add_column(head, justify="right", no_wrap=True, min_width=7)
+    for head in ("least", "5 %", "median", "95 %", "greatest", "of"):
+        table.add_column(head, justify="right", no_wrap=True)
     for configuration in flown["configuration"].unique(maintain_order=True):
         rows = flown.filter(pl.col("configuration") == configuration)
-        table.add_row(f"[bold]{escape(configuration)}[/]")
+        table.add_row(f"[bold]{escape(configuration)}[/]", *[""] * 6)
         for name in figures:
             values = rows[name].drop_nulls()
             shares = [values.quantile(share, "linear") for share in (0.0, 0.05, 0.5, 0.95, 1.0)]
             cells = ["–" if value is None else f"{value:.3g}" for value in shares]
-            table.add_row(f"  {name}", *cells, str(len(values)))
+            table.add_row(f" {name}", *cells, str(len(values)))
     console.print(table, highlight=False)
     ended = found.filter(pl.col("ended_early") != "")
     if len(ended):

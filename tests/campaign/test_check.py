@@ -231,7 +231,6 @@ def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
     ("words", "says"),
     [
         (["check", "push.toml"], "push.toml: expect: there is none: nothing could fail"),
-        (["check", "nothing"], "nothing: is no shipped run"),
         (["check", "capture", "capture"], "capture: two of the runs have this name"),
         (["check", "capture", "--junit", "push.toml/x.xml"], "cannot be written there"),
     ],
