@@ -33,7 +33,7 @@ ORDER = [
     "logs",
     "flight",
 ]
-ORDER += ["authority", "calibration", "gap", "blind", "plots", "tables", "terminal", "cli"]
+ORDER += ["authority", "maps", "calibration", "gap", "blind", "plots", "tables", "terminal", "cli"]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 
 

@@ -1,6 +1,6 @@
 """The command line: parses, calls, prints. A module a group of commands."""
 
-from coupled.cli import bench, blind, calibration, document, flights, gaps, logs
+from coupled.cli import bench, blind, calibration, document, flights, gaps, logs, maps
 from coupled.cli.app import app, main
 
 __all__ = [
@@ -13,4 +13,5 @@ __all__ = [
     "gaps",
     "logs",
     "main",
+    "maps",
 ]
