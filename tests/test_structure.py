@@ -37,6 +37,7 @@ ORDER = [
 ]
 ORDER += [
     "authority",
+    "maps",
     "campaign",
     "calibration",
     "gap",

@@ -1,6 +1,6 @@
 """The command line: parses, calls, prints. A module a group of commands."""
 
-from coupled.cli import bench, blind, calibration, campaign, document, flights, gaps, logs
+from coupled.cli import bench, blind, calibration, campaign, document, flights, gaps, logs, maps
 from coupled.cli.app import app, main
 
 __all__ = [
@@ -14,4 +14,5 @@ __all__ = [
     "gaps",
     "logs",
     "main",
+    "maps",
 ]

@@ -1,0 +1,72 @@
+"""The command of the authority maps: map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupled.cli.app import app
+from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.errors import InputError
+from coupled.files import check_target
+from coupled.resources import find, shipped_rigs
+from coupled.terminal import progress, say
+
+
+@app.command(
+    name="map", epilog="[dim]Examples: coupled map 737 · coupled map t37 --record out/a.csv[/]"
+)
+def draw_map(
+    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
+    record: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Records whose envelope is drawn (default: the rig's shipped runs, flown)."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Figure, PNG, PDF or SVG.  [default: out/RIG-map.png]"),
+    ] = None,
+) -> None:
+    """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
+    from coupled.maps import envelope, feel, loss_maps, shipped_flights
+    from coupled.plots.maps import draw_feel, draw_losses
+    from coupled.plots.saving import check_format, save
+    from coupled.record import check_suffix, read_record
+    from coupled.rig.rigfile import read_rig
+    from coupled.tables.maps import write_feel, write_losses
+
+    file = find(rig, shipped_rigs(), "rig")
+    data = read_rig(file)
+    path = output or Path("out") / f"{data.name}-map.png"
+    check_format(path)
+    other = path.with_name(f"{path.stem}-feel{path.suffix}")
+    written = [path, path.with_suffix(".csv"), other, other.with_suffix(".csv")]
+    for target in written:
+        check_target(target, [file, *(record or [])])
+    for given in record or []:
+        check_suffix(given)
+    records = [read_record(given) for given in record or []]
+    for given, told in zip(record or [], records, strict=True):
+        if "dynamic_pressure_Pa" not in told:
+            raise InputError(given, "dynamic_pressure_Pa", "no such column")
+    say_stale(data)
+    with progress() as advance:
+        if not record:
+            records = shipped_flights(data, advance)
+        felt = feel(data, file, advance)
+    maps = {name: loss_maps(data, name) for name in data.controls}
+    flown = {name: envelope(records, name) for name in data.controls}
+    save(draw_losses(data.name, maps, flown), written[0])
+    write_losses((told for of_control in maps.values() for told in of_control), written[1])
+    if felt is None:
+        say("no level trim of a column: no stick force per g or per knot")
+        written = written[:2]
+    else:
+        save(draw_feel(data.name, felt), written[2])
+        write_feel(felt, written[3])
+    for target in written:
+        say(f"written: {target}")
