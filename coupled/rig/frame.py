@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlArray, ControlParameters, ControlState
-from coupled.rig.hand import grip_force, move_muscle
+from coupled.rig.hand import grip_force, move_muscle, only_scripted
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import modifying_force, set_gradients
@@ -89,6 +89,7 @@ def run_frame(
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
     h = p.clock.substep
+    scripted = only_scripted(p.hand)  # asked once a frame, not at every node
     for node in range(first_node + 1, first_node + p.clock.substeps + 1):
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
@@ -96,6 +97,9 @@ def run_frame(
         before = s.loader.computed
         move_loader(p.loader, p.friction, s.modification, s.loader, ahead, h)
         move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
+        if scripted:
+            s.hand.force = force[node] + s.hand.muscle
+            continue
         rate = (held[node] - held[node - 1]) / h
         grip_force(p.hand, s.hand, p.linkage, s.linkage, force[node], held[node], rate, h)
 

@@ -54,6 +54,13 @@ HAND_STATE = layout(HandState)
 
 
 @stage
+def only_scripted(p: HandParameters) -> bool:
+    """Tell whether a hand holds what is asked of it as it is: no impedance, no limit."""
+    impedance = p.stiffness != 0.0 or p.damping != 0.0 or p.integral != 0.0
+    return not impedance and p.strongest == 0.0
+
+
+@stage
 def within_strength(p: HandParameters, s: HandState, force: float, h: float) -> float:
     """Return the force that a hand can hold of one asked for, N, and tire it for h seconds."""
     if p.strongest == 0.0:
