@@ -71,9 +71,14 @@ def _bend(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _stiffening(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Saturate the bend; a rig that is held to be rigid bends first."""
+    """Saturate the bend; a rig that is held to be rigid bends first.
+
+    At full force K·F falls short by about size²/3; K itself is off by no more, or where the limit is
+    far off a trial would be of a plain bend.
+    """
     nominal = clean.loader.bend
-    bend = nominal * (0.8 + 0.4 * draw.u[0]) if nominal > 0.0 else 1e-4 * size
+    off = (draw.u[0] - 0.5) * min(0.4, 0.6 * size**2)
+    bend = nominal * (1.0 + off) if nominal > 0.0 else 1e-4 * size
     bent = bend * clean.peak("column_force_N")
     limit = bent / (size if nominal > 0.0 else 0.8 + 1.2 * draw.u[1])
     twin.set(bend=bend, bend_limit=limit)

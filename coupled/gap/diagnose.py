@@ -16,11 +16,10 @@ import numpy as np
 
 from coupled.channels import ControlName
 from coupled.errors import InputError
+from coupled.gap.air import can_tell_air, spread_of_air
 from coupled.gap.airframe import (
     NEEDS,
     airframe_outputs,
-    can_tell_air,
-    spread_of_air,
     surface_points,
     trim_speed,
 )

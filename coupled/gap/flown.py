@@ -14,7 +14,7 @@ from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.pilot import Action, Pilot
 from coupled.flight.scenario import Bench, RunFile, Scenario
-from coupled.gap.airframe import vertical_air
+from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Control, Rig
@@ -85,10 +85,13 @@ def closed_loop(
     left: dict[str, dict[str, float]] = {name: {} for name in names}
     for when, rig in (("before", nominal), ("after", improved)):
         gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
-        air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
+        told_air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
+        air = None if told_air is None else told_air.speed
         quiet = rig.model_copy(update={"noise": {}})
         try:
-            flown = fly_force(quiet, control, smoothed(record[force]), told, air)
+            flown = fly_force(
+                quiet, control, smoothed(record[force]), told, None if air is None else air.speed
+            )
         except InputError:
             return None
         rows = min(len(flown), len(record))

@@ -2,15 +2,17 @@
 
 A stage driven by a noisy input answers to noise that the rig never felt, and a fit then
 mistakes the missing answer for more inertia, or a lag (errors in variables). The inputs are
-smooth on the scale of a frame, so the Whittaker smoother with third differences,
+smooth on the scale of a frame, so the Whittaker smoother with third differences (n = 3),
 
-    H(ω) = 1/(1 + λ·(2·sin(ω/2))⁶),
+    H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
 takes the noise off; λ is chosen by generalised cross-validation (Craven and Wahba, 1979), which
 leaves sharp inputs sharp.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,22 +27,52 @@ def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
     return np.asarray(CubicSpline(frames, signal).derivative()(frames) * frame_rate_Hz)
 
 
+@dataclass(frozen=True)
+class Smoother:
+    """A Whittaker smoother, its strength found by cross-validation on one signal."""
+
+    gain: Floats  # H at each frequency of the lengthened signal
+    reach: int  # frames by which a signal is lengthened at either end
+
+    @classmethod
+    def of(cls, signal: Floats, order: int = 3) -> Smoother:
+        """Return the one that suits a signal, with differences of this order."""
+        reach = min(len(signal) - 1, 200)
+        long = _lengthened(signal, reach)
+        sharpness = (2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))) ** (2 * order)
+        power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2
+        best, gain = np.inf, np.ones_like(power)
+        for strength in np.logspace(-3, 12, 61):
+            passed = 1.0 / (1.0 + strength * sharpness)
+            score = np.mean((1.0 - passed) ** 2 * power) / np.mean(1.0 - passed) ** 2
+            if score < best:
+                best, gain = score, passed
+        return cls(gain, reach)
+
+    def smooth(self, signal: Floats) -> Floats:
+        """Return a signal of the same length without its white noise; zero phase."""
+        long = _lengthened(signal, self.reach)
+        drift = np.linspace(long[0], long[-1], len(long))
+        out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
+        return np.asarray(out[self.reach : self.reach + len(signal)])
+
+    def wiener_error(self, level: float, frames: int, rng: np.random.Generator) -> Floats:
+        """Return a realisation of what is wrong with a signal that this smoother is Wiener's for.
+
+        `level` is the rms of the white noise. Noise passed and signal lost have the spectrum H·S_n.
+        """
+        hiss = rng.normal(0.0, level, frames + 2 * self.reach)
+        out = np.fft.irfft(np.fft.rfft(hiss) * np.sqrt(self.gain), len(hiss))
+        return np.asarray(out[self.reach : self.reach + frames])
+
+
 def smoothed(signal: Floats) -> Floats:
     """Return the signal without its white noise, same shape; zero phase."""
-    # Reflected about its ends, so that the transform sees neither jump nor kink there.
-    reach = min(len(signal) - 1, 200)
+    return Smoother.of(signal).smooth(signal)
+
+
+def _lengthened(signal: Floats, reach: int) -> Floats:
+    """Return the signal reflected about its ends, where the transform then sees no jump or kink."""
     before = 2.0 * signal[0] - signal[reach:0:-1]
     after = 2.0 * signal[-1] - signal[-2 : -reach - 2 : -1]
-    long = np.concatenate((before, signal, after))
-    drift = np.linspace(long[0], long[-1], len(long))
-    spectrum = np.fft.rfft(long - drift)
-    sharpness = (2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))) ** 6
-    power = np.abs(spectrum) ** 2
-    best, gain = np.inf, np.ones_like(power)
-    for strength in np.logspace(-3, 12, 61):
-        passed = 1.0 / (1.0 + strength * sharpness)
-        score = np.mean((1.0 - passed) ** 2 * power) / np.mean(1.0 - passed) ** 2
-        if score < best:
-            best, gain = score, passed
-    out = drift + np.fft.irfft(spectrum * gain, len(long))
-    return np.asarray(out[reach : reach + len(signal)])
+    return np.concatenate((before, signal, after))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.gap.airframe import can_tell_air
+from coupled.gap.air import can_tell_air
 from coupled.gap.choose import LEAST_GAIN, RIVAL, Step
 from coupled.gap.effects import EFFECTS
 from coupled.gap.fit import shows_in

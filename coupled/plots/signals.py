@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupled.channels import channel, unit_of
-from coupled.gap.airframe import surface_points, vertical_air
+from coupled.gap.air import vertical_air
+from coupled.gap.airframe import surface_points
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.stages import Reader
@@ -172,7 +173,7 @@ def _air(scene: Scene, rig: Rig | None) -> Floats:
     found = vertical_air(scene.reader.record, 1.0 / scene.frame_rate)
     if found is None:
         raise KeyError("altitude_m")
-    return found
+    return found.speed
 
 
 @dataclass(frozen=True)
