@@ -73,8 +73,8 @@ def _bend(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 def _stiffening(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     """Saturate the bend; a rig that is held to be rigid bends first.
 
-    At full force K·F falls short by about size²/3; K itself is off by no more, or where the limit is
-    far off a trial would be of a plain bend.
+    At full force K·F falls short by about size²/3; K itself is off by no more, or with a far limit
+    a trial would be of a plain bend.
     """
     nominal = clean.loader.bend
     off = (draw.u[0] - 0.5) * min(0.4, 0.6 * size**2)

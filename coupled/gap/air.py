@@ -6,8 +6,8 @@ with ḣ from the load factor, held to the altitude. The model is then flown thr
 gust is believed where the *pitch rate* follows it, which had no part in finding it.
 
 The noise in w is white, that of turbulence falls as 1/ω²: the smoother is Whittaker's with first
-differences, which is Wiener's for such a signal, H = S_w/(S_w + S_n). What is wrong with its outcome,
-noise passed and air lost, has the spectrum H·S_n then, so it is known without the air.
+differences, which is Wiener's for such a signal, H = S_w/(S_w + S_n). What is wrong with its
+outcome, noise passed and air lost, has the spectrum H·S_n then, and is known without the air.
 """
 
 from __future__ import annotations
