@@ -89,9 +89,7 @@ def closed_loop(
         air = None if told_air is None else told_air.speed
         quiet = rig.model_copy(update={"noise": {}})
         try:
-            flown = fly_force(
-                quiet, control, smoothed(record[force]), told, None if air is None else air.speed
-            )
+            flown = fly_force(quiet, control, smoothed(record[force]), told, air)
         except InputError:
             return None
         rows = min(len(flown), len(record))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from coupled.channels import ControlName, channel
 from coupled.gap.output import Output, Predict, white
-from coupled.gap.smooth import rate_of, smoothed
+from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
@@ -38,7 +38,6 @@ from coupled.rig.replay import (
 )
 
 Floats = NDArray[np.float64]
-ROUGH = 0.25
 SHARED = 0.5  # of q̄'s noise in G_T, from which the host is taken to have made it of q̄ as recorded
 NEUTRAL = 8.0  # of a channel's noise: so near to neutral its side is not sure
 ROUNDING = 1e-6  # of a channel's span
@@ -135,13 +134,10 @@ class Reader:
         return Output(stage, name, measured, predict, floor, rate, self.number)
 
     def _calmed(self, signal: Floats, k: int, level: float) -> Floats:
-        """Return a signal with a try's noise, smoothed; and a share of it as it came.
-
-        The smoother's own error on a signal that is not quite smooth shows in no try; the
-        share of raw noise stands for it.
-        """
-        noisy = signal + np.random.default_rng([41, k]).normal(0.0, level, len(signal))
-        return smoothed(noisy) + ROUGH * (noisy - signal)
+        """Return a smoothed signal with a try's error: of noise passed, and of signal lost."""
+        rng = np.random.default_rng([41, k])
+        raw = signal + rng.normal(0.0, level, len(signal))
+        return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
