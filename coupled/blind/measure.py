@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.airframe import airframe_outputs
 from coupled.gap.effects import BY_NAME
 from coupled.gap.fit import fit
 from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 

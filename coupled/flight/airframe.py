@@ -124,7 +124,7 @@ class JSBSimAirframe:
         air_m_per_s: Iterable[float] | None = None,
     ) -> None:
         self._file, self._record_file = file, record_file
-        self._flight = flight
+        self._flight, self._controls = flight, tuple(controls)
         self._fdm = self._load(models, frame_s)
         self._trim()
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
@@ -264,16 +264,19 @@ class JSBSimAirframe:
         up, down, forth, back = found
         return (up - down) / 0.04, (forth - back) / 0.04
 
-    def surface_map(self) -> tuple[Floats, Floats]:
-        """Return commands about trim, and where the elevator stands for each, rad.
+    def surface_map(self, surface: str = "elevator_rad") -> tuple[Floats, Floats]:
+        """Return commands about trim, and where a surface stands for each, rad.
 
         Spends this aircraft: it is flown through all of them, a frame each.
         """
         commands = np.linspace(-1.5, 1.5, 601)
         positions = np.empty_like(commands)
-        for i, command in enumerate(commands):
-            self.step((float(command), 0.0, 0.0))
-            positions[i] = self.motion()[ELEVATOR]
+        at = motion_channels(self._controls, flown=True).index(surface)
+        moved = [f"{SURFACES[control]}_rad" == surface for control in self._controls]
+        first, second, third = (*map(float, moved), 0.0, 0.0)[:3]
+        for i, command in enumerate(commands.tolist()):
+            self.step((first * command, second * command, third * command))
+            positions[i] = self.motion()[at]
         return commands, positions
 
     def set_gust(self, up_m_per_s: float) -> None:

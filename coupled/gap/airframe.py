@@ -1,10 +1,9 @@
-"""The airframe's residuals: the JSBSim model, driven from trim by the measured surface.
+"""The airframe's residuals: the JSBSim model, driven from trim by the measured surfaces.
 
-The surface's position is taken back to the command that the model's own map needs for it, and
-the model is flown by that, open loop. Pitch rate, angle of attack and load factor are compared:
-they hold up, since what they owe to the elevator fades within seconds; attitude, speed and
-height integrate every small error and are left to the kinematics.
-How the air moved over them, `air` tells.
+The surfaces' positions are taken back to commands (`surfaces`), and the model flown by those, open
+loop. The rates, angle of attack, sideslip and load factor are compared: they hold up, since
+what they owe to the surfaces fades within seconds; attitude, speed and height integrate every small
+error and are left to the kinematics. How the air moved over them, `air` tells.
 """
 
 from __future__ import annotations
@@ -15,95 +14,105 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import LONGITUDINAL
+from coupled.channels import motion_channels
 from coupled.flight.airframe import SPEED, JSBSimAirframe
-from coupled.flight.altered import UNALTERED
-from coupled.gap.air import LOAD, Air, vertical_air
-from coupled.gap.output import Output, white
-from coupled.gap.smooth import smoothed
+from coupled.gap.air import Air, vertical_air
+from coupled.gap.output import Output, spread, white
+from coupled.gap.surfaces import commands, surface_channel
 from coupled.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight, Rig
 
 Floats = NDArray[np.float64]
-RATE, ALPHA = "pitch_rate_rad_per_s", "alpha_rad"
-COMPARED = (RATE, ALPHA, LOAD)
-NEEDS = ("elevator_rad", RATE)
+RATE = "pitch_rate_rad_per_s"
+COMPARED = (
+    RATE,
+    "alpha_rad",
+    "load_factor",
+    "roll_rate_rad_per_s",
+    "yaw_rate_rad_per_s",
+    "sideslip_rad",
+)
+KNOWN = 1e-4  # share of its span to which a channel can be replayed by measured surfaces
 _KEPT = 4  # flights remembered
 
 
 @dataclass
 class Model:
-    """The aircraft of one record, flown by its measured surface; remembers its last flights."""
+    """The aircraft of one record, flown by its surfaces; remembers its last flights."""
 
     rig: Rig
-    elevator: Floats
-    points: tuple[Floats, Floats]
+    told: Floats  # commands about trim, shape (frames, 3)
+    compared: tuple[str, ...]
     air: Air | None
     _flown: list[tuple[Flight, Floats]] = field(default_factory=list)
 
     def motion(self, rig: Rig) -> Floats:
-        """Return the compared channels as `rig` has them, shape (frames, 3)."""
+        """Return the compared channels as `rig` has them, shape (frames, channels)."""
         flight = rig.flight
         assert flight is not None
         for known, flown in self._flown:
             if known == flight:
                 return flown
-        flown = self.fly(flight, self.elevator)
+        flown = self.fly(flight, self.told)
         self._flown[:] = [*self._flown[1 - _KEPT :], (flight, flown)]
         return flown
 
-    def fly(self, flight: Flight, elevator: Floats, astray: bool = False) -> Floats:
-        """Return the motion while the elevator stands as given, rad.
+    def fly(self, flight: Flight, told: Floats, astray: bool = False) -> Floats:
+        """Return the motion that the surfaces' commands make.
 
         `astray` adds to the air what is wrong with it.
         """
-        commands, positions = self.points
-        order = np.argsort(positions)
-        wanted = np.interp(elevator, positions[order], commands[order])
         still = flight.model_copy(update={"gust_rms": 0.0})
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = moves + self.air.error if astray else moves
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 tells of the air over the frame before
-        frame_s = 1.0 / self.rig.frame_rate
-        airframe = JSBSimAirframe(still, frame_s, ["column"], [aircraft_folder()], air_m_per_s=air)
-        at = [LONGITUDINAL.index(name) for name in COMPARED]
-        motion = np.full((len(elevator), len(COMPARED)), np.nan)
-        for k in range(len(elevator)):
+        frame_s, controls = 1.0 / self.rig.frame_rate, list(self.rig.controls)
+        airframe = JSBSimAirframe(still, frame_s, controls, [aircraft_folder()], air_m_per_s=air)
+        every = motion_channels(controls, flown=True)
+        at = [every.index(name) for name in self.compared]
+        motion = np.full((len(told), len(at)), np.nan)
+        rows = [(a, b, c) for a, b, c in told.tolist()]
+        for k in range(len(rows)):
             now = airframe.motion()
             motion[k] = [now[i] for i in at]
             if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > 20.0:
                 motion[k:] = motion[max(k - 1, 0)]
                 break
             # Row k + 1 is the answer to the command of row k.
-            airframe.step((float(wanted[min(k + 1, len(wanted) - 1)]), 0.0, 0.0))
+            airframe.step(rows[min(k + 1, len(rows) - 1)])
         return motion
+
+
+def needs(rig: Rig) -> tuple[str, ...]:
+    """Return the channels without which the airframe cannot be judged."""
+    return (RATE, surface_channel("column")) if "column" in rig.controls else (RATE,)
 
 
 def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
     """Return the airframe's outputs; none for a bench or where its channels lack."""
-    if rig.flight is None or any(name not in record for name in NEEDS):
+    if rig.flight is None or any(name not in record for name in needs(rig)):
         return []
-    elevator = record["elevator_rad"]
-    level, calm = white(elevator), smoothed(elevator)
-    model = Model(rig, calm, surface_points(rig), vertical_air(record, 1.0 / rig.frame_rate))
-    flown = model.motion(rig)
+    known = motion_channels(list(rig.controls), flown=True)
+    compared = tuple(n for n in COMPARED if n in known and n in record and np.ptp(record[n]) > 0.0)
     rng = np.random.default_rng(43)
-    hiss = smoothed(calm + rng.normal(0.0, level, len(calm)))
-    carried = np.sqrt(np.mean((model.fly(rig.flight, hiss, astray=True) - flown) ** 2, axis=0))
+    told, wrong = commands(rig, record, rng)
+    model = Model(rig, told, compared, vertical_air(record, 1.0 / rig.frame_rate))
+    flown = model.motion(rig)
+    carried = model.fly(rig.flight, wrong, astray=True) - flown
     outputs = []
-    for i, name in enumerate(COMPARED):
-        if name not in record or np.ptp(record[name]) == 0.0:
-            continue
-        floor = float(np.hypot(white(record[name]), carried[i]))
+    for i, name in enumerate(compared):
+        own = float(np.hypot(white(record[name]), KNOWN * np.ptp(record[name])))
+        floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
+        loose = spread([carried[:, i]], own)
 
         def predict(changed: Rig, i: int = i) -> Floats:
             return np.asarray(model.motion(changed)[:, i])
 
         outputs.append(
-            Output("airframe", name, record[name], predict, floor, rig.frame_rate, number)
+            Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)
         )
     return outputs
 
@@ -114,11 +123,3 @@ def trim_speed(rig: Rig) -> float:
     frame_s = 1.0 / rig.frame_rate
     airframe = JSBSimAirframe(rig.flight, frame_s, ["column"], [aircraft_folder()])
     return airframe.motion()[SPEED]
-
-
-def surface_points(rig: Rig) -> tuple[Floats, Floats]:
-    """Return commands about trim, and the elevator's positions that the model gives them, rad."""
-    assert rig.flight is not None
-    flight = rig.flight.model_copy(update=UNALTERED)
-    frame_s = 1.0 / rig.frame_rate
-    return JSBSimAirframe(flight, frame_s, ["column"], [aircraft_folder()]).surface_map()

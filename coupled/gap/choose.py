@@ -17,11 +17,10 @@ from coupled.channels import ControlName
 from coupled.gap.case import Case, Tell
 from coupled.gap.effects import EFFECTS, TOLERANCE, Effect
 from coupled.gap.fit import Fit, shows_in
-from coupled.gap.output import Output, memory, stage_gaps
+from coupled.gap.output import Output, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
 from coupled.rig.parameters import Rig
 
-CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
 LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
@@ -148,13 +147,15 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
     physics of a right effect may leave: no law of dry friction is exact.
     """
     best = ranked[0]
-    first = stage_gaps(case.outputs, settled.rig)
+    first, limits = stage_gaps(case.outputs, settled.rig), stage_limits(case.outputs)
     for other in ranked[1:]:
         if len(other.effect.free) >= len(best.effect.free):
             continue
         left = stage_gaps(case.outputs, other.fit.rig)
         closes = all(
-            left[stage] <= bar(first[stage]) for stage in shows_in(other.effect) if stage in left
+            left[stage] <= bar(first[stage], limits[stage])
+            for stage in shows_in(other.effect)
+            if stage in left
         )
         doubtful = closes and best.effect.stage == "loader"
         margin = max(RIVAL, SIMPLER * ranked[0].gain) if doubtful else RIVAL
@@ -163,16 +164,20 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
     return best
 
 
-def bar(before: float) -> float:
-    """Return the gap up to which a stage is explained, by its gap without any effect."""
-    return max(CLEAR, 1.0 + MISMATCH * (before - 1.0))
+def bar(before: float, limit: float) -> float:
+    """Return the gap up to which a stage is explained, by its gap without any effect.
+
+    `limit` is the gap up to which noise may be all there is.
+    """
+    return max(limit, 1.0 + MISMATCH * (before - 1.0))
 
 
 def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
     """Return the candidates by their held-out gain over the current effects, best first."""
     first = stage_gaps(case.outputs, settled.rig)
     now = case.gaps(current.rig) if current.effects else first
-    guilty = {stage for stage, gap in now.items() if gap > bar(first[stage])}
+    limits = stage_limits(case.outputs)
+    guilty = {stage for stage, gap in now.items() if gap > bar(first[stage], limits[stage])}
     candidates = [
         effect
         for effect in library

@@ -17,20 +17,16 @@ import numpy as np
 from coupled.channels import ControlName
 from coupled.errors import InputError
 from coupled.gap.air import can_tell_air, spread_of_air
-from coupled.gap.airframe import (
-    NEEDS,
-    airframe_outputs,
-    surface_points,
-    trim_speed,
-)
+from coupled.gap.airframe import airframe_outputs, needs, trim_speed
 from coupled.gap.case import Case, Tell
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.choose import CLEAR, Choice, bar, search
+from coupled.gap.choose import Choice, bar, search
 from coupled.gap.effects import EFFECTS, STAGES, parameter_name
-from coupled.gap.output import Output, stage_gaps
+from coupled.gap.output import CLEAR, Output, stage_gaps, stage_limits
 from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
-from coupled.gap.where import where
+from coupled.gap.surfaces import surface_points
+from coupled.gap.where import remains, where
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 
@@ -100,8 +96,7 @@ def _outputs(readers: Sequence[Reader]) -> list[Output]:
     found: list[Output] = []
     for reader in readers:
         found += reader.outputs()
-        if reader.control == "column":
-            found += airframe_outputs(reader.rig, reader.record, reader.number)
+        found += airframe_outputs(reader.rig, reader.record, reader.number)
     return found
 
 
@@ -124,20 +119,22 @@ def _stages(
     lacking = _lacking(readers)
     before = _joined(stage_gaps(outputs, readers[0].rig))
     settled = _joined(stage_gaps(outputs, choice.settled.rig))
-    after = _joined(last)
+    after, limits = _joined(last), _joined(stage_limits(outputs))
     blamed = {step.effect.stage for step in choice.steps}
     found: dict[str, Any] = {}
     for stage in STAGES:
         if stage in before and stage not in lacking:
-            guilty = stage in blamed or after[stage] > bar(settled[stage])
+            guilty = stage in blamed or after[stage] > bar(settled[stage], limits[stage])
             found[stage] = {"gap": before[stage], "settled": settled[stage]}
+            found[stage] |= {"limit": limits[stage]}
             found[stage] |= {"left": after[stage], "guilty": guilty}
         elif stage in lacking:
             found[stage] = {"judged": False, "missing": lacking[stage]}
         elif stage == "schedule":
             found[stage] = {"judged": False, "missing": [], "why": "constant gradient"}
         elif stage == "surface" and readers[0].rig.flight is not None:
-            found[stage] = {"judged": False, "missing": [], "why": "no elevator"}
+            why = "the aircraft moves it, too"
+            found[stage] = {"judged": False, "missing": [], "why": why}
     scale = [before[stage] for stage in ("loader", "linkage") if stage in before]
     if scale:
         found["sensing"] = {"gap": max(scale) if "sensing" in blamed else 1.0}
@@ -146,10 +143,8 @@ def _stages(
         gap = max(compensation_gap(r) for r in readers if "compensation" not in r.missing())
         found["compensation"] = {"gap": gap, "guilty": gap > CLEAR}
     if readers[0].rig.flight is not None and "airframe" not in before:
-        missing = [name for name in NEEDS if name not in readers[0].record]
+        missing = [name for name in needs(readers[0].rig) if name not in readers[0].record]
         found["airframe"] = {"judged": False, "missing": missing}
-        if not missing:
-            found["airframe"]["why"] = "no elevator"
     return found
 
 
@@ -164,6 +159,10 @@ def _tell_where(
             widest = max(ours, key=lambda o: o.gap(choice.settled.rig))
             reader = readers[widest.record]
             found["where"] = where(widest, choice.settled.rig, reader.record, reader.control)
+            if _left(found):
+                most = max(ours, key=lambda o: o.gap(choice.fit.rig))
+                told = readers[most.record].record
+                found["remains"] = remains(most, choice.fit.rig, told, reader.control)
 
 
 def _joined(gaps: Mapping[str, float]) -> dict[str, float]:
@@ -177,7 +176,7 @@ def _joined(gaps: Mapping[str, float]) -> dict[str, float]:
 
 def _left(found: Mapping[str, Any]) -> bool:
     """Tell whether a stage still holds structure that the effects found do not explain."""
-    return "left" in found and found["left"] > bar(found["settled"])
+    return "left" in found and found["left"] > bar(found["settled"], found["limit"])
 
 
 def _verdict(choice: Choice, stages: dict[str, Any]) -> str:

@@ -16,12 +16,14 @@ from coupled.flight.pilot import Action, Pilot
 from coupled.flight.scenario import Bench, RunFile, Scenario
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
+from coupled.gap.surfaces import surface_channel
 from coupled.record import Record
 from coupled.rig.parameters import Control, Rig
 
 Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
-MOTION = ("elevator_rad", "pitch_rate_rad_per_s", "load_factor", "pitch_rad")
+MOTION = ("pitch_rate_rad_per_s", "load_factor", "pitch_rad")
+LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")
 TOLD_EVERY = 12  # frames between the points at which a bench is told q̄
 
 
@@ -40,29 +42,32 @@ class Recorded(Pilot):
 
 def fly_force(
     rig: Rig,
-    control: ControlName,
-    force_N: Floats,
+    forces_N: Mapping[ControlName, Floats],
     pressure_Pa: Floats | None = None,
     air_m_per_s: Floats | None = None,
     seed: int = 0,
 ) -> Record:
-    """Return the record of a rig under a force given at each frame, shape (frames,).
+    """Return the record of a rig under forces given at each frame, shape (frames,) each.
 
     `pressure_Pa` is what a bench is told, at each frame; `air_m_per_s` how fast the air rises.
     """
-    times = np.arange(len(force_N)) / rig.frame_rate
-    pilot = Recorded(times=times.tolist(), forces=force_N.tolist())
+    frames = len(next(iter(forces_N.values())))
+    times = np.arange(frames) / rig.frame_rate
+    pilots: dict[ControlName, Pilot] = {
+        control: Recorded(times=times.tolist(), forces=force.tolist())
+        for control, force in forces_N.items()
+    }
     bench = None
     if rig.flight is None:
         assert pressure_Pa is not None
         told = slice(None, None, TOLD_EVERY)
         bench = Bench(time=times[told].tolist(), dynamic_pressure=pressure_Pa[told].tolist())
-    duration = len(force_N) / rig.frame_rate
+    duration = frames / rig.frame_rate
     run = RunFile(
         name="again", card="again", rig="again", duration=duration, seed=seed, bench=bench
     )
     nowhere = Path()
-    scenario = Scenario(run, nowhere, rig, nowhere, {control: pilot}, "again")
+    scenario = Scenario(run, nowhere, rig, nowhere, pilots, "again")
     air = None if air_m_per_s is None else air_m_per_s[1:].tolist()
     return fly(scenario, air_m_per_s=air)
 
@@ -75,11 +80,15 @@ def closed_loop(
     rms differences by channel, in its unit: {channel: {"before", "after"}}. None where the
     record lacks the force, or a bench's q̄, or where the rig cannot be flown so.
     """
-    force, pressure = channel(control, "force"), "dynamic_pressure_Pa"
-    if force not in record or (nominal.flight is None and pressure not in record):
+    pressure = "dynamic_pressure_Pa"
+    forces = {name: channel(name, "force") for name in nominal.controls}
+    pulled = {name: smoothed(record[force]) for name, force in forces.items() if force in record}
+    if control not in pulled or (nominal.flight is None and pressure not in record):
         return None
     names = [channel(control, quantity) for quantity in COMPARED]
-    motion = MOTION if nominal.flight is not None else ()
+    surface = surface_channel(control)
+    motion = [surface, *MOTION, *(() if control == "column" else LATERAL)]
+    motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in record]
     told = smoothed(record[pressure]) if pressure in record else None
     left: dict[str, dict[str, float]] = {name: {} for name in names}
@@ -89,7 +98,7 @@ def closed_loop(
         air = None if told_air is None else told_air.speed
         quiet = rig.model_copy(update={"noise": {}})
         try:
-            flown = fly_force(quiet, control, smoothed(record[force]), told, air)
+            flown = fly_force(quiet, pulled, told, air)
         except InputError:
             return None
         rows = min(len(flown), len(record))

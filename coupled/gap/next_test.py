@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from coupled.channels import ControlName, channel, noisy_channels
 from coupled.errors import InputError
-from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.airframe import airframe_outputs
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice, ranked_by_gain
 from coupled.gap.effects import Effect
 from coupled.gap.flown import fly_force
 from coupled.gap.output import Output, white
 from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 
@@ -86,14 +87,14 @@ def _gain(
 ) -> float | None:
     """Return by how much the first set would beat the second on a record of the first."""
     try:
-        record = fly_force(real, control, test.force_N, test.pressure_Pa, seed=5)
+        record = fly_force(real, {control: test.force_N}, test.pressure_Pa, seed=5)
     except InputError:
         return None
     if record.manifest["ended_early"]:
         return None
     reader = Reader(test.rig, record, control, surface_points)
     outputs: list[Output] = reader.outputs()
-    if control == "column" and any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
+    if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
         outputs += airframe_outputs(test.rig, record)
     case = Case(test.rig, control, outputs)
     fits = [case.fit(effects, "fitted", start) for effects in pair]

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
 STRETCH_s = 2.5  # a stretch of the record, fitted or held out
+CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
+SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
 _KEPT = 4  # predictions remembered
 
 
@@ -22,8 +24,8 @@ _KEPT = 4  # predictions remembered
 class Output:
     """One measured output of a stage, and how a rig predicts it from the measured input.
 
-    `floor` is the rms that noise alone leaves, in the channel's unit. `record` numbers the
-    record that it is of.
+    `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
+    standard deviation from record to record. `record` numbers the record that it is of.
     """
 
     stage: str
@@ -33,6 +35,7 @@ class Output:
     floor: float
     frame_rate_Hz: float
     record: int = 0
+    spread: float = 0.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def residual(self, rig: Rig, part: Part = "all") -> Floats:
@@ -57,6 +60,11 @@ class Output:
             return np.ones(len(number), dtype=bool)
         return np.asarray(number % 2 == (0 if part == "fitted" else 1))
 
+    @property
+    def limit(self) -> float:
+        """The gap up to which noise may be all there is."""
+        return max(CLEAR, 1.0 + SIGMAS * self.spread)
+
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
         return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
@@ -65,6 +73,19 @@ class Output:
 def white(signal: Floats) -> float:
     """Return the white noise in a smooth signal, by its fourth differences (gain √70)."""
     return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+
+
+def spread(carried: Sequence[Floats], own: float) -> float:
+    """Return the relative standard deviation of noise's rms: `carried` of some tries, and white.
+
+    The mean square of N values of Gaussian noise varies by √(2·Σρ²/N) of itself (Bartlett), its
+    root by half of that. The less noise a stage and its smoother let pass, the fewer values count.
+    """
+    power = np.mean([np.abs(np.fft.rfft(x)) ** 2 for x in carried], axis=0) / len(carried[0])
+    crowded = 1.0 + 1.0 / len(carried)  # of the square of a periodogram, by how few are averaged
+    total = float(np.mean(power)) + own**2
+    square = float(np.mean(power**2)) / crowded + 2.0 * float(np.mean(power)) * own**2 + own**4
+    return float(np.sqrt(0.5 * square / total**2 / len(carried[0])))
 
 
 def memory(residual: Floats) -> float:
@@ -78,6 +99,14 @@ def memory(residual: Floats) -> float:
     negative = np.flatnonzero(correlation < 0.05)
     end = int(negative[0]) if negative.size else len(correlation)
     return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
+
+
+def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
+    """Return the gap of each stage up to which noise may be all there is."""
+    found: dict[str, float] = {}
+    for output in outputs:
+        found[output.stage] = max(found.get(output.stage, CLEAR), output.limit)
+    return found
 
 
 def stage_gaps(outputs: Sequence[Output], rig: Rig) -> dict[str, float]:

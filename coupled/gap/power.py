@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.channels import ControlName
-from coupled.gap.choose import CLEAR
 from coupled.gap.effects import (
     EFFECTS,
     SETTINGS,
@@ -99,7 +98,10 @@ def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
 def _signature(
     nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect, size: float
 ) -> float:
-    """Return the largest rms signature of an effect in an output, in floors, settings profiled."""
+    """Return the largest rms signature of an effect in an output, settings profiled.
+
+    Of what would lift a residual of noise alone to the gap from which its stage is guilty.
+    """
     rig = apply(nominal, control, [effect], _values(effect, size, nominal, control))
     largest = 0.0
     for output in outputs:
@@ -107,7 +109,8 @@ def _signature(
         basis = _settings(nominal, control, output, effect)
         if basis.size:
             change = change - basis @ np.linalg.lstsq(basis, change, rcond=None)[0]
-        largest = max(largest, float(np.sqrt(np.mean(change**2))))
+        wanted = math.sqrt(output.limit**2 - 1.0)
+        largest = max(largest, float(np.sqrt(np.mean(change**2))) / wanted)
     return largest
 
 
@@ -125,10 +128,9 @@ def _least(
     nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect
 ) -> dict[str, float] | None:
     """Return the parameters at which an effect just shows, or None where it never does."""
-    wanted = math.sqrt(CLEAR**2 - 1.0)
 
     def shows(size: float) -> bool:
-        return _signature(nominal, control, outputs, effect, size) >= wanted
+        return _signature(nominal, control, outputs, effect, size) >= 1.0
 
     if not effect.free:
         return {} if shows(1.0) else None

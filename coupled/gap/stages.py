@@ -4,7 +4,7 @@ The chain is cut at every measured signal, so that a fault upstream is inherited
 Inputs are smoothed first (`smooth`). A residual is divided by the channel's floor: its own
 white noise, told by fourth differences (gain √70), and the input's carried through the stage.
 
-    schedule      q̄ → G_T                       surface   δ̂, q̄ → elevator
+    schedule      q̄ → G_T                       surface   δ̂, q̄ → its position
     loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
     multiplier    δc, G_T → F_mod (part of the loader)
     linkage       δc, F → δ
@@ -17,13 +17,13 @@ multiplier's and the linkage's residuals at once, so it is judged on all three.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName, channel
-from coupled.gap.output import Output, Predict, white
+from coupled.channels import SURFACES, ControlName, channel
+from coupled.gap.output import Output, Predict, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
@@ -41,6 +41,7 @@ Floats = NDArray[np.float64]
 SHARED = 0.5  # of q̄'s noise in G_T, from which the host is taken to have made it of q̄ as recorded
 NEUTRAL = 8.0  # of a channel's noise: so near to neutral its side is not sure
 ROUNDING = 1e-6  # of a channel's span
+KNOWN = 1e-4  # share of its span to which a surface's map tells where it stands
 SLOW_s = 5.0  # a loader whose own period is longer drifts, and is replayed in short windows
 WINDOW_s = 0.25
 TRIES = 4  # realisations of the input's noise, to carry it through a stage
@@ -53,8 +54,14 @@ class Reader:
     rig: Rig
     record: Record
     control: ControlName
-    surface_points: Callable[[Rig], tuple[Floats, Floats]]  # the model's own command map
+    # The map of a control's commands to its surface's positions; None where others move it, too.
+    surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
     number: int = 0  # of the record, where there are several
+
+    @property
+    def surface(self) -> str:
+        """The channel of the control's surface."""
+        return f"{SURFACES[self.control]}_rad"
 
     def signal(self, quantity: str) -> Floats:
         """Return a control's channel."""
@@ -69,7 +76,7 @@ class Reader:
             + self._gradient_from(),
             "linkage": [self._name(q) for q in ("computed", "force", "deflection")],
             "compensation": [self._name(q) for q in ("computed", "force", "estimate")],
-            "surface": [self._name("estimate"), "dynamic_pressure_Pa", "elevator_rad"],
+            "surface": [self._name("estimate"), "dynamic_pressure_Pa", self.surface],
         }
         lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         return {stage: names for stage, names in lacking.items() if names}
@@ -123,9 +130,9 @@ class Reader:
         """Return an output whose floor is its own noise and its input's, carried through."""
         base = predict(self.rig)
         tries = [noisy(self.rig, k) - base for k in range(TRIES)]
-        carried = float(np.sqrt(np.mean(np.square(tries)))) if tries else 0.0
-        floor = float(np.hypot(own, carried))
-        return self._output(stage, name, measured, predict, floor)
+        floor = float(np.hypot(own, np.sqrt(np.mean(np.square(tries)))))
+        made = self._output(stage, name, measured, predict, floor)
+        return replace(made, spread=spread(tries, own)) if floor > 0.0 else made
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
@@ -251,12 +258,13 @@ class Reader:
         return [self._made("linkage", name, measured, predict, noisy, white(measured))]
 
     def _surface(self) -> list[Output]:
-        if self.control != "column" or self.rig.flight is None:
+        points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)
+        if points is None:
             return []
-        believed, measured = self.signal("estimate"), self.record["elevator_rad"]
+        commands_at, positions = points
+        believed, measured = self.signal("estimate"), self.record[self.surface]
         pressure = self.record["dynamic_pressure_Pa"]
         command = replay_surface(self.rig, self.control, believed, pressure)
-        commands_at, positions = self.surface_points(self.rig)
 
         def position(wanted: Floats) -> Floats:
             return np.interp(wanted, commands_at, positions)
@@ -268,7 +276,8 @@ class Reader:
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
         left = measured - position(np.concatenate(([0.0], command[:-1])))
-        return [self._output("surface", "elevator_rad", measured, predict, white(left))]
+        floor = float(np.hypot(white(left), KNOWN * np.ptp(measured)))
+        return [self._output("surface", self.surface, measured, predict, floor)]
 
 
 def compensation_gap(reader: Reader) -> float:

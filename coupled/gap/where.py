@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from coupled.channels import ControlName, channel, unit_of
+from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.record import Record
@@ -42,6 +43,21 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> dic
     if pressure in record and np.ptp(record[pressure]) > 0.0:
         found["by_pressure"] = _by(left, smoothed(record[pressure]))
     return found
+
+
+def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> dict[str, Any]:
+    """Return what the effects found leave of an output: its gap, what that follows, its frequency.
+
+    `free_share` is what a model free in form could still take of it, from the stage's own signals.
+    """
+    left = output.residual(improved)
+    known = signals(output.stage, record, control, output.frame_rate_Hz)
+    return {
+        "gap": output.gap(improved),
+        "follows": _follows(output, left, record, control),
+        "peak_Hz": _peak(left, output.frame_rate_Hz),
+        "free_share": free_share(output, left, known.values()),
+    }
 
 
 def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:
@@ -113,12 +129,15 @@ def _in_time(left: Floats, time_s: Floats, rate_Hz: float) -> dict[str, Any]:
     count = len(left) // window
     rms = np.sqrt(np.mean(left[: count * window].reshape(count, window) ** 2, axis=1))
     loud = rms > LOUD
-    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(8.0 * rate_Hz)))
-    peak = float(frequency[1:][np.argmax(density[1:])])
-    found: dict[str, Any] = {"peak_Hz": peak, "loud": float(np.mean(loud))}
+    found: dict[str, Any] = {"peak_Hz": _peak(left, rate_Hz), "loud": float(np.mean(loud))}
     if loud.any():
         found["onset_s"] = float(time_s[int(np.argmax(loud)) * window])
     return found
+
+
+def _peak(left: Floats, rate_Hz: float) -> float:
+    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(8.0 * rate_Hz)))
+    return float(frequency[1:][np.argmax(density[1:])])
 
 
 def _by(left: Floats, pressure: Floats) -> list[dict[str, float]]:

@@ -59,11 +59,23 @@ def _since(diagnosis: dict[str, Any]) -> str:
             continue
         if found.get("onset_s", 0.0) > 5.0:
             said.append(f"In the {stage} it is first seen at {found['onset_s']:.1f} s.")
-        if diagnosis["verdict"] == "unexplained" and found["follows"]:
-            most = found["follows"][0]
-            share = f"{100 * most['share']:.0f} %"
-            said.append(f"In the {stage}, {share} of it follows {_signal(most['signal'])}.")
+        left = diagnosis["stages"][stage].get("remains")
+        if left is not None:
+            said.append(_remains(stage, left))
     return " ".join(said)
+
+
+def _remains(stage: str, left: dict[str, Any]) -> str:
+    """Return what an unexplained stage's residual looks like, effects found taken off."""
+    follows = ""
+    if left["follows"]:
+        most = left["follows"][0]
+        follows = f"{100 * most['share']:.0f} % of it follows {_signal(most['signal'])}, and "
+    share = round(100 * left["free_share"])
+    takes = f"{share} % is some function of the stage's own signals"
+    if share < 5:
+        takes = "none of it is a function of the stage's own signals: noise, or another input"
+    return f"What remains in the {stage} is {left['gap']:.3g} floors: {follows}{takes}."
 
 
 def _signal(name: str) -> str:

@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from coupled.gap.choose import CLEAR
 from coupled.gap.effects import STAGES
-from coupled.gap.output import Output
+from coupled.gap.output import CLEAR, Output
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, residual_shown, words
 

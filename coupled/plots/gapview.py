@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from coupled.channels import CONTROL_NAMES, channel
-from coupled.gap.airframe import surface_points
-from coupled.gap.choose import CLEAR, bar
+from coupled.gap.choose import bar
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.effects import SETTINGS, Effect, apply
 from coupled.gap.fit import shows_in
-from coupled.gap.output import Floats, Output, white
+from coupled.gap.output import CLEAR, Floats, Output, white
 from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
 from coupled.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import replay_compensation
@@ -132,8 +132,8 @@ class View:
 
     def threshold(self, stage: str) -> float:
         """Return the gap up to which a stage counts as explained."""
-        settled = self.stages.get(stage, {}).get("settled")
-        return CLEAR if settled is None else bar(settled)
+        found = self.stages.get(stage, {})
+        return bar(found["settled"], found["limit"]) if "limit" in found else CLEAR
 
     def suspects(self) -> list[Output]:
         """Return the outputs of guilty stages and of the effects found, widest gap first.

@@ -14,10 +14,10 @@ import numpy as np
 
 from coupled.channels import channel, unit_of
 from coupled.gap.air import vertical_air
-from coupled.gap.airframe import surface_points
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.stages import Reader
+from coupled.gap.surfaces import command_of, surface_channel, surface_points
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Loader, Rig
 from coupled.rig.replay import replay_product, replay_surface
@@ -144,11 +144,12 @@ def _servo_speed(scene: Scene, rig: Rig | None) -> Floats:
 
 def _answer(scene: Scene, rig: Rig | None) -> Floats:
     """Return the command that the surface's position answers to, % about trim, pull positive."""
-    commands, positions = surface_points(scene.base)
-    order = np.argsort(positions)
-    position = scene.raw("elevator_rad", rig)
-    sign = COMMAND_SIGN[scene.base.controls[scene.reader.control].surface]
-    return np.asarray(100.0 * sign * np.interp(position, positions[order], commands[order]))
+    control = scene.reader.control
+    position = scene.raw(surface_channel(control), rig)
+    sign = COMMAND_SIGN[scene.base.controls[control].surface]
+    points = surface_points(scene.base, control)
+    assert points is not None  # or its stage would not have been judged
+    return 100.0 * sign * command_of(position, points)
 
 
 def _wanted(scene: Scene) -> Floats:

@@ -13,13 +13,14 @@ import pytest
 from matplotlib.figure import Figure
 
 from coupled.channels import unit_of
-from coupled.gap.airframe import airframe_outputs, surface_points
+from coupled.gap.airframe import airframe_outputs
 from coupled.gap.choose import Candidate, Choice, Step
 from coupled.gap.diagnose import Diagnosis, diagnose
 from coupled.gap.effects import BY_NAME, EFFECTS, Effect, apply
 from coupled.gap.fit import Fit
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
 from coupled.plots.gaps import FIGURES, draw_diagnosis
 from coupled.plots.gapview import View, unit_shown, words
 from coupled.plots.saving import save

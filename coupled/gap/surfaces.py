@@ -1,0 +1,110 @@
+"""What the airframe's surfaces were told, taken back from where the record says that they stood.
+
+Each model has a map of its own from command to position, found by flying it. A surface that the
+aircraft moves itself (a yaw damper) stands where its motion wants it, too: what was commanded is
+then the host's own command, and the surface cannot be judged by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.channels import SURFACES, ControlName, channel, motion_channels
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import UNALTERED
+from coupled.gap.output import white
+from coupled.gap.smooth import Smoother, smoothed
+from coupled.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight, Rig
+from coupled.rig.replay import replay_surface
+
+Floats = NDArray[np.float64]
+Points = tuple[Floats, Floats]
+OWN_rad = 1e-4  # of a surface while the other controls move, from which the aircraft moves it
+SHAKE_s = 1.0  # for so long each of the others is held at
+SHAKE = 0.1  # of its travel
+
+
+def surface_channel(control: ControlName) -> str:
+    """Return the channel of the surface that a control moves."""
+    return f"{SURFACES[control]}_rad"
+
+
+def surface_points(rig: Rig, control: ControlName) -> Points | None:
+    """Return commands about trim, and a surface's positions that the model gives them, rad.
+
+    None where the aircraft moves the surface by laws of its own.
+    """
+    assert rig.flight is not None
+    plain = rig.flight.model_copy(update=UNALTERED)
+    return _points(plain.model_dump_json(), tuple(rig.controls), rig.frame_rate, control)
+
+
+@lru_cache(maxsize=64)
+def _points(
+    flight: str, controls: tuple[ControlName, ...], rate_Hz: float, control: ControlName
+) -> Points | None:
+    plain = Flight.model_validate_json(flight)
+
+    def model() -> JSBSimAirframe:
+        return JSBSimAirframe(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
+
+    if _moves_itself(model(), controls, rate_Hz, control):
+        return None
+    return model().surface_map(surface_channel(control))
+
+
+def _moves_itself(
+    airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
+) -> bool:
+    """Tell whether the aircraft moves a control's surface while the others are moved."""
+    at = motion_channels(controls, flown=True).index(surface_channel(control))
+    still, moved = airframe.motion()[at], 0.0
+    for i, other in enumerate(controls):
+        if other == control:
+            continue
+        for _ in range(round(SHAKE_s * rate_Hz)):
+            airframe.step((SHAKE * (i == 0), SHAKE * (i == 1), SHAKE * (i == 2)))
+            moved = max(moved, abs(airframe.motion()[at] - still))
+    return moved > OWN_rad
+
+
+def command_of(position: Floats, points: Points) -> Floats:
+    """Return the command about trim at which a surface stands so, same shape."""
+    commands, positions = points
+    order = np.argsort(positions)
+    return np.interp(position, positions[order], commands[order])
+
+
+def commands(rig: Rig, record: Record, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Return what the surfaces were told, shape (frames, 3), and the same with its error.
+
+    In the order of the rig's controls, about trim. Row k holds what row k answers to. A control
+    that the record knows nothing of is taken to have been left alone.
+    """
+    told = np.zeros((len(record), 3))
+    astray = np.zeros_like(told)
+    for i, control in enumerate(rig.controls):
+        name, points = surface_channel(control), surface_points(rig, control)
+        if name not in record or points is None:
+            told[:, i] = astray[:, i] = _asked(rig, record, control)
+            continue
+        position = record[name]
+        level, calm = white(position), smoothed(position)
+        error = Smoother.of(position).wiener_error(level, len(calm), rng)
+        told[:, i], astray[:, i] = command_of(calm, points), command_of(calm + error, points)
+    return told, astray
+
+
+def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
+    """Return the host's own command of a surface, none where the record holds no estimate."""
+    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
+    if name not in record or pressure not in record:
+        return np.zeros(len(record))
+    asked = replay_surface(rig, control, record[name], record[pressure])
+    return np.concatenate(([0.0], asked[:-1]))

@@ -1,0 +1,75 @@
+"""What noise leaves of a stage, and what a model free in form could take of the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.gap.flexible import free_share
+from coupled.gap.output import Output, spread
+from coupled.gap.smooth import Smoother
+
+Floats = NDArray[np.float64]
+RATE_Hz = 120.0
+FRAMES = 4800
+RNG = np.random.default_rng(5)
+HISS = RNG.normal(size=FRAMES)
+PLACE = np.convolve(np.cumsum(RNG.normal(size=FRAMES)), np.ones(60) / 600.0, "same")
+SPEED = np.gradient(PLACE) * RATE_Hz
+ELSEWHERE = np.convolve(RNG.normal(size=FRAMES), np.hanning(41), "same")
+OUTPUT = Output("loader", "place", PLACE, lambda rig: PLACE, 1.0, RATE_Hz)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        lambda: np.abs(PLACE),
+        lambda: np.sign(SPEED),
+        lambda: PLACE * SPEED,
+        lambda: np.tanh(2.0 * SPEED / np.std(SPEED)),
+    ],
+    ids=["bend", "sign", "product", "saturation"],
+)
+def test_a_function_of_the_stages_signals_is_taken(shape: Callable[[], Floats]) -> None:
+    made = shape() - np.mean(shape())
+    left = 2.0 * made / np.std(made) + HISS
+    most = 1.0 - float(HISS @ HISS) / float(left @ left)
+    took = free_share(OUTPUT, left, [PLACE, SPEED, np.sign(SPEED)])
+    assert 0.93 * most < took < 1.02 * most
+
+
+def test_neither_noise_nor_another_input_is_taken() -> None:
+    signals = [PLACE, SPEED, np.sign(SPEED)]
+    assert free_share(OUTPUT, HISS, signals) < 0.02
+    other = 2.0 * (ELSEWHERE - ELSEWHERE.mean()) / np.std(ELSEWHERE) + HISS
+    assert free_share(OUTPUT, other, signals) < 0.15
+
+
+def test_the_spread_of_noise_is_what_many_records_show() -> None:
+    rng, own = np.random.default_rng(3), 0.5
+
+    def carried() -> Floats:
+        slow = rng.normal(size=1200)
+        return 8.0 * np.convolve(slow, np.hanning(101) / 50.0, "same") / 5.0
+
+    rms = [
+        float(np.sqrt(np.mean((carried() + own * rng.normal(size=1200)) ** 2))) for _ in range(400)
+    ]
+    told = np.mean([spread([carried() for _ in range(4)], own) for _ in range(20)])
+    assert told == pytest.approx(np.std(rms) / np.mean(rms), rel=0.15)
+    assert spread([np.zeros(1200)], own) == pytest.approx(np.sqrt(0.5 / 1200))
+
+
+def test_wieners_error_is_what_the_smoother_leaves_of_a_random_walk() -> None:
+    rng, level = np.random.default_rng(7), 1.0
+    left, told = [], []
+    for _ in range(30):
+        walk = np.cumsum(0.2 * rng.normal(size=2400))
+        rough = walk + level * rng.normal(size=2400)
+        smoother = Smoother.of(rough, order=1)
+        left.append(np.mean((smoother.smooth(rough) - walk) ** 2))
+        told.append(np.mean(smoother.wiener_error(level, 2400, rng) ** 2))
+    assert np.mean(told) == pytest.approx(np.mean(left), rel=0.1)

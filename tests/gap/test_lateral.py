@@ -1,0 +1,95 @@
+"""Wheel and pedals: all three controls move, and the gap of one is put down to nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.channels import ControlName, noisy_channels
+from coupled.gap.diagnose import diagnose
+from coupled.gap.effects import BY_NAME, apply
+from coupled.gap.flown import closed_loop, fly_force
+from coupled.gap.surfaces import surface_points
+from coupled.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Rig
+from coupled.rig.rigfile import read_rig
+
+PUSH_N = {"column": 40.0, "wheel": 25.0, "pedals": 80.0}
+LONG_s = 30.0
+# Standard deviations of white noise by the end of a channel's name.
+NOISE = {"_N": 0.1, "_m": 5e-5, "_Pa": 10.0, "_rad": 3e-4, "_s": 3e-4, "factor": 3e-3}
+OF_THE_AIR = {"true_airspeed_m_per_s": 0.1, "altitude_m": 0.3, "wheel_deflection_rad": 1e-3}
+
+
+def noisy(rig: Rig) -> Rig:
+    levels = {
+        name: OF_THE_AIR.get(name, next(v for end, v in NOISE.items() if name.endswith(end)))
+        for name in noisy_channels(list(rig.controls), flown=True)
+    }
+    return rig.model_copy(update={"noise": levels})
+
+
+def pushes(rig: Rig) -> dict[ControlName, NDArray[np.float64]]:
+    """Return bell-shaped pushes of each control in turn, N."""
+    t = np.arange(round(LONG_s * rig.frame_rate)) / rig.frame_rate
+    made = {}
+    for i, control in enumerate(rig.controls):
+        rng = np.random.default_rng(i)
+        sizes = rng.uniform(0.3, 1.0, 8) * np.where(np.arange(8) % 2, 1.0, -1.0)
+        at = 2.0 + 0.7 * i + 3.2 * np.arange(8)
+        bells = np.exp(-(((t[:, None] - at) / 0.35) ** 2))
+        made[control] = PUSH_N[control] * bells @ sizes
+    return made
+
+
+@pytest.fixture(scope="module")
+def cessna() -> Rig:
+    return noisy(read_rig(aircraft_folder() / "c172p" / "c172p.toml"))
+
+
+def flown(rig: Rig, control: ControlName, name: str, value: float) -> Record:
+    effect = BY_NAME[name]
+    real = apply(rig, control, [effect], {f"{name}.{effect.free[0].name}": value})
+    return fly_force(real, pushes(rig), seed=3)
+
+
+def test_three_moving_controls_are_no_gap(cessna: Rig) -> None:
+    record = fly_force(cessna, pushes(cessna), seed=3)
+    assert max(abs(record["roll_rad"])) > 0.1  # it does roll, which pitches it, too
+    for control in cessna.controls:
+        found = diagnose(cessna, {"r": record}, control).found
+        assert found["verdict"] == "no_gap"
+        gaps = [stage["gap"] for stage in found["stages"].values()]
+        assert len(gaps) == 7 and max(gaps) < 1.1
+
+
+@pytest.mark.parametrize(
+    ("control", "name", "value"),
+    [("wheel", "surface_lag", 0.06), ("pedals", "rigging_offset", 0.02)],
+)
+def test_a_surface_of_wheel_and_pedals_is_judged(
+    cessna: Rig, control: ControlName, name: str, value: float
+) -> None:
+    record = flown(cessna, control, name, value)
+    whole = diagnose(cessna, {"r": record}, control)
+    (effect,) = whole.found["effects"]
+    (number,) = effect["parameters"].values()
+    assert (whole.found["verdict"], effect["name"]) == ("effect", name)
+    assert number["low"] < value < number["high"]
+    assert [s for s, judged in whole.found["stages"].items() if judged["guilty"]] == ["surface"]
+    again = closed_loop(cessna, whole.improved, control, record)
+    assert again is not None
+    turned = again["roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"]
+    assert turned["after"] < 0.5 * turned["before"]
+
+
+def test_a_damped_rudder_is_not_judged_by_its_command() -> None:
+    jet = noisy(read_rig(aircraft_folder() / "737" / "737.toml"))
+    assert surface_points(jet, "pedals") is None  # the yaw damper moves it
+    assert surface_points(jet, "wheel") is not None
+    found = diagnose(jet, {"r": fly_force(jet, pushes(jet), seed=3)}, "pedals").found
+    assert found["verdict"] == "no_gap"
+    assert found["stages"]["surface"]["judged"] is False
+    assert found["stages"]["airframe"]["gap"] < 1.1
