@@ -21,7 +21,7 @@ from coupled.gap.airframe import airframe_outputs, needs, trim_speed
 from coupled.gap.case import Case, Tell
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice, bar, search
-from coupled.gap.effects import EFFECTS, STAGES, parameter_name
+from coupled.gap.effects import EFFECTS, SETTINGS, STAGES, parameter_name
 from coupled.gap.output import CLEAR, Output, stage_gaps, stage_limits
 from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
@@ -88,6 +88,11 @@ def diagnose(
             [s.effect.name, *(r.effect.name for r in s.rivals)] for s in choice.steps if s.rivals
         ],
         "shrink": shrink(case, choice),
+        "settings": {
+            setting.parameters[0].field: choice.fit.values[f"{setting.name}.factor"]
+            for setting in SETTINGS.values()
+            if f"{setting.name}.factor" in choice.fit.values
+        },
     }
     return Diagnosis(found, choice.fit.rig, rig, control, tuple(outputs), choice)
 

@@ -1,14 +1,14 @@
 """What a model that is free in form could still take of a stage's residual.
 
-The effects of the library are physics, each with a number or two. Where they leave structure, a
-ridge regression on the stage's own signals tells whether these could explain it: with bends at
-their quantiles, products of two, and lagged copies. It is fitted on every other stretch and held
-against those between, so noise is not taken.
+The effects of the library are physics, each with a number or two. Where they leave structure, ridge
+regressions tell whether the stage's own signals could explain it: a function of one of them, with
+bends at its quantiles, lagged copies, and as the stage answers to it; or of all, with products of
+two. Each is fitted on every other stretch and held against those between, so noise is not taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -18,52 +18,66 @@ from scipy.signal import lfilter
 from coupled.gap.output import Output
 
 Floats = NDArray[np.float64]
-BENDS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a signal where its function may bend
+Response = tuple[Floats, Floats]
+BENDS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)  # quantiles where a function may bend
 LAGS_s = (0.03, 0.1, 0.3, 1.0)
-RIDGES = tuple(10.0**k for k in range(-6, 7))
+RIDGES = tuple(10.0**k for k in range(-7, 3))
+FLAT = 1e-3  # share of its whole spread under which a function is not told by a part
+ALL = "all"
 
 
-def free_share(output: Output, left: Floats, signals: Iterable[Floats]) -> float:
-    """Return the share of a residual's power that a free model of the signals takes, 0 to 1.
+def free_share(
+    output: Output, left: Floats, signals: Mapping[str, Floats], response: Response | None = None
+) -> tuple[float, str]:
+    """Return the share of a residual's power that a free model takes, 0 to 1, and of which signal.
 
-    `left` is the residual in floors, shape (frames,), as each signal. It is counted on held-out
-    stretches.
+    `left` is the residual in floors, shape (frames,), as each signal. `response` is the digital
+    filter by which the stage answers to what acts inside it. The share is counted on held-out
+    stretches; the signal is `ALL` where it takes more than one.
     """
-    columns = _columns(list(signals), output.frame_rate_Hz)
-    remains = np.empty_like(left)
-    fitted = output.rows("fitted")
-    for known in (fitted, ~fitted):
-        remains[~known] = left[~known] - _ridge(columns[known], left[known], columns[~known])
-    power = float(left @ left)
-    return max(0.0, 1.0 - float(remains @ remains) / power) if power > 0.0 else 0.0
+    plain = {name: (s - s.mean()) / s.std() for name, s in signals.items() if s.std() > 0.0}
+    each = {name: _functions(signal, output.frame_rate_Hz) for name, signal in plain.items()}
+    crossed = [a * b for a, b in combinations(plain.values(), 2)]
+    if crossed:
+        each[ALL] = np.column_stack((*each.values(), *crossed))
+    best = 0.0, ""
+    for name, columns in each.items():
+        answers = [] if response is None else [lfilter(*response, columns, axis=0)]
+        best = max(best, (_taken(output, left, np.hstack((columns, *answers))), name))
+    return best
 
 
-def _columns(signals: list[Floats], rate_Hz: float) -> Floats:
-    """Return the functions of the signals that a model may use, shape (frames, functions)."""
-    plain = [(s - s.mean()) / s.std() for s in signals if s.std() > 0.0]
-    found = [np.ones(len(signals[0]))]
-    for signal in plain:
-        found.append(signal)
-        found += [np.maximum(signal - bend, 0.0) for bend in np.quantile(signal, BENDS)]
-        for lag_s in LAGS_s:
-            share = -np.expm1(-1.0 / (lag_s * rate_Hz))
-            found.append(lfilter([share], [1.0, share - 1.0], signal))
-    found += [a * b for a, b in combinations(plain, 2)]
+def _functions(signal: Floats, rate_Hz: float) -> Floats:
+    """Return the functions of a signal that a model may use, shape (frames, functions)."""
+    found = [signal, *(np.maximum(signal - bend, 0.0) for bend in np.quantile(signal, BENDS))]
+    for lag_s in LAGS_s:
+        share = -np.expm1(-1.0 / (lag_s * rate_Hz))
+        found.append(lfilter([share], [1.0, share - 1.0], signal))
     return np.column_stack(found)
 
 
-def _ridge(known: Floats, wanted: Floats, asked: Floats) -> Floats:
-    """Return a ridge regression's prediction, its strength found by cross-validation (GCV)."""
-    mean, spread = known.mean(axis=0), known.std(axis=0)
-    spread[spread == 0.0] = 1.0
+def _taken(output: Output, left: Floats, columns: Floats) -> float:
+    """Return the share of the residual's power that functions take of stretches not fitted to.
+
+    How strong the ridge is, these decide: a residual remembers, and cross-validation by single
+    frames would take that for structure.
+    """
+    fitted = output.rows("fitted")
+    remains = np.zeros(len(RIDGES))
+    for known in (fitted, ~fitted):
+        made = _ridges(columns[known], left[known], columns[~known])
+        remains += np.sum((left[~known, None] - made) ** 2, axis=0)
+    power = float(left @ left)
+    return max(0.0, 1.0 - float(np.min(remains)) / power) if power > 0.0 else 0.0
+
+
+def _ridges(known: Floats, wanted: Floats, asked: Floats) -> Floats:
+    """Return the ridge regressions' predictions, shape (frames, RIDGES)."""
+    spread = known.std(axis=0)
+    told = spread > FLAT * np.vstack((known, asked)).std(axis=0)
+    mean, spread = known[:, told].mean(axis=0), spread[told]
     level = float(wanted.mean())
-    left, sizes, right = np.linalg.svd((known - mean) / spread, full_matrices=False)
-    turned, rows = left.T @ (wanted - level), len(wanted)
-    best, weights = np.inf, np.zeros(len(sizes))
-    for ridge in RIDGES:
-        passed = sizes**2 / (sizes**2 + ridge * rows)
-        misfit = float(np.sum((wanted - level - left @ (passed * turned)) ** 2))
-        score = misfit / (rows - 1.0 - float(passed.sum())) ** 2
-        if score < best:
-            best, weights = score, sizes / (sizes**2 + ridge * rows) * turned
-    return np.asarray(level + (asked - mean) / spread @ (right.T @ weights))
+    left, sizes, right = np.linalg.svd((known[:, told] - mean) / spread, full_matrices=False)
+    passed = sizes[:, None] / (sizes[:, None] ** 2 + np.array(RIDGES) * len(wanted))
+    weights = right.T @ (passed * (left.T @ (wanted - level))[:, None])
+    return np.asarray(level + (asked[:, told] - mean) / spread @ weights)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
+from scipy.signal import bilinear, welch
 
 from coupled.channels import ControlName, channel, unit_of
 from coupled.gap.flexible import free_share
@@ -48,16 +48,32 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> dic
 def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> dict[str, Any]:
     """Return what the effects found leave of an output: its gap, what that follows, its frequency.
 
-    `free_share` is what a model free in form could still take of it, from the stage's own signals.
+    `free_share` is what a model free in form could still take of it, as a function of the signal
+    `free_in`, or of all.
     """
-    left = output.residual(improved)
+    left, answers = output.residual(improved), _response(output, improved, record, control)
     known = signals(output.stage, record, control, output.frame_rate_Hz)
+    share, signal = free_share(output, left, known, answers)
     return {
         "gap": output.gap(improved),
         "follows": _follows(output, left, record, control),
         "peak_Hz": _peak(left, output.frame_rate_Hz),
-        "free_share": free_share(output, left, known.values()),
+        "free_share": share,
+        "free_in": signal,
     }
+
+
+def _response(
+    output: Output, rig: Rig, record: Record, control: ControlName
+) -> tuple[Floats, Floats] | None:
+    """Return the digital filter by which a loader answers to a force, at its mean gradient."""
+    name = channel(control, "gradient")
+    if output.stage != "loader" or name not in record:
+        return None
+    loader = rig.controls[control].loader
+    second = [loader.mass, loader.damping, max(float(np.mean(record[name])), 1.0)]
+    above, below = bilinear([1.0], second, output.frame_rate_Hz)
+    return np.asarray(above), np.asarray(below)
 
 
 def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:

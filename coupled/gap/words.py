@@ -23,6 +23,7 @@ OF_SIGNAL = {
 def in_words(diagnosis: dict[str, Any], control: str) -> str:
     """Return what is wrong, how large, how sure, how much it explains, and what to record next."""
     said = [_what(diagnosis, control)]
+    said.append(_settings(diagnosis))
     if diagnosis["verdict"] == "no_gap":
         unjudged = [stage for stage, found in diagnosis["stages"].items() if "gap" not in found]
         if unjudged:
@@ -50,6 +51,23 @@ def _what(diagnosis: dict[str, Any], control: str) -> str:
     return f"The gap lies in the {where}: {named}."
 
 
+def _settings(diagnosis: dict[str, Any]) -> str:
+    """Return what widens a stage that nothing else does: a number off within its setting."""
+    said = []
+    for stage, names in (("loader", ("mass", "damping")), ("linkage", ("servo_frequency",))):
+        found = diagnosis["stages"].get(stage, {})
+        if found.get("guilty") or found.get("gap", 0.0) <= found.get("limit", 0.0):
+            continue
+        off = {name: diagnosis["settings"][name] for name in names if name in diagnosis["settings"]}
+        told = [f"{name.replace('_', ' ')} {100 * (v - 1):+.1f} %" for name, v in off.items()]
+        if told:
+            said.append(
+                f"The {stage} stands at {found['gap']:.3g} floors by its settings,"
+                f" {' and '.join(told)}: within what they are set to."
+            )
+    return " ".join(said)
+
+
 def _since(diagnosis: dict[str, Any]) -> str:
     """Return since when, and for what is not explained, what it follows."""
     said = []
@@ -70,11 +88,12 @@ def _remains(stage: str, left: dict[str, Any]) -> str:
     follows = ""
     if left["follows"]:
         most = left["follows"][0]
-        follows = f"{100 * most['share']:.0f} % of it follows {_signal(most['signal'])}, and "
+        follows = f"{100 * most['share']:.0f} % follows {_signal(most['signal'])}, and "
     share = round(100 * left["free_share"])
-    takes = f"{share} % is some function of the stage's own signals"
+    of = "the stage's own signals" if left["free_in"] == "all" else _signal(left["free_in"])
+    takes = f"{share} % could be some function of {of}"
     if share < 5:
-        takes = "none of it is a function of the stage's own signals: noise, or another input"
+        takes = "no function of the stage's signals takes any on stretches held out"
     return f"What remains in the {stage} is {left['gap']:.3g} floors: {follows}{takes}."
 
 

@@ -20,6 +20,7 @@ HISS = RNG.normal(size=FRAMES)
 PLACE = np.convolve(np.cumsum(RNG.normal(size=FRAMES)), np.ones(60) / 600.0, "same")
 SPEED = np.gradient(PLACE) * RATE_Hz
 ELSEWHERE = np.convolve(RNG.normal(size=FRAMES), np.hanning(41), "same")
+SIGNALS = {"place": PLACE, "speed": SPEED, "side": np.sign(SPEED)}
 OUTPUT = Output("loader", "place", PLACE, lambda rig: PLACE, 1.0, RATE_Hz)
 
 
@@ -37,15 +38,14 @@ def test_a_function_of_the_stages_signals_is_taken(shape: Callable[[], Floats]) 
     made = shape() - np.mean(shape())
     left = 2.0 * made / np.std(made) + HISS
     most = 1.0 - float(HISS @ HISS) / float(left @ left)
-    took = free_share(OUTPUT, left, [PLACE, SPEED, np.sign(SPEED)])
+    took = free_share(OUTPUT, left, SIGNALS)[0]
     assert 0.93 * most < took < 1.02 * most
 
 
 def test_neither_noise_nor_another_input_is_taken() -> None:
-    signals = [PLACE, SPEED, np.sign(SPEED)]
-    assert free_share(OUTPUT, HISS, signals) < 0.02
+    assert free_share(OUTPUT, HISS, SIGNALS)[0] < 0.02
     other = 2.0 * (ELSEWHERE - ELSEWHERE.mean()) / np.std(ELSEWHERE) + HISS
-    assert free_share(OUTPUT, other, signals) < 0.15
+    assert free_share(OUTPUT, other, SIGNALS)[0] < 0.15
 
 
 def test_the_spread_of_noise_is_what_many_records_show() -> None:
