@@ -3,8 +3,8 @@
     python aircraft/awjsra/fit.py
     python aircraft/awjsra/fit.py --leave-out
 
-A least-squares fit of the aircraft in its published approach to the rows that validate.py marks as
-fitted. The published figures are more than the numbers, but do not tell all of them apart; so each
+A least-squares fit of the aircraft in its published approach to the rows that validate.py marks
+`fit`. The published figures are more than the numbers, but do not tell all of them apart; so each
 number is also held near what closed forms or like aircraft suggest, within the width given here.
 
 The first command prints each number with its standard deviation, and how much of it the rows tell:
@@ -54,9 +54,9 @@ COLUMN = 0.02  # of full travel: trim near the column's neutral
 
 
 def modelled(values: Floats) -> list[Row]:
-    """Return the fitted rows with these numbers; force per g, which the gradient sets, apart."""
+    """Return the rows that are fitted, with these numbers."""
     found = rows(read_rig(RIG), _estimates(values))
-    return [row for row in found if row.fitted and "per g" not in row.what]
+    return [row for row in found if row.rests_on == "fit"]
 
 
 def _estimates(values: Floats) -> dict[str, float]:

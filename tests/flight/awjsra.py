@@ -18,14 +18,19 @@ CLEAN = {"fcs/flap-cmd-norm": 0.0, "fcs/nozzle-cmd-deg": 18.5, "gear/gear-cmd-no
 
 
 @cache
-def validation() -> ModuleType:
-    """Return the module behind the table of published against flown."""
-    spec = importlib.util.spec_from_file_location("validate", HOME / "validate.py")
+def script(name: str) -> ModuleType:
+    """Return a script of the aircraft's folder as a module."""
+    spec = importlib.util.spec_from_file_location(name, HOME / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules["validate"] = module  # its dataclasses look themselves up there
+    sys.modules[name] = module  # its dataclasses, and the other scripts, look it up there
     spec.loader.exec_module(module)
     return module
+
+
+def validation() -> ModuleType:
+    """Return the module behind the table of published against flown."""
+    return script("validate")
 
 
 def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:

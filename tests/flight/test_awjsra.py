@@ -22,7 +22,7 @@ from coupled.flight.direct import check_direct_controls
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.units import KNOT_m_per_s
-from tests.flight.awjsra import CLEAN, HOME, RIG, validation
+from tests.flight.awjsra import CLEAN, HOME, RIG, script, validation
 
 FRAME = 1 / 120
 CONTROLS = ["column", "wheel", "pedals"]
@@ -104,6 +104,13 @@ def test_newton_and_jsbsims_own_trim_agree_where_both_can() -> None:
     assert airframe(clean).motion()[:count] == pytest.approx(own[:count], abs=2e-3, rel=2e-4)
 
 
+def in_readme(name: str) -> str:
+    readme = (HOME / "README.md").read_text(encoding="utf-8")
+    held = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", readme, re.DOTALL)
+    assert held is not None
+    return held.group(1)
+
+
 def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> None:
     validate = validation()
     found = list(validate.rows(RIG))
@@ -112,10 +119,12 @@ def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> 
         assert abs(row.off) <= row.aim, row
     slow = next(row for row in found if "slow" in row.what)
     assert validate.flown_root(RIG) == pytest.approx(slow.flown, rel=0.03)
-    readme = (HOME / "README.md").read_text(encoding="utf-8")
-    held = re.search(r"<!-- validate -->\n(.*?)\n<!-- end -->", readme, re.DOTALL)
-    assert held is not None
-    assert held.group(1) == validate.report()
+    assert in_readme("validate") == validate.report()
+
+
+def test_trims_elsewhere_are_as_the_readme_says() -> None:
+    validation()
+    assert in_readme("elsewhere") == script("elsewhere").table()
 
 
 def test_the_spring_tab_is_the_published_equation() -> None:

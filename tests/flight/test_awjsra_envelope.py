@@ -73,6 +73,50 @@ def energy(fdm: Any) -> float:
     return float(weight * (fdm["position/h-sl-ft"] + speed * speed / 64.35))
 
 
+@pytest.mark.parametrize(
+    ("command", "value", "surface", "angle_deg", "turns"),
+    [
+        ("elevator", -1.0, "elevator", -25.0, "q"),
+        ("elevator", 1.0, "elevator", 15.0, "-q"),
+        ("aileron", 1.0, "left-aileron", 17.0, "p"),
+        ("aileron", -1.0, "right-aileron", 17.0, "-p"),
+        ("rudder", 1.0, "rudder", 25.0, "-r"),
+        ("rudder", -1.0, "rudder", -25.0, "r"),
+    ],
+)
+def test_full_controls_are_the_published_travel_and_turn_it_their_way(
+    command: str, value: float, surface: str, angle_deg: float, turns: str
+) -> None:
+    """The elevator's and ailerons' trailing edges down are positive, the rudder's to the left."""
+    fdm = place(trimmed(), {f"fcs/{command}-cmd-norm": value})
+    assert fdm[f"fcs/{surface}-pos-rad"] == pytest.approx(math.radians(angle_deg), rel=1e-6)
+    sign = -1.0 if turns.startswith("-") else 1.0
+    assert sign * fdm[f"accelerations/{turns[-1]}dot-rad_sec2"] > 0.03
+
+
+def test_without_rate_limits_the_surfaces_are_there_at_once() -> None:
+    fdm = trimmed()
+    fdm["fcs/aileron-cmd-norm"] = fdm["fcs/rudder-cmd-norm"] = 0.5
+    fdm.run()
+    fdm.run()
+    found = fdm["fcs/left-aileron-pos-rad"], fdm["fcs/rudder-pos-rad"]
+    assert found == pytest.approx((math.radians(8.5), math.radians(12.5)), rel=1e-6)
+
+
+def test_the_ailerons_droop_with_the_flap() -> None:
+    fdm = place(trimmed(), {"fcs/flap-cmd-norm": 1.0})
+    assert fdm["fcs/aileron-droop-rad"] == pytest.approx(math.radians(30.0), rel=1e-6)
+
+
+@pytest.mark.parametrize(("asked_deg", "stands_deg"), [(0.0, 18.5), (60.0, 60.0), (180.0, 116.0)])
+def test_the_nozzles_stop_where_published(asked_deg: float, stands_deg: float) -> None:
+    fdm = place(trimmed(), {"fcs/nozzle-cmd-deg": asked_deg})
+    assert fdm["fcs/nozzle-pos-deg"] == pytest.approx(stands_deg, abs=0.01)
+    for engine in range(2):
+        turned = math.degrees(fdm[f"propulsion/engine[{engine}]/pitch-angle-rad"])
+        assert turned == pytest.approx(stands_deg, abs=0.01)
+
+
 def test_an_engine_out_in_the_approach_is_held_by_the_wheel() -> None:
     fdm = trimmed(altitude=1000.0)
     fdm.run()
