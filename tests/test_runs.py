@@ -7,6 +7,7 @@ import pytest
 
 from coupled.authority import Flight, compare
 from coupled.flight.scenario import read_run
+from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs
 
 WORST = {"worst-case", "worst-case-t37"}
@@ -71,7 +72,8 @@ def test_appendix_c_as_printed_feels_too_light() -> None:
 
 def test_the_approach_ends_on_the_wheels_and_the_bend_makes_them_touch_harder() -> None:
     sinks = {}
-    for flight in flown("awjsra-approach"):
+    flights = flown("awjsra-approach")
+    for flight in flights:
         record = flight.record
         touch = int(np.argmax(record["gear/wow"] > 0.0))
         assert 98.0 < record.time_s[touch] < 102.0
@@ -86,10 +88,14 @@ def test_the_approach_ends_on_the_wheels_and_the_bend_makes_them_touch_harder() 
     assert sinks["rigid"] == pytest.approx(4.8, abs=0.1)
     assert sinks["uncompensated"] == pytest.approx(5.55, abs=0.1)
     assert sinks["compensated"] == pytest.approx(sinks["rigid"], abs=0.05)
+    # of 104 s the figure shows those of the pull
+    assert draw_comparison(flights).axes[0].get_xlim() == pytest.approx((93.0, 104.0), abs=0.5)
 
 
 def test_the_upset_in_shear_is_recovered_later_where_authority_is_lost() -> None:
-    flights = {flight.configuration: flight for flight in flown("awjsra-shear")}
+    found = flown("awjsra-shear")
+    assert draw_comparison(found).axes[0].get_xlim()[0] < 0.0
+    flights = {flight.configuration: flight for flight in found}
     for flight in flights.values():
         path = flight.record["flight-path/gamma-deg"]
         assert path.min() == pytest.approx(-13.4, abs=0.3)
