@@ -189,6 +189,21 @@ def test_it_stands_on_its_wheels_and_takes_off() -> None:
     assert abs(fdm["aero/beta-deg"]) < 0.1
 
 
+def test_at_full_power_on_the_brakes_it_stands_still() -> None:
+    """No wind gives the air's forces a direction; what the nozzles lift is taken off the wheels."""
+    fdm = trimmed()
+    levers = {"fcs/left-brake-cmd-norm": 1.0, "fcs/right-brake-cmd-norm": 1.0}
+    levers |= dict.fromkeys(LEVERS, 1.0)
+    place(fdm, {**levers, "fcs/nozzle-cmd-deg": 90.0}, vt__kts=0.0, h__agl__ft=8.5, theta__deg=1.0)
+    fly(fdm, 20.0)
+    felt = []
+    for _ in range(600):
+        fdm.run()
+        felt.append(fdm["accelerations/Nz"])
+    assert felt == pytest.approx([1.0] * 600, abs=0.02)
+    assert abs(fdm["velocities/vg-fps"]) < 0.05
+
+
 def test_thrust_takes_seconds_to_come_and_go() -> None:
     fdm = trimmed()
     fdm.run()
