@@ -7,6 +7,7 @@ import pytest
 
 from coupled.authority import Flight, compare
 from coupled.flight.scenario import read_run
+from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs
 
 WORST = {"worst-case", "worst-case-t37"}
@@ -71,7 +72,8 @@ def test_appendix_c_as_printed_feels_too_light() -> None:
 
 def test_the_approach_ends_on_the_wheels_and_the_bend_makes_them_touch_harder() -> None:
     sinks = {}
-    for flight in flown("awjsra-approach"):
+    flights = flown("awjsra-approach")
+    for flight in flights:
         record = flight.record
         touch = int(np.argmax(record["gear/wow"] > 0.0))
         assert 98.0 < record.time_s[touch] < 102.0
@@ -80,20 +82,25 @@ def test_the_approach_ends_on_the_wheels_and_the_bend_makes_them_touch_harder() 
         sink = -np.polyfit(record.time_s[before], record["altitude_m"][before], 1)[0]
         speed = float(np.mean(record["true_airspeed_m_per_s"][before]))
         assert np.degrees(np.arcsin(sink / speed)) == pytest.approx(7.5, abs=0.25)  # hands off
-        assert record["position/h-agl-ft"][-1] == pytest.approx(9.6, abs=0.3)  # on its wheels
+        assert record["position/h-agl-ft"][-1] == pytest.approx(9.3, abs=0.3)  # on its wheels
+        assert record["load_factor"].max() < 2.0
         assert record["true_airspeed_m_per_s"][-1] < 25.0
-    assert sinks["rigid"] == pytest.approx(4.6, abs=0.2)
-    assert sinks["uncompensated"] == pytest.approx(5.4, abs=0.2)
+    assert sinks["rigid"] == pytest.approx(4.8, abs=0.1)
+    assert sinks["uncompensated"] == pytest.approx(5.55, abs=0.1)
     assert sinks["compensated"] == pytest.approx(sinks["rigid"], abs=0.05)
+    # of 104 s the figure shows those of the pull
+    assert draw_comparison(flights).axes[0].get_xlim() == pytest.approx((93.0, 104.0), abs=0.5)
 
 
 def test_the_upset_in_shear_is_recovered_later_where_authority_is_lost() -> None:
-    flights = {flight.configuration: flight for flight in flown("awjsra-shear")}
+    found = flown("awjsra-shear")
+    assert draw_comparison(found).axes[0].get_xlim()[0] < 0.0
+    flights = {flight.configuration: flight for flight in found}
     for flight in flights.values():
         path = flight.record["flight-path/gamma-deg"]
         assert path.min() == pytest.approx(-13.4, abs=0.3)
-        assert path[-1] > -9.5
-        assert flight.record["true_airspeed_m_per_s"].min() > 24.0
+        assert path[flight.record.time_s > 12.0].min() > -8.0
+        assert flight.record["true_airspeed_m_per_s"].min() > 26.0
     times = {name: flight.outcome.time_to_attitude_s or 0.0 for name, flight in flights.items()}
     assert times["gradient only"] > times["rigid"] + 0.03
     assert times["compensated"] == pytest.approx(times["rigid"], abs=0.02)

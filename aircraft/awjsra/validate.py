@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import jsbsim
 import numpy as np
@@ -162,13 +162,17 @@ def flown_root(rig: Rig) -> float:
 
 @dataclass(frozen=True)
 class Row:
-    """A figure: published, flown, the aim, and whether the model's estimates were fitted to it."""
+    """A figure: published, flown, the aim, and what the flown one rests on.
+
+    `rests_on` is `fit` where the model's estimates were fitted to it, `gradient` where the rig's
+    gradient was, and `geometry` where it follows from published weight, inertia and thrust line.
+    """
 
     what: str
     published: float
     flown: float
     aim: float
-    fitted: bool
+    rests_on: Literal["fit", "gradient", "geometry"]
 
     @property
     def off(self) -> float:
@@ -183,33 +187,33 @@ def rows(rig: Rig, estimates: dict[str, float] | None = None) -> Iterator[Row]:
     moves = derivatives(fdm)
     model = linear(fdm)
     quick, slow, phugoid, _ = model.roots
-    yield Row("short-period root, quick, rad/s", 1.2, -quick.real, 0.1, True)
-    yield Row("short-period root, slow, rad/s", 0.62, -slow.real, 0.1, True)
-    yield Row("phugoid frequency, rad/s", 0.22, abs(phugoid), 0.1, True)
-    yield Row("phugoid damping ratio", 0.15, -phugoid.real / abs(phugoid), 0.1, True)
+    yield Row("short-period root, quick, rad/s", 1.2, -quick.real, 0.1, "fit")
+    yield Row("short-period root, slow, rad/s", 0.62, -slow.real, 0.1, "fit")
+    yield Row("phugoid frequency, rad/s", 0.22, abs(phugoid), 0.1, "fit")
+    yield Row("phugoid damping ratio", 0.15, -phugoid.real / abs(phugoid), 0.1, "fit")
     low, high = -model.zeros(np.array([0.0, 0.0, 1.0, 0.0]))[:2]
-    yield Row("pitch numerator root, low, rad/s", 0.18, low, 0.1, True)
-    yield Row("pitch numerator root, high, rad/s", 0.37, high, 0.1, True)
+    yield Row("pitch numerator root, low, rad/s", 0.18, low, 0.1, "fit")
+    yield Row("pitch numerator root, high, rad/s", 0.37, high, 0.1, "fit")
     per_inch = float(moves.column_per_in[2])
-    yield Row("pitch acceleration per inch of column, rad/s²", 0.0425, per_inch, 0.1, True)
+    yield Row("pitch acceleration per inch of column, rad/s²", 0.0425, per_inch, 0.1, "fit")
     load = model.speed / GRAVITY * per_inch * high / (quick * slow).real
-    yield Row("column force per g, lb", 57.2, pounds / load, 0.1, True)
-    yield Row("path numerator root 1/Th1, rad/s", 0.06, model.zeros(model.path)[0], 0.25, True)
+    yield Row("column force per g, lb", 57.2, pounds / load, 0.1, "gradient")
+    yield Row("path numerator root 1/Th1, rad/s", 0.06, model.zeros(model.path)[0], 0.25, "fit")
     steady = model.steady()
-    yield Row("steady γ per θ", -0.43, float(model.path @ steady / steady[2]), 0.25, True)
+    yield Row("steady γ per θ", -0.43, float(model.path @ steady / steady[2]), 0.25, "fit")
     knots = steady[0] * FOOT_m / KNOT_m_per_s * math.radians(1.0) / steady[2]
-    yield Row("steady V per θ, kt/deg", -2.5, float(knots), 0.25, True)
-    yield Row("hot thrust in trim, lb", 7160.0, thrust, 0.25, True)
+    yield Row("steady V per θ, kt/deg", -2.5, float(knots), 0.25, "fit")
+    yield Row("hot thrust in trim, lb", 7160.0, thrust, 0.25, "fit")
     x, z, m = moves.thrust_per_lb
-    yield Row("Z per pound of hot thrust, ft/s²", -0.0018, float(z), 0.25, True)
-    yield Row("its X/Z", 0.0164, float(x / z), 0.25, True)
-    yield Row("its M/Z, rad/ft", 0.0008, float(m / z), 0.25, True)
+    yield Row("Z per pound of hot thrust, ft/s²", -0.0018, float(z), 0.25, "fit")
+    yield Row("its X/Z", 0.0164, float(x / z), 0.25, "fit")
+    yield Row("its M/Z, rad/ft", 0.0008, float(m / z), 0.25, "fit")
     x, z, m = moves.nozzle_per_deg
-    yield Row("X per degree of nozzle, ft/s²", -0.094, float(x), 0.25, False)
-    yield Row("its Z/X", 0.0424, float(z / x), 0.25, False)
-    yield Row("its M/X, rad/ft", 0.0153, float(m / x), 0.25, False)
+    yield Row("X per degree of nozzle, ft/s²", -0.094, float(x), 0.25, "geometry")
+    yield Row("its Z/X", 0.0424, float(z / x), 0.25, "geometry")
+    yield Row("its M/X, rad/ft", 0.0153, float(m / x), 0.25, "geometry")
     hold = -pounds * float(m) / per_inch
-    yield Row("column force to balance a nozzle change, lb/deg", 0.21, hold, 0.25, False)
+    yield Row("column force to balance a nozzle change, lb/deg", 0.21, hold, 0.25, "geometry")
 
 
 def column_gradient(rig: Rig, fdm: jsbsim.FGFDMExec) -> float:
@@ -221,14 +225,13 @@ def column_gradient(rig: Rig, fdm: jsbsim.FGFDMExec) -> float:
 
 def table(found: list[Row]) -> str:
     """Return the rows as a Markdown table."""
-    lines = ["| | published | flown | off | aim | |", "| --- | --- | --- | --- | --- | --- |"]
+    lines = ["| | published | flown | off | aim | by |", "| --- | --- | --- | --- | --- | --- |"]
     for row in found:
-        kind = "fitted" if row.fitted else "predicted"
         met = "" if abs(row.off) <= row.aim else ", **missed**"
         value = f"{row.flown:.0f}" if abs(row.flown) >= 1000 else f"{row.flown:.3g}"
         lines.append(
             f"| {row.what} | {row.published:g} | {value} | {round(100 * row.off) or 0:+d} %"
-            f" | {100 * row.aim:.0f} % | {kind}{met} |"
+            f" | {100 * row.aim:.0f} % | {row.rests_on}{met} |"
         )
     return "\n".join(lines)
 
@@ -259,7 +262,7 @@ def report() -> str:
     """Return the table and the remarks."""
     rig = read_rig(RIG)
     found = list(rows(rig))
-    timed = Row("short-period root, slow, by a flight in time", 0.62, flown_root(rig), 0.1, True)
+    timed = Row("short-period root, slow, by a flight in time", 0.62, flown_root(rig), 0.1, "fit")
     return f"{table([*found[:2], timed, *found[2:]])}\n\n{remarks(rig)}"
 
 

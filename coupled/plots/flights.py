@@ -108,6 +108,15 @@ def _line(configuration: str) -> dict[str, Any]:
     return {"color": color, "linestyle": style, "linewidth": width, "label": configuration}
 
 
+def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
+    """Begin a time axis 3 s before the control moves, where it does so in the second half."""
+    record, control = case[0].record, case[0].scenario.control
+    deflection = np.abs(record[channel(control, "deflection")])
+    moves, end = record.time_s[np.argmax(deflection > 0.01 * np.max(deflection))], record.time_s[-1]
+    if moves > 0.5 * end:
+        axes.set_xlim(moves - 3.0, end)
+
+
 def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
     """Surface command about trim, against what the pilot's deflection asks for."""
     control = case[0].scenario.control
@@ -121,7 +130,8 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
     asked = 100.0 * np.clip(record[channel(control, "deflection")] / data.travel, -1.0, 1.0)
     axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked, specified")
     axes.set_xlabel("time, s")
-    axes.set_ylabel(f"{data.surface} from trim, % of travel")
+    _show_from_the_pull(axes, case)
+    axes.set_ylabel(f"{data.surface} command, % of travel")
 
 
 def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
@@ -131,6 +141,7 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
         rate = flight.record[f"{name}_rad_per_s"] / DEGREE_rad
         axes.plot(flight.record.time_s, rate, **_line(flight.configuration))
     axes.set_xlabel("time, s")
+    _show_from_the_pull(axes, case)
     axes.set_ylabel(f"{name.replace('_', ' ')}, °/s")
 
 

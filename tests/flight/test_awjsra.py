@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
 import subprocess
@@ -10,7 +9,6 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,18 +19,15 @@ from coupled.channels import LONGITUDINAL, motion_channels
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.direct import check_direct_controls
-from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
-from coupled.rig.rigfile import read_rig
 from coupled.units import KNOT_m_per_s
+from tests.flight.awjsra import CLEAN, HOME, RIG, script, validation
 
 FRAME = 1 / 120
 CONTROLS = ["column", "wheel", "pedals"]
-HOME = aircraft_folder() / "awjsra"
-RIG = read_rig(shipped_rigs()["awjsra"])
 assert RIG.flight is not None
 APPROACH = RIG.flight
-CLEAN = {"fcs/flap-cmd-norm": 0.0, "fcs/nozzle-cmd-deg": 18.5, "gear/gear-cmd-norm": 0.0}
 TAB = {"direct_controls": False, "properties": {**APPROACH.properties, "fcs/spring-tab-on": 1.0}}
 
 
@@ -48,15 +43,6 @@ def at(knots: float, path_deg: float, properties: dict[str, float], **more: Any)
 
 def airframe(flight: Flight, record: tuple[str, ...] = ()) -> JSBSimAirframe:
     return JSBSimAirframe(flight, FRAME, CONTROLS, [aircraft_folder()], record=record)
-
-
-def validation() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("validate", HOME / "validate.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["validate"] = module  # its dataclasses look themselves up there
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_published_approach_takes_the_published_thrust() -> None:
@@ -118,6 +104,13 @@ def test_newton_and_jsbsims_own_trim_agree_where_both_can() -> None:
     assert airframe(clean).motion()[:count] == pytest.approx(own[:count], abs=2e-3, rel=2e-4)
 
 
+def in_readme(name: str) -> str:
+    readme = (HOME / "README.md").read_text(encoding="utf-8")
+    held = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", readme, re.DOTALL)
+    assert held is not None
+    return held.group(1)
+
+
 def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> None:
     validate = validation()
     found = list(validate.rows(RIG))
@@ -126,10 +119,12 @@ def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> 
         assert abs(row.off) <= row.aim, row
     slow = next(row for row in found if "slow" in row.what)
     assert validate.flown_root(RIG) == pytest.approx(slow.flown, rel=0.03)
-    readme = (HOME / "README.md").read_text(encoding="utf-8")
-    held = re.search(r"<!-- validate -->\n(.*?)\n<!-- end -->", readme, re.DOTALL)
-    assert held is not None
-    assert held.group(1) == validate.report()
+    assert in_readme("validate") == validate.report()
+
+
+def test_trims_elsewhere_are_as_the_readme_says() -> None:
+    validation()
+    assert in_readme("elsewhere") == script("elsewhere").table()
 
 
 def test_the_spring_tab_is_the_published_equation() -> None:
@@ -283,7 +278,7 @@ assert len(record) > 100
 TAKES = {  # how many arguments a function of JSBSim's takes, at least and at most
     **dict.fromkeys(("product", "sum", "min", "max", "and"), (2, 99)),
     **dict.fromkeys(("difference", "quotient", "pow", "gt"), (2, 2)),
-    **dict.fromkeys(("sqrt", "sin"), (1, 1)),
+    **dict.fromkeys(("sqrt", "sin", "cos"), (1, 1)),
     "ifthen": (3, 3),
     **dict.fromkeys(("value", "property"), (0, 0)),
 }

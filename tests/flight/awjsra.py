@@ -1,0 +1,62 @@
+"""The Augmentor Wing aircraft in JSBSim itself, without a rig: what its tests share."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.rig.rigfile import read_rig
+
+HOME = aircraft_folder() / "awjsra"
+RIG = read_rig(shipped_rigs()["awjsra"])
+LEVERS = ("fcs/throttle-cmd-norm[0]", "fcs/throttle-cmd-norm[1]")
+CLEAN = {"fcs/flap-cmd-norm": 0.0, "fcs/nozzle-cmd-deg": 18.5, "gear/gear-cmd-norm": 0.0}
+
+
+@cache
+def script(name: str) -> ModuleType:
+    """Return a script of the aircraft's folder as a module."""
+    spec = importlib.util.spec_from_file_location(name, HOME / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # its dataclasses, and the other scripts, look it up there
+    spec.loader.exec_module(module)
+    return module
+
+
+def validation() -> ModuleType:
+    """Return the module behind the table of published against flown."""
+    return script("validate")
+
+
+def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
+    """Return the aircraft trimmed as its rig file says, but for what is given."""
+    assert RIG.flight is not None
+    changes = {**flight, "properties": {**RIG.flight.properties, **(properties or {})}}
+    rig = RIG.model_copy(update={"flight": RIG.flight.model_copy(update=changes)})
+    return validation().trimmed(rig)
+
+
+def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:
+    """Put a trimmed aircraft into another state of flight, its levers where they are put.
+
+    A state is named as JSBSim names it, without its `ic/` and with two underscores for a dash.
+    """
+    fdm.set_trim_status(True)  # what moves slowly stands where it is asked for
+    for name, value in (levers or {}).items():
+        fdm[name] = value
+    for name, value in state.items():
+        fdm["ic/" + name.replace("__", "-")] = value
+    for _ in range(4):  # the rate of the angle of attack, which counts, is an answer too
+        fdm.run_ic()
+    fdm.set_trim_status(False)
+    return fdm
+
+
+def fly(fdm: Any, seconds: float) -> None:
+    for _ in range(round(seconds * 120)):
+        fdm.run()
