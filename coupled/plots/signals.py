@@ -224,15 +224,15 @@ SIGNALS: dict[str, Signal] = {
     ),
     "deflection": Signal("grip δ", "{d}", lambda s, r: s.fine * s.seen("deflection", r)),
     "servo_speed": Signal("rate of the servo (δ − K·F)′", "{d}/s", _servo_speed),
-    "wanted": Signal("elevator commanded about trim", "%", lambda s, r: _wanted(s)),
+    "wanted": Signal("surface commanded about trim", "%", lambda s, r: _wanted(s)),
     "wanted_rate": Signal("rate of the command", "%/s", lambda s, r: s.rate(smoothed(_wanted(s)))),
     "answer_left": Signal(
-        "elevator's answer less its command", "%", lambda s, r: _answer(s, r) - _wanted(s)
+        "surface's answer less its command", "%", lambda s, r: _answer(s, r) - _wanted(s)
     ),
     "answer_rate": Signal(
-        "rate of the elevator's answer", "%/s", lambda s, r: s.rate(smoothed(_answer(s, r)))
+        "rate of the surface's answer", "%/s", lambda s, r: s.rate(smoothed(_answer(s, r)))
     ),
-    "ratio": Signal("elevator's answer over its command", "1", _ratio),
+    "ratio": Signal("surface's answer over its command", "1", _ratio),
     "elevator": Signal(
         "elevator about trim",
         "°",
