@@ -51,7 +51,7 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     try:
         yield pool
     except BrokenExecutor:
-        problem = "a worker died; finished flights are kept, and the same command goes on"
+        problem = "a worker died; what is finished is kept, and the same command goes on"
         raise InputError("--workers", "", problem) from None
     finally:
         pool.shutdown(cancel_futures=True)

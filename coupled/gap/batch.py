@@ -10,15 +10,15 @@ import csv
 import hashlib
 import io
 import json
-import multiprocessing
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import coupled
+from coupled.campaign.pool import executor
 from coupled.errors import InputError, nearest
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
@@ -153,8 +153,7 @@ def run_all(todo: list[Job], progress: Progress, workers: int = 0) -> list[dict[
     """Diagnose all records on all cores; the order and the numbers are those of one core."""
     version = version_hash()
     found: dict[str, dict[str, Any]] = {}
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers or os.cpu_count() or 1, mp_context=spawn) as pool:
+    with executor(workers or os.cpu_count() or 1) as pool:
         waiting = {pool.submit(run, job, version): job.name for job in todo}
         for done in as_completed(waiting):
             found[waiting[done]] = done.result()
