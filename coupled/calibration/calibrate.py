@@ -24,6 +24,8 @@ from coupled.rig.parameters import Control
 
 Floats = NDArray[np.float64]
 FEWEST = 4  # a line of two unknowns, and something left to tell their errors by
+FAR = 0.1  # of the largest: what lies nearer to neutral may have any sign
+BEYOND_TRAVEL = 1.5  # that much more travel than there is, and the unit is wrong
 EXTREME = 3.0  # of a hand's wander: as far as friction takes a control with it
 SURELY = 0.999  # how sure it must be that the gradients differ
 
@@ -149,6 +151,9 @@ def calibrate(
         raise InputError(
             file, "", "the fit does not settle; the readings tell too little"
         ) from None
+    if fit.line.bend.high < 0.0:
+        problem = "K comes out negative, and no structure bends against its force"
+        raise InputError(file, "", f"{problem}; check v1, and which readings are of which gradient")
     there = f != 0.0
     s2 = scales.s2_from_gains(fit.line.s1, fit.s3, control.gains)
     loader, sides = control.loader, used.null_side
@@ -201,17 +206,18 @@ def _refuse_poor(
     n, force, deflection = len(readings.row), readings.force, readings.deflection
     if n < FEWEST:
         raise InputError(
-            file, "", f"holds {n} readings with deflection and force; {FEWEST} at least"
+            file, "", f"has deflection and force in {n} rows; {FEWEST} readings are the least"
         )
     if np.count_nonzero(force) < FEWEST:
         raise InputError(
             file, "force", f"is not 0 in {np.count_nonzero(force)} rows; {FEWEST} at least"
         )
     rows = f"rows {readings.row[0]} to {readings.row[-1]}"
-    for quantity, values in (("force", force), ("v1", readings.v1)):
+    for quantity, values in (("force", force), ("v1", readings.v1), ("v3", readings.v3)):
         if np.ptp(values) <= 1e-12 * np.max(np.abs(values)):
             problem = f"every {quantity} is the same; S1 and K need readings that differ"
             raise InputError(file, rows, problem)
+    _refuse_signs(readings, control, name, file)
     if len(set(readings.label)) == 1:
         why = f"all readings are of one gradient set, {readings.label[0]!r}"
     elif not _gradients_differ(readings, instruments):
@@ -224,6 +230,29 @@ def _refuse_poor(
         f"{why}: with one gradient v1 = (S1 - S1*K*G)*deflection, and S1 and K are inseparable"
     )
     raise InputError(file, rows, f"{problem}; {separating}")
+
+
+def _refuse_signs(readings: Readings, control: Control, name: str, file: Path | str) -> None:
+    """Refuse what a wrong sign or unit gives, by its row."""
+    deflection, force = readings.deflection, readings.force
+    far = np.abs(deflection) > FAR * np.max(np.abs(deflection))
+    far &= np.abs(force) > FAR * np.max(np.abs(force))  # friction may turn a small force
+    against = far & (deflection * force < 0.0)
+    if against.any():
+        row = int(readings.row[np.argmax(against)])
+        problem = "force and deflection have different signs; a pull moves the control with it"
+        raise InputError(file, f"row {row}", problem)
+    if force @ readings.v3 < 0.0:
+        raise InputError(file, "v3_V", "falls as the force grows; check its sign")
+    wrong = readings.null_v2 * readings.null_v3 < 0.0
+    if wrong.any():
+        row = int(readings.null_row[np.argmax(wrong)])
+        problem = "has another sign than v3; the supply takes the hand's place"
+        raise InputError(file, f"row {row}: v2_V", problem)
+    if np.median(np.abs(deflection)) > BEYOND_TRAVEL * control.travel:
+        d = unit_of(name)
+        problem = f"is {deflection[0]:.4g} {d}, the {name}'s travel is {control.travel:g} {d}"
+        raise InputError(file, f"row {readings.row[0]}: deflection", f"{problem}; another unit?")
 
 
 def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:

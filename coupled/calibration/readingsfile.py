@@ -14,6 +14,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from coupled.units import POUND_N, DEGREE_rad, INCH_m
 
 Floats = NDArray[np.float64]
 MOST_ROWS = 10_000
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf)", re.I)
 LABEL, APPROACH, REMARK = "gradient_set", "approach", "remark"
 SIDES = {"out": 1.0, "in": -1.0}
 LENGTHS = {"deflection_m": 1.0, "deflection_mm": 1e-3, "deflection_in": INCH_m}
@@ -63,7 +65,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise InputError(path, "", "is not text in UTF-8; a CSV file is wanted") from None
+        raise InputError(path, "", "is not text in UTF-8; save it as CSV in UTF-8") from None
     if "\0" in text:
         raise InputError(path, "", "is not text; a CSV file is wanted")
     reader = csv.reader(io.StringIO(text.rstrip()), strict=True)
@@ -87,7 +89,11 @@ def _units(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, f
         if head in other or head in [_after(name) for name in other]:
             raise InputError(path, f"row 1: {head}", f"a {control} is read in {', '.join(ours)}")
         if head not in known:
-            hint = "columns are parted by commas" if ";" in head else nearest(head, known)
+            hint = (
+                "columns are parted by commas"
+                if ";" in head or "\t" in head
+                else nearest(head, known)
+            )
             raise InputError(path, f"row 1: {head}", f"is no column of readings; {hint}")
     found = {"v1": ("v1_V", 1.0), "v3": ("v3_V", 1.0)}
     for quantity, choices in (("deflection", ours), ("force", FORCES)):
@@ -180,12 +186,11 @@ def _number(path: Path, row: int, column: str, cell: str) -> float:
     place = f"row {row}: {column}"
     if not cell:
         raise InputError(path, place, "is empty; a reading has no gaps")
-    try:
-        number = float(cell)
-    except ValueError:
+    if not NUMBER.fullmatch(cell):
         shown = cell if len(cell) <= 40 else cell[:37] + "..."
         hint = "; write it with a point" if "," in cell else ""
-        raise InputError(path, place, f"{shown!r} is no number{hint}") from None
+        raise InputError(path, place, f"{shown!r} is no number{hint}")
+    number = float(cell)
     if not math.isfinite(number) or abs(number) > LARGEST:
         raise InputError(path, place, f"{cell[:40]!r} is no finite number")
     return number

@@ -70,7 +70,8 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> 
     ]
     worst = min(ours, key=lambda check: check.margin)
     word = "pass" if worst.passed else "FAIL"
-    return f"{pressure(pressure_Pa)}: {word}, least margin {100 * worst.margin:.0f} %"
+    margin = f"{100 * worst.margin:.{0 if abs(worst.margin) >= 0.01 else 1}f}".replace("-", "−")
+    return f"{pressure(pressure_Pa)}: {word}, least margin {margin} %"
 
 
 def draw_releases(found: Documentation) -> Figure:

@@ -247,7 +247,7 @@ def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
     """A fault crosses from a worker as the one line that it is."""
     rig = report_rig()
     few = stations(rig, "column", 3, 1)
-    with pytest.raises(InputError, match="holds 3 readings"):
+    with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
         measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)
 
 
