@@ -186,7 +186,7 @@ def test_the_sandwich_of_a_mean_is_its_standard_error() -> None:
 
 
 def test_few_readings_at_two_corners_hold_19_times_in_20() -> None:
-    """Where residuals weighed by leverage and n − 2 degrees of freedom would hold 98 %."""
+    """Where residuals weighed up by 1/(1 − h) and n − 2 degrees of freedom hold 97 %."""
     rng = np.random.default_rng(21)
     delta, force = np.repeat([0.169, 0.0685], 4), np.repeat([94.7, 150.0], 4)
     held = []
