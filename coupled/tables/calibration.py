@@ -128,8 +128,8 @@ def _creep_words(found: Result) -> list[str]:
         words.append(text)
     if found.one_sided:
         words.append(
-            "The nulls were approached from one side, and the control has friction: S2 is widened"
-            " for what a wandering hand does then. Take as many again from beyond (approach: in)."
+            "The nulls are not four or more from both sides, and the control has friction: S2 is"
+            " widened for what a wandering hand does then. Take more from beyond (approach: in)."
         )
     return words
 
