@@ -64,7 +64,7 @@ def print_calibration(console: Console, found: Result) -> None:
 def _row(table: Table, name: str, estimate: Estimate) -> None:
     error = estimate.error
     ends = f"{_number(estimate.low, error)} to {_number(estimate.high, error)}"
-    table.add_row(name, _number(estimate.value, error), f"{error:.2g}", ends)
+    table.add_row(name, _number(estimate.value, error), f"{error:#.2g}".rstrip("."), ends)
 
 
 def _number(value: float, error: float) -> str:
