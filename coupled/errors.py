@@ -34,6 +34,7 @@ class InputError(ValueError):
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a hint that names the known word most like `word`, or lists them all."""
     known = list(known)
-    word = word[:LONGEST]
-    match = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"did you mean {match[0]}?" if match else "known: " + ", ".join(sorted(known))
+    plain = {name.casefold(): name for name in known}
+    word = word[:LONGEST].casefold()
+    match = difflib.get_close_matches(word, plain, n=1, cutoff=0.6)
+    return f"did you mean {plain[match[0]]}?" if match else "known: " + ", ".join(sorted(known))

@@ -1,9 +1,16 @@
 """The virtual bench: a person with ruler, spring scale and voltmeter at a simulated rig.
 
 The rig is the one that flies, stage by stage. The hand holds a force that wanders; the
-person reads one instrument after the other, each with its error and rounding. For S₂ the
-null is really performed: the force of a held control is noted without the multiplier,
-then, hands off, the supply in its place is turned until v₁ is back.
+person reads one instrument after the other, each with its error and rounding: ruler,
+scale, v₁, v₃, and then scale and ruler again, so that what drifts meanwhile cancels. The hand
+pulls a little past where it holds and eases back, so that friction, if there is any, keeps
+the control where it is; a hand that wanders would else work it outward from the ruler's
+look to the meter's.
+
+For S₂ the null is really performed: the force of a held control is noted without the
+multiplier, then, hands off, the supply in its place is turned until v₁ is back. Every
+other null is approached from beyond, with the supply as with the hand: friction then keeps
+the hand's least force instead of its greatest, and the mean of both sides is free of it.
 """
 
 from __future__ import annotations
@@ -11,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +27,37 @@ from scipy.signal import lfilter
 from coupled.calibration.belief import real_scales
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
-from coupled.calibration.readings import Readings
+from coupled.calibration.readings import Readings, readings_of
 from coupled.channels import ControlName
 from coupled.rig.parameters import Rig
-from coupled.rig.told import nodes_of, run_told, smooth, supply_told
+from coupled.rig.told import nodes_of, run_told, smooth, under_supply
 
 Floats = NDArray[np.float64]
 PULL_s = 0.3  # the hand goes to its next force so quickly
 SLOW_s = 2.0  # and so slowly where friction must not matter
 GLANCE_s = 0.6  # from one instrument to the next
 WANDER_s = 0.2  # over which a hand forgets where it was
+PAST = 5.0  # of a hand's wander: how far it pulls past where it holds
+BEYOND = 0.1  # of its force, and so far, with friction to spare, for a null from beyond
+SPARE = 3.0  # of the friction: 2 let the control come back
 TURNS = 40  # of the supply's knob at most
 MOST_VOLTS = 1e4
-NULLS = 5
+NULLS = 6
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig on the bench, without its converters: what to hold, when, and when to read it."""
+    """A rig on the bench, without its converters: what to hold, when, and when to read it.
+
+    `again`: ruler and scale are read a second time, after the voltmeter.
+    """
 
     rig: Rig
     control: ControlName
     stations: Sequence[Station]
     instruments: Instruments
     nulls: int = NULLS
+    again: bool = True
 
 
 def take_readings(bench: Bench, seed: int) -> Readings:
@@ -51,18 +66,24 @@ def take_readings(bench: Bench, seed: int) -> Readings:
     rig, control = _meters_rig(bench.rig, bench.control), bench.control
     pressures = np.array([station.pressure_Pa for station in bench.stations])
     forces = np.array([station.force for station in bench.stations])
-    read = _hold(rig, bench, forces, pressures, rng)
     scales = real_scales(bench.rig.controls[control])
     tools = bench.instruments
+    read = _hold(rig, bench, forces, (1.0 + PAST * tools.hand) * forces, pressures, rng)
     count, labels = len(forces), tuple(station.label for station in bench.stations)
     deflection = _reading(read[0], tools.ruler, tools.ruler_step, rng)
     force = _reading(read[1], tools.scale, tools.scale_step, rng)
     v1 = _reading(scales.s1 * read[2], tools.meter, tools.meter_step, rng)
     v3 = _reading(scales.s3 * read[3], tools.meter, tools.meter_step, rng)
+    rise = np.full((2, count), np.nan)
+    if bench.again:
+        force_again = _reading(read[4], tools.scale, tools.scale_step, rng)
+        rise[0] = _reading(read[5], tools.ruler, tools.ruler_step, rng) - deflection
+        rise[1] = force_again - force
+        deflection, force = deflection + 0.5 * rise[0], force + 0.5 * rise[1]
     null = _null(rig, bench, rng)
-    rows = np.arange(2, count + 2)
-    null_rows = np.arange(count + 2, count + 2 + null.shape[1])
-    return Readings(rows, labels, deflection, force, v1, v3, null_rows, *null)
+    columns = np.stack((deflection, force, v1, v3, *rise))
+    null_rows = range(count + 2, count + 2 + null.shape[1])
+    return readings_of(range(2, count + 2), labels, columns, null_rows, null)
 
 
 def _meters_rig(rig: Rig, control: ControlName) -> Rig:
@@ -91,34 +112,33 @@ def _hold(
     rig: Rig,
     bench: Bench,
     forces: Floats,
+    peaks: Floats,
     pressures: Floats,
     rng: np.random.Generator,
     pull_s: float = PULL_s,
 ) -> Floats:
-    """Return δ, F, δc and F again as they were when each was looked at, shape (4, readings)."""
+    """Return δ, F, δc, F, F and δ as they were when each was looked at, shape (6, readings).
+
+    Each force is reached by way of a peak beyond it.
+    """
     settle = _settling_s(rig, bench.control, bench.instruments.hand == 0.0)
     rate = rig.frame_rate
-    each = math.ceil((pull_s + settle + 3.0 * GLANCE_s) * rate) + 2
+    each = math.ceil((2.0 * pull_s + settle + 5.0 * GLANCE_s) * rate) + 2
     frames = each * len(forces)
-    held = np.repeat(forces, each)
     before = np.concatenate(([0.0], forces[:-1]))
     pull = smooth(np.arange(each) / (pull_s * rate))
-    held += np.outer(before - forces, 1.0 - pull).ravel()
+    ease = smooth(np.arange(each) / (pull_s * rate) - 1.0)
+    held = np.repeat(before, each) + np.outer(peaks - before, pull).ravel()
+    held += np.outer(forces - peaks, ease).ravel()
     if bench.instruments.hand > 0.0:
         held = held * (1.0 + bench.instruments.hand * _wander(frames, rate, rng))
     ends = np.append(np.arange(frames), frames) / rate
     nodes = np.interp(nodes_of(rig, frames), ends, np.append(held, held[-1]))
     told = run_told(rig, bench.control, nodes, np.repeat(pressures, each))
-    first = np.arange(len(forces)) * each + math.ceil((pull_s + settle) * rate)
-    looks = [first + round(i * GLANCE_s * rate) for i in range(4)]
-    return np.stack(
-        (
-            told.deflection[looks[0]],
-            told.force[looks[1]],
-            told.computed[looks[2]],
-            told.force[looks[3]],
-        )
-    )
+    first = np.arange(len(forces)) * each + math.ceil((2.0 * pull_s + settle) * rate)
+    looks = [first + round(i * GLANCE_s * rate) for i in range(6)]
+    seen = (told.deflection, told.force, told.computed, told.force, told.force, told.deflection)
+    return np.stack([signal[at] for signal, at in zip(seen, looks, strict=True)])
 
 
 def _wander(frames: int, rate: float, rng: np.random.Generator) -> Floats:
@@ -136,32 +156,57 @@ def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) 
 
 
 def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
-    """Return v₁ as noted, v₂ that brought it back and v₃ as noted, shape (3, nulls)."""
+    """Return v₁ as noted, v₂ that brought it back, v₃ as noted and the side, shape (4, nulls)."""
     control = bench.control
-    data = rig.controls[control]
-    if bench.nulls == 0 or data.loader.basic_gradient <= 0.0:
-        return np.empty((3, 0))
+    loader = rig.controls[control].loader
+    if bench.nulls == 0 or loader.basic_gradient <= 0.0:
+        return np.empty((4, 0))
     plain = _without_multiplier(rig, control)
-    loader = data.loader
-    room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
-    forces = np.linspace(0.5, 1.0, bench.nulls) * room
+    spare = SPARE * max(loader.friction, loader.breakaway)
+    forces, sides = _null_forces(rig, bench, spare)
     # From rest each time, and slowly, as the supply is: then friction is the same in both.
     held = np.hstack(
-        [_hold(plain, bench, force, np.zeros(1), rng, SLOW_s) for force in forces[:, None]]
+        [
+            _hold(plain, bench, force, _by_way_of(force, side, spare), np.zeros(1), rng, SLOW_s)
+            for force, side in zip(forces[:, None], sides, strict=True)
+        ]
     )
     scales, tools = real_scales(bench.rig.controls[control]), bench.instruments
     v1 = _reading(scales.s1 * held[2], tools.meter, tools.meter_step, rng)
     v3 = _reading(scales.s3 * held[3], tools.meter, tools.meter_step, rng)
-    settle = _settling_s(plain, control, tools.hand == 0.0)
+    rests_at = under_supply(plain, control, SLOW_s, _settling_s(plain, control, tools.hand == 0.0))
 
-    def shown(v2: float) -> float:
-        computed = supply_told(plain, control, v2 / scales.s2, SLOW_s, settle)
-        volts = np.array(scales.s1 * computed)
-        return float(_reading(volts, tools.meter, tools.meter_step, rng))
+    def shown(v2: float, side: float) -> float:
+        supply = np.array(v2 / scales.s2)
+        rest = rests_at(float(_by_way_of(supply, side, spare)), float(supply))
+        return float(_reading(np.array(scales.s1 * rest), tools.meter, tools.meter_step, rng))
 
-    v2 = [_turn_until(shown, wanted, tools) for wanted in v1]
+    v2 = [
+        _turn_until(partial(shown, side=side), wanted, tools)
+        for side, wanted in zip(sides, v1, strict=True)
+    ]
     # What was turned is read as well.
-    return np.stack((v1, _reading(np.array(v2), tools.meter, tools.meter_step, rng), v3))
+    return np.stack((v1, _reading(np.array(v2), tools.meter, tools.meter_step, rng), v3, sides))
+
+
+def _by_way_of(force: Floats, side: float, spare: float) -> Floats:
+    """Return the force first gone to, N, before one that is approached from a side.
+
+    As much of a way outward as inward, so that the hand wanders as long on both.
+    """
+    return (1.0 - BEYOND * side) * force + (spare if side < 0.0 else 0.0)
+
+
+def _null_forces(rig: Rig, bench: Bench, spare: float) -> tuple[Floats, Floats]:
+    """Return the forces to hold for nulls in N and the sides, every other −1."""
+    data = rig.controls[bench.control]
+    loader = data.loader
+    room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
+    side = np.where(np.arange(bench.nulls) % 2 == 0, 1.0, -1.0)
+    most = np.where(side > 0.0, room, (room - spare) / (1.0 + BEYOND))
+    if np.min(most) <= loader.breakout:  # no room to come back from beyond
+        side, most = np.ones(bench.nulls), np.full(bench.nulls, room)
+    return np.linspace(0.5, 1.0, bench.nulls) * most, side
 
 
 def _without_multiplier(rig: Rig, control: ControlName) -> Rig:

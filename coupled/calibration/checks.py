@@ -2,13 +2,15 @@
 
 The rig as it is against itself with a rigid structure, which stands for the aircraft:
 what the schedule specifies, felt through the loader's own mass, damping and friction.
-Where the rule gives two tolerances for a force, the wider one holds. The rule counts
-periods from 0: period n (n = 0 the first) may err by 10·(n + 1) %.
+Where the rule gives two tolerances for a force, the wider one holds. Of a release the
+rule's P₀ is the time from 90 % of the displacement to the first zero crossing, or overdamped
+to 10 %, and may err by 10 %; P_n, the n-th full period after that crossing, by 10·(n + 1) %.
+Displacements are counted from where the control comes to rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +30,8 @@ FORCE_SHARE = 0.10
 SURFACE_rad = 2.0 * DEGREE_rad
 TIME_SHARE = 0.10
 COUNTED = 0.05  # overshoots above this share of the displacement count
+STILL, STUCK = 1e-3, 0.8  # of the displacement: what has come to rest, and what never left
+APART = 10.0  # times what still moves, a resting place is no slow return to neutral
 LEGS = ("out, positive", "back, positive", "out, negative", "back, negative")
 
 
@@ -174,7 +178,8 @@ class Swing:
 
 def swing_of(let_go: Release) -> Swing:
     """Return a release in the rule's terms."""
-    share, time = let_go.deflection / let_go.start, let_go.time_s
+    rest, time = _resting(let_go), let_go.time_s
+    share = (let_go.deflection - rest) / (let_go.start - rest)
     begin = _falls_to(time, share, 0.9)
     end = _falls_to(time, share, 0.1)
     change = np.flatnonzero(share[:-1] * share[1:] < 0.0)
@@ -184,6 +189,14 @@ def swing_of(let_go: Release) -> Swing:
     stretches = np.split(np.abs(share), change + 1)[1:]
     peaks = np.array([stretch.max() for stretch in stretches if stretch.size])
     return Swing(crossings - begin, peaks[peaks > COUNTED], end - begin)
+
+
+def _resting(let_go: Release) -> float:
+    """Return where friction holds a release at its end, d; neutral where it still moves."""
+    tail = let_go.deflection[-max(len(let_go.deflection) // 10, 1) :]
+    rest, moves, start = float(tail[-1]), float(np.ptp(tail)), abs(let_go.start)
+    held = moves <= STILL * start and APART * moves <= abs(rest) < STUCK * start
+    return rest if held else 0.0
 
 
 def _falls_to(time: Floats, share: Floats, level: float) -> float:
@@ -206,13 +219,16 @@ def dynamic_checks(
         allowed = TIME_SHARE * wanted.fall_s
         name = f"90 % to 10 %, {side}"
         yield Check(name, pressure_Pa, now.fall_s, wanted.fall_s, allowed, "s")
+        height = 100.0 * float(np.max(now.peaks, initial=0.0))
+        yield Check(f"overshoot, {side}", pressure_Pa, height, 0.0, 100.0 * COUNTED, "%")
         return
     first = wanted.crossings[0]
     crossed = float(now.crossings[0]) if now.crossings.size else float("inf")
     name = f"first zero crossing, {side}"
     yield Check(name, pressure_Pa, crossed, float(first), TIME_SHARE * float(first), "s")
     count = (float(len(now.peaks)), float(len(wanted.peaks)))
-    for n in range(min(len(now.crossings), len(wanted.crossings), len(wanted.peaks) + 1) - 2):
+    counted = min(len(now.crossings), len(wanted.crossings), len(wanted.peaks) + 1)
+    for n in range(1, (counted + 1) // 2):
         periods = (_period(now, n), _period(wanted, n))
         allowed = TIME_SHARE * (n + 1) * periods[1]
         yield Check(f"period {n}, {side}", pressure_Pa, *periods, allowed, "s")
@@ -224,10 +240,5 @@ def dynamic_checks(
 
 
 def _period(swing: Swing, n: int) -> float:
-    return float(swing.crossings[n + 2] - swing.crossings[n])
-
-
-def summary(checks: Sequence[Check]) -> str:
-    """Return in words how many passed."""
-    good = sum(check.passed for check in checks)
-    return f"{good} of {len(checks)} checks pass"
+    """Return the n-th full period after the first zero crossing, n from 1, in s."""
+    return float(swing.crossings[2 * n] - swing.crossings[2 * n - 2])

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coupled.calibration.belief import real_scales
+from coupled.calibration.belief import Scales, real_scales
 from coupled.calibration.bench import Bench, take_readings
-from coupled.calibration.calibrate import calibrate
+from coupled.calibration.calibrate import Result, calibrate
+from coupled.calibration.outcome import deflection_off, felt_off
+from coupled.rig.parameters import Control
 
 Progress = Callable[[str, int, int], None]
 FIGURES = ("K", "S1", "S3", "S2")
@@ -26,7 +29,9 @@ class Coverage:
 
     `covered` of each figure's 95 % interval, `within` of K within 5 %; `bias` and `spread` of
     K over its true value, errors in variables and ordinary; `accused` of benches in which a
-    good reading was taken for a mistyped one.
+    good reading was taken for a mistyped one; `deflection` and `felt` of benches after which a
+    compensated rig's δ̂ is within 0.5 % and its felt gradient within 1 %, at the least, middle
+    and greatest gradient (`circle`: both).
     """
 
     benches: int
@@ -38,6 +43,9 @@ class Coverage:
     ordinary_bias: float
     ordinary_spread: float
     accused: float
+    deflection: float
+    felt: float
+    circle: float
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
@@ -58,18 +66,27 @@ def measure_coverage(
         if progress is not None:
             progress("benches", len(rows), benches)
     table = np.array(rows)
-    held, k, plain = table[:, : len(FIGURES)], table[:, -4], table[:, -3]
+    held, k, plain = table[:, : len(FIGURES)], table[:, -6], table[:, -5]
+    deflection, felt = (np.abs(table[:, -2]) <= 0.005, np.abs(table[:, -1]) <= 0.01)
     return Coverage(
         benches,
-        dict(zip(FIGURES, np.nanmean(held, axis=0).tolist(), strict=True)),
+        dict(zip(FIGURES, _means(held), strict=True)),
         float(np.mean(np.abs(k) <= NEAR)),
         float(np.mean(k)),
         float(np.std(k)),
-        float(np.mean(table[:, -2])),
+        float(np.mean(table[:, -4])),
         float(np.mean(plain)),
         float(np.std(plain)),
-        float(np.mean(table[:, -1])),
+        float(np.mean(table[:, -3])),
+        float(np.mean(deflection)),
+        float(np.mean(felt)),
+        float(np.mean(deflection & felt)),
     )
+
+
+def _means(held: NDArray[np.float64]) -> list[float]:
+    """Return the mean of each column, NaN for one that was never found."""
+    return [float(np.mean(c[~np.isnan(c)])) if np.any(~np.isnan(c)) else np.nan for c in held.T]
 
 
 def _done(blocks: list[tuple[Bench, range]], workers: int) -> Iterator[list[list[float]]]:
@@ -98,4 +115,20 @@ def _one(bench: Bench, seed: int) -> list[float]:
     held.append(float("nan") if s2 is None else float(s2.low <= scales.s2 <= s2.high))
     plain = found.plain.bend
     errors = [found.line.bend.value / bend - 1.0, plain.value / bend - 1.0]
-    return [*held, *errors, float(plain.low <= bend <= plain.high), float(bool(found.suspects))]
+    errors += [float(plain.low <= bend <= plain.high), float(bool(found.suspects))]
+    return [*held, *errors, *_circle(found, data)]
+
+
+def _circle(found: Result, data: Control) -> tuple[float, float]:
+    """Return how far δ̂ and the felt gradient are off, as shares, where most so."""
+    true, bend = real_scales(data), data.loader.bend
+    k, s2 = found.line.bend.value, found.s2_chosen
+    believed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)
+    table = data.schedule.total_gradient
+    pairs = []
+    for g in np.linspace(min(table), max(table), 3):
+        off = deflection_off(believed, k, true, bend, float(g))
+        basic = data.loader.basic_gradient
+        pairs.append((off, felt_off(believed.s2 / true.s2, k, bend, (float(g), basic))))
+    deflection, felt = np.max(np.abs(pairs), axis=0)
+    return float(deflection), float(felt)

@@ -56,8 +56,18 @@ def mean_of(values: Floats) -> Estimate:
 
 def product(first: Estimate, second: Estimate) -> Estimate:
     """Return the product of independent estimates; degrees of freedom by Welch-Satterthwaite."""
-    value = first.value * second.value
-    one, two = (first.error * second.value) ** 2, (second.error * first.value) ** 2
+    return _joined(
+        first.value * second.value, first.scaled(second.value), second.scaled(first.value)
+    )
+
+
+def total(first: Estimate, second: Estimate) -> Estimate:
+    """Return the sum of independent estimates; degrees of freedom by Welch-Satterthwaite."""
+    return _joined(first.value + second.value, first, second)
+
+
+def _joined(value: float, first: Estimate, second: Estimate) -> Estimate:
+    one, two = first.error**2, second.error**2
     spread = one**2 / first.freedom + two**2 / second.freedom
     freedom = (one + two) ** 2 / spread if spread > 0.0 else first.freedom + second.freedom
     return Estimate(value, float(np.sqrt(one + two)), freedom)
@@ -80,15 +90,18 @@ class Instruments:
     scale_step: float
     meter_step: float
 
-    def deflection_variance(self, deflection: Floats) -> Floats:
-        """Return the variance of a ruler's reading in d²: own error, rounding, wander."""
-        own = self.ruler**2 + self.ruler_step**2 / 12.0
-        return own + (self.hand * deflection) ** 2
+    def deflection_variance(self, deflection: Floats, looks: Floats | float = 1.0) -> Floats:
+        """Return the variance of the mean of so many looks at the ruler, d².
 
-    def force_variance(self, force: Floats) -> Floats:
-        """Return the variance of a spring scale's reading in N²."""
+        Own error, rounding, wander.
+        """
+        own = self.ruler**2 + self.ruler_step**2 / 12.0
+        return np.asarray((own + (self.hand * deflection) ** 2) / looks)
+
+    def force_variance(self, force: Floats, looks: Floats | float = 1.0) -> Floats:
+        """Return the variance of the mean of so many looks at the spring scale, N²."""
         own = self.scale**2 + self.scale_step**2 / 12.0
-        return own + (self.hand * force) ** 2
+        return np.asarray((own + (self.hand * force) ** 2) / looks)
 
     def voltage_variance(self, voltage: Floats) -> Floats:
         """Return the variance of a voltmeter's reading in V²."""

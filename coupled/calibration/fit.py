@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.calibration.estimate import Estimate, Instruments
+from coupled.calibration.readings import Readings
+from coupled.calibration.sandwich import Sandwich, sandwich
 
 Floats = NDArray[np.float64]
 
@@ -52,51 +54,40 @@ def condition(deflection: Floats, force: Floats) -> float:
     return float(np.linalg.cond(design / np.linalg.norm(design, axis=0)))
 
 
-def ordinary(deflection: Floats, force: Floats, v1: Floats, instruments: Instruments) -> LineFit:
-    """Return the ordinary least-squares fit.
-
-    The standard errors allow for readings of unequal accuracy (MacKinnon and White's HC3).
-    """
+def ordinary(readings: Readings, instruments: Instruments) -> LineFit:
+    """Return the ordinary least-squares fit; its standard errors come from its residuals."""
+    deflection, force, v1 = readings.deflection, readings.force, readings.v1
     design = np.column_stack((deflection, force))
     a, b = solve(design, v1)
-    variance = error_variance(a, b, deflection, force, v1, instruments)
-    return line_fit(design, a, b, v1 - design @ np.array([a, b]), variance)
+    residual = v1 - design @ np.array([a, b])
+    errors = sandwich(design[:, None, :], residual[:, None])
+    return line_fit(a, b, errors, residual, error_variance(a, b, readings, instruments))
 
 
-def error_variance(
-    a: float, b: float, deflection: Floats, force: Floats, v1: Floats, instruments: Instruments
-) -> Floats:
+def error_variance(a: float, b: float, readings: Readings, instruments: Instruments) -> Floats:
     """Return the variance of a·δ + b·F − v₁ that the instruments give each reading, V²."""
     return np.asarray(
-        a**2 * instruments.deflection_variance(deflection)
-        + b**2 * instruments.force_variance(force)
-        + instruments.voltage_variance(v1)
+        a**2 * instruments.deflection_variance(readings.deflection, readings.deflection_looks)
+        + b**2 * instruments.force_variance(readings.force, readings.force_looks)
+        + instruments.voltage_variance(readings.v1)
     )
 
 
-def line_fit(design: Floats, a: float, b: float, residual: Floats, variance: Floats) -> LineFit:
-    """Return a fit's figures from (a, b), by the sandwich of its design, shape (n, 2).
+def line_fit(a: float, b: float, errors: Sandwich, residual: Floats, variance: Floats) -> LineFit:
+    """Return S₁ and K = −b/a of a fit whose first two figures are a and b.
 
-    Each residual is weighed up by its leverage, which keeps the interval honest for few
-    readings. K = −b/a by its derivatives.
+    `residual` of v₁ in V, and the `variance` that the instruments give it in V².
     """
-    n = len(residual)
-    size = np.linalg.norm(design, axis=0)
-    scaled = design / size
-    q, r = np.linalg.qr(scaled)
-    leverage = np.minimum(np.einsum("ij,ij->i", q, q), 1.0 - 1e-9)
-    spread = np.linalg.solve(r, (q * (residual / (1.0 - leverage))[:, None]).T)
-    covariance = spread @ spread.T / np.outer(size, size)
-    slope = np.array([[1.0, 0.0], [b / a**2, -1.0 / a]])
-    found = slope @ covariance @ slope.T
-    errors = np.sqrt(np.diag(found))
-    product = float(errors[0] * errors[1])
+    n, more = len(residual), len(errors.back) - 2
+    slopes = np.array([[1.0, 0.0], [b / a**2, -1.0 / a]])
+    slopes = np.hstack((slopes, np.zeros((2, more))))
+    s1 = errors.estimate(float(a), slopes[0])
+    bend = errors.estimate(float(-b / a), slopes[1])
+    product = s1.error * bend.error
+    together = float(slopes[0] @ errors.covariance @ slopes[1])
     known = float(np.sum(variance))
-    excess = np.sqrt(np.sum(residual**2) / known * n / (n - 2)) if known > 0.0 else np.nan
-    return LineFit(
-        Estimate(float(a), float(errors[0]), n - 2.0),
-        Estimate(float(-b / a), float(errors[1]), n - 2.0),
-        float(found[0, 1]) / product if product > 0.0 else 0.0,
-        residual,
-        float(excess),
-    )
+    excess = np.nan
+    if known > 0.0:
+        excess = np.sqrt(np.mean(residual**2 / np.maximum(variance, 1e-300)) * n / (n - 2))
+    correlation = together / product if product > 0.0 else 0.0
+    return LineFit(s1, bend, correlation, residual, float(excess))

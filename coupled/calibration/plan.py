@@ -1,9 +1,10 @@
 """Which readings to take: at which gradients and deflections, and how many.
 
 The error of K follows from the design before anything is read: with information
-M = Σ x·xᵀ/w over readings x = (δ, F), its variance is cᵀ·M⁻¹·c, c the derivative of K
-= −b/a by (a, b). Only two corners matter to it, the softest gradient at full travel and the
-stiffest at full force; what lies between shows whether the bend is straight.
+M = Σ Xᵀ·X over the readings' whitened derivatives X by (a, b, S₃), its variance is
+cᵀ·M⁻¹·c, c the derivative of K = −b/a. Only two corners matter to it, the softest
+gradient at full travel and the stiffest at full force; what lies between shows whether the
+bend is straight. The interval has the degrees of freedom that a fit of the design has.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import t as student
 
 from coupled.calibration.belief import real_scales
-from coupled.calibration.estimate import COVERAGE, Instruments
+from coupled.calibration.errors_in_variables import expected_design
+from coupled.calibration.estimate import Estimate, Instruments
+from coupled.calibration.readings import readings_of
+from coupled.calibration.sandwich import sandwich
 from coupled.channels import ControlName, unit_of
 from coupled.errors import InputError
 from coupled.rig.parameters import Rig
@@ -28,6 +31,7 @@ STRONGEST_N = 150.0  # two thirds of what 14 CFR 25.143(d) allows one hand for a
 NEAREST, FARTHEST = 0.4, 1.0  # deflections within what travel and force allow, as shares
 FULL_TRAVEL = 0.95
 MOST_READINGS = 400
+NORMAL_95 = 1.96
 USUAL_LOSS = 0.1  # K·G taken at the stiffest gradient where the host believes no K yet
 
 
@@ -111,11 +115,18 @@ def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) 
 
 
 def precision(
-    rig: Rig, control: ControlName, design: Sequence[Station], instruments: Instruments
+    rig: Rig,
+    control: ControlName,
+    design: Sequence[Station],
+    instruments: Instruments,
+    looks: int = 2,
 ) -> Precision:
-    """Return what a design gives, for the K that the host believes or a usual one."""
-    rows, c, bend = _rows(rig, control, design, instruments)
-    return _precision(rows.T @ rows, c, bend, len(design))
+    """Return what a design gives, for the K that the host believes or a usual one.
+
+    `looks`: how often ruler and scale are read.
+    """
+    rows, c, bend = _rows(rig, control, design, instruments, looks)
+    return _precision(rows, c, bend)
 
 
 def fewest(
@@ -124,58 +135,80 @@ def fewest(
     instruments: Instruments,
     share: float,
     strongest_N: float = STRONGEST_N,
+    looks: int = 2,
 ) -> list[tuple[Station, int]]:
     """Return the fewest readings whose 95 % interval of K is ± this share of it, by station.
 
     Each in turn is the one that helps most. Raises InputError where very many do not do.
     """
     grid = stations(rig, control, 5, 4, strongest_N)
-    rows, c, bend = _rows(rig, control, grid, instruments)
+    rows, c, bend = _rows(rig, control, grid, instruments, looks)
     counts = np.zeros(len(grid), dtype=int)
-    ends = [int(np.argmax(rows[:, 0])), int(np.argmax(rows[:, 1]))]
+    ends = [int(np.argmax(rows[:, 0, 0])), int(np.argmax(rows[:, 1, 2]))]
     counts[ends] += 1
     while counts.sum() < MOST_READINGS:
-        information = (rows * counts[:, None]).T @ rows
-        reached = _precision(information, c, bend, int(counts.sum()))
-        if counts.sum() >= 4 and reached.half_width <= share:
-            return [(s, int(n)) for s, n in zip(grid, counts, strict=True) if n]
-        pull = rows @ np.linalg.solve(information, c)
-        spread = np.einsum("ij,jk,ik->i", rows, np.linalg.inv(information), rows)
-        counts[int(np.argmax(pull**2 / (1.0 + spread)))] += 1
+        information = np.einsum("n,nmp,nmq->pq", counts, rows, rows)
+        error = np.sqrt(c @ np.linalg.solve(information, c)) / bend
+        if counts.sum() >= 4 and NORMAL_95 * error <= share:
+            reached = _precision(np.repeat(rows, counts, axis=0), c, bend)
+            if reached.half_width <= share:
+                return [(s, int(n)) for s, n in zip(grid, counts, strict=True) if n]
+        counts[_most_helpful(rows, information, c)] += 1
     problem = f"{MOST_READINGS} readings do not give K to ±{100 * share:g} %; ask for less"
     raise InputError(rig.name, "--precision", problem)
 
 
+def _most_helpful(rows: Floats, information: Floats, c: Floats) -> int:
+    """Return which further reading makes K's variance least."""
+    lifted = rows @ np.linalg.inv(information)
+    pull = lifted @ c
+    inner = np.eye(rows.shape[1]) + lifted @ rows.transpose(0, 2, 1)
+    less = np.einsum("nm,nm->n", pull, np.linalg.solve(inner, pull[:, :, None])[:, :, 0])
+    return int(np.argmax(less))
+
+
 def _rows(
-    rig: Rig, control: ControlName, design: Sequence[Station], instruments: Instruments
+    rig: Rig,
+    control: ControlName,
+    design: Sequence[Station],
+    instruments: Instruments,
+    looks: int,
 ) -> tuple[Floats, Floats, float]:
-    """Return the whitened rows (δ, F)/√w, c, and the K in d/N assumed."""
+    """Return the whitened derivatives by (a, b, S₃), c, and the K in d/N assumed."""
     data = rig.controls[control]
-    s1 = real_scales(data).s1
+    scales = real_scales(data)
     bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.total_gradient)
     delta = np.array([station.deflection for station in design])
     force = np.array([station.force for station in design])
-    variance = (
-        s1**2 * instruments.deflection_variance(delta)
-        + (s1 * bend) ** 2 * instruments.force_variance(force)
-        + instruments.voltage_variance(s1 * (delta - bend * force))
-    )
-    rows = np.column_stack((delta, force)) / np.sqrt(variance)[:, None]
-    return rows, np.array([-bend / s1, -1.0 / s1]), bend
+    volts = (scales.s1 * (delta - bend * force), scales.s3 * force)
+    rise = np.full((2, len(design)), 0.0 if looks == 2 else np.nan)
+    columns = np.stack((delta, force, *volts, *rise))
+    labels = [station.label for station in design]
+    readings = readings_of(range(len(design)), labels, columns, [], np.empty((4, 0)))
+    figures = (scales.s1, -scales.s1 * bend, scales.s3)
+    c = np.array([-bend / scales.s1, -1.0 / scales.s1, 0.0])
+    return expected_design(readings, instruments, figures), c, bend
 
 
-def _precision(information: Floats, c: Floats, bend: float, count: int) -> Precision:
-    error = float(np.sqrt(c @ np.linalg.solve(information, c))) / bend
-    wide = float(student.ppf(0.5 + 0.5 * COVERAGE, count - 2)) if count > 2 else np.inf
-    return Precision(count, bend, error, wide * error)
+def _precision(rows: Floats, c: Floats, bend: float) -> Precision:
+    count = len(rows)
+    if count < 3:
+        return Precision(count, bend, np.inf, np.inf)
+    errors = sandwich(rows, np.zeros(rows.shape[:2]))
+    variance = float(np.sum((errors.back.T @ c) ** 2))
+    found = Estimate(bend, float(np.sqrt(variance)), errors.freedom(c)).scaled(1.0 / bend)
+    return Precision(count, bend, found.error, found.half_width)
 
 
-def form(chosen: Sequence[tuple[Station, int]], control: str) -> str:
+def form(chosen: Sequence[tuple[Station, int]], control: str, looks: int = 2) -> str:
     """Return a plan as a CSV to be filled in: where to hold, and empty cells to write into."""
     unit = unit_of(control)
-    lines = [f"gradient_set,deflection_{unit},force_N,v1_V,v3_V,v2_V,remark"]
+    heads = [f"gradient_set,deflection_{unit},force_N,v1_V,v3_V"]
+    heads += [f"force_after_N,deflection_after_{unit}"] if looks == 2 else []
+    lines = [",".join([*heads, "v2_V,approach,remark"])]
+    empty = "," * (7 + 2 * (looks == 2))
     for station, count in chosen:
         where = f"hold at {station.deflection:.4g} {unit} and about {station.force:.3g} N"
         where += f" with the host told {station.pressure_Pa:.5g} Pa"
-        lines += [f"{station.label},,,,,,{where}"] * count
+        lines += [f"{station.label}{empty}{where}"] * count
     return "\n".join(lines) + "\n"

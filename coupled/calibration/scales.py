@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.calibration.estimate import Estimate, Instruments, mean_of, product
+from coupled.calibration.estimate import Estimate, mean_of, product
 from coupled.rig.parameters import Gains
 
 Floats = NDArray[np.float64]
@@ -14,30 +14,6 @@ Floats = NDArray[np.float64]
 def s3_by_ratios(force: Floats, v3: Floats) -> Estimate:
     """Return S₃ in V/N as the mean of v₃/F, eq. (13)."""
     return mean_of(v3 / force)
-
-
-def s3_by_line(force: Floats, v3: Floats, instruments: Instruments) -> Estimate:
-    """Return S₃ in V/N as the slope of v₃ = S₃·F through the origin, both with errors.
-
-    Weighs a reading by its accuracy, where eq. (13) counts a small force as much as a large.
-    """
-    slope = float(force @ v3 / (force @ force))
-    variance = slope**2 * instruments.force_variance(force) + instruments.voltage_variance(v3)
-    if not np.any(variance):
-        variance = np.ones_like(force)
-    adjusted = force
-    for _ in range(50):
-        residual = v3 - slope * force
-        adjusted = force + slope * instruments.force_variance(force) * residual / variance
-        step = float((adjusted / variance) @ residual / ((adjusted / variance) @ adjusted))
-        slope += step
-        if abs(step) <= 1e-14 * abs(slope):
-            break
-    pull = adjusted / np.sqrt(variance)
-    leverage = np.minimum(pull**2 / (pull @ pull), 1.0 - 1e-9)
-    left = (v3 - slope * force) / np.sqrt(variance) / (1.0 - leverage)
-    error = float(np.sqrt(np.sum((pull * left) ** 2)) / (pull @ pull))
-    return Estimate(slope, error, len(force) - 1.0)
 
 
 def s2_from_gains(s1: Estimate, s3: Estimate, gains: Gains) -> dict[str, Estimate]:
@@ -50,6 +26,37 @@ def s2_from_gains(s1: Estimate, s3: Estimate, gains: Gains) -> dict[str, Estimat
     return found
 
 
-def s2_by_null(v2: Floats, v3: Floats, s3: Estimate) -> Estimate:
-    """Return S₂ in V/N as the mean of v₂/v₃, times S₃: eq. (14)."""
-    return product(mean_of(v2 / v3), s3)
+def s2_by_null(
+    v2: Floats, v3: Floats, side: Floats, s3: Estimate, one_sided_share: float = 0.0
+) -> Estimate:
+    """Return S₂ in V/N as the mean of v₂/v₃, times S₃: eq. (14).
+
+    A hand that wanders works a control with friction onward, so that the supply has to reach
+    the hand's extreme force and not its mean: v₂/v₃ is too large where the null was approached
+    outward and as much too small where inward (`side` ±1). With both sides the difference is
+    fitted and drops out. With one, S₂ may be off by up to `one_sided_share` of itself, which
+    enters the error as an even distribution over ± that.
+    """
+    ratio = v2 / v3
+    if both_sides(side):
+        found = _centre(ratio, side)
+    else:
+        found = mean_of(ratio)
+        error = np.hypot(found.error, one_sided_share * found.value / np.sqrt(3.0))
+        found = Estimate(found.value, float(error), found.freedom)
+    return product(found, s3)
+
+
+def both_sides(side: Floats) -> bool:
+    """Return whether nulls from both sides are enough to fit their difference."""
+    return len(side) >= 4 and len(set(side.tolist())) == 2
+
+
+def _centre(values: Floats, side: Floats) -> Estimate:
+    """Return the centre between values from two sides, by least squares of centre and half gap."""
+    design = np.column_stack((np.ones_like(side), side))
+    figures, *_ = np.linalg.lstsq(design, values, rcond=None)
+    freedom = len(values) - 2.0
+    variance = float(np.sum((values - design @ figures) ** 2)) / freedom
+    error = np.sqrt(variance * np.linalg.inv(design.T @ design)[0, 0])
+    return Estimate(float(figures[0]), float(error), freedom)

@@ -45,7 +45,7 @@ def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]
             readings.v3,
             readings.force,
             instruments.voltage_variance(readings.v3),
-            instruments.force_variance(readings.force),
+            instruments.force_variance(readings.force, readings.force_looks),
         )
         for row, one, two in zip(readings.row, line, ratio, strict=True):
             if max(one, two) > TOO_FAR:
@@ -115,7 +115,7 @@ def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
     """Return how many deviations each v₁ is off the robust line."""
     d, f, v = readings.deflection, readings.force, readings.v1
     a, b = robust_line(d, f, v, np.ones_like(v))
-    spread = np.sqrt(error_variance(a, b, d, f, v, instruments))
+    spread = np.sqrt(error_variance(a, b, readings, instruments))
     spread = np.maximum(spread, SLIP * np.max(np.abs(v)))
     a, b = robust_line(d, f, v, spread)
     return _deviations((v - a * d - b * f) / spread)

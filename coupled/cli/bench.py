@@ -13,6 +13,7 @@ from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
     ErrorOption,
+    OnceOption,
     RigOption,
     StrongestOption,
     instruments,
@@ -36,7 +37,8 @@ def bench(
     control: ControlOption = "column",
     gradients: Annotated[int, typer.Option(help="Gradient sets.", min=1, max=30)] = 5,
     deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = 5,
-    nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 5,
+    nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 6,
+    once: OnceOption = False,
     precision: Annotated[
         float | None,
         typer.Option(
@@ -64,7 +66,7 @@ def bench(
     from coupled.calibration.bench import Bench, take_readings
     from coupled.calibration.estimate import perfect_instruments
     from coupled.calibration.plan import fewest, stations
-    from coupled.calibration.readings import write_readings
+    from coupled.calibration.readingsfile import write_readings
 
     file, data, name = rig_and_control(rig, control)
     path = output or Path("out") / f"{data.name}-readings.csv"
@@ -77,9 +79,9 @@ def bench(
     tools = instruments(name, error)
     grid = stations(data, name, gradients, deflections, strongest)
     if precision is not None:
-        planned = fewest(data, name, tools, precision / 100.0, strongest)
+        planned = fewest(data, name, tools, precision / 100.0, strongest, 1 if once else 2)
         grid = [station for station, count in planned for _ in range(count)]
-    made = Bench(data, name, grid, perfect_instruments() if perfect else tools, nulls)
+    made = Bench(data, name, grid, perfect_instruments() if perfect else tools, nulls, not once)
     if repeat:
         _repeat(made, repeat, seed, json_file)
         return

@@ -13,6 +13,7 @@ from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
     ErrorOption,
+    OnceOption,
     RigOption,
     StrongestOption,
     instruments,
@@ -50,6 +51,7 @@ def calibrate(
         float, typer.Option(help="Wanted of K by a plan, ± % (95 %).", min=0.1, max=100)
     ] = 5.0,
     strongest: StrongestOption = 150.0,
+    once: OnceOption = False,
     figure: Annotated[
         Path | None, typer.Option(help="Draw readings and fit (figure 4): PNG, PDF or SVG.")
     ] = None,
@@ -62,7 +64,8 @@ def calibrate(
     if plan:
         if readings is not None or figure is not None:
             raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
-        _plan(data, name, tools, (precision / 100.0, strongest), (write, json_file))
+        wanted = (precision / 100.0, strongest, 1 if once else 2)
+        _plan(data, name, tools, wanted, (write, json_file))
         return
     if readings is None:
         raise InputError("calibrate", "", "give a file of readings, or --plan for which to take")
@@ -89,7 +92,7 @@ def _calibrate(
 ) -> None:
     from coupled.calibration.belief import with_calibration
     from coupled.calibration.calibrate import calibrate as fit
-    from coupled.calibration.readings import read_readings
+    from coupled.calibration.readingsfile import read_readings
     from coupled.rig.rigfile import rig_from_table
     from coupled.rig.rigwrite import rig_text
     from coupled.schema import loads_toml
@@ -122,13 +125,13 @@ def _plan(
     rig: Rig,
     control: ControlName,
     tools: Instruments,
-    wanted: tuple[float, float],
+    wanted: tuple[float, float, int],
     targets: tuple[Path | None, str],
 ) -> None:
     from coupled.calibration.plan import fewest, form, precision, stations
     from coupled.tables.calibration import print_plan
 
-    (share, strongest), (write, json_file) = wanted, targets
+    (share, strongest, looks), (write, json_file) = wanted, targets
     if write is not None:
         if write.suffix.lower() != ".csv":
             raise InputError(write, "--write", "a form for readings ends in .csv")
@@ -136,15 +139,16 @@ def _plan(
     check_json(json_file, [write] if write else [])
     sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
     grids = {
-        size: precision(rig, control, stations(rig, control, *size, strongest), tools)
+        size: precision(rig, control, stations(rig, control, *size, strongest), tools, looks)
         for size in sizes
     }
-    chosen = fewest(rig, control, tools, share, strongest)
-    reached = precision(rig, control, [s for s, count in chosen for _ in range(count)], tools)
+    chosen = fewest(rig, control, tools, share, strongest, looks)
+    design = [s for s, count in chosen for _ in range(count)]
+    reached = precision(rig, control, design, tools, looks)
     if json_file != "-":
         print_plan(out, control, grids, chosen, reached)
     if write is not None:
-        write_text(write, form(chosen, control))
+        write_text(write, form(chosen, control, looks))
         if json_file != "-":
             say(f"form: {write}")
     table = {

@@ -83,7 +83,7 @@ def _fit_for(
     from coupled.calibration.bench import Bench, take_readings
     from coupled.calibration.calibrate import calibrate as fit
     from coupled.calibration.plan import stations
-    from coupled.calibration.readings import read_readings
+    from coupled.calibration.readingsfile import read_readings
 
     data, tools = rig.controls[control], instruments(control, None)
     if readings is not None:

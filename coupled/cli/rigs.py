@@ -38,6 +38,12 @@ StrongestOption = Annotated[
 ]
 
 
+OnceOption = Annotated[
+    bool,
+    typer.Option("--once", help="Ruler and scale read once, not again after the voltmeter."),
+]
+
+
 def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
     """Return a rig's file, the rig, and the control that is meant."""
     from coupled.rig.rigfile import read_rig

@@ -70,7 +70,8 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> 
     ]
     worst = min(ours, key=lambda check: check.margin)
     word = "pass" if worst.passed else "FAIL"
-    return f"{pressure(pressure_Pa)}: {word}, least margin {100 * worst.margin:.0f} %"
+    margin = f"{100 * worst.margin:.{0 if abs(worst.margin) >= 0.01 else 1}f}".replace("-", "−")
+    return f"{pressure(pressure_Pa)}: {word}, least margin {margin} %"
 
 
 def draw_releases(found: Documentation) -> Figure:
@@ -117,12 +118,10 @@ def _draw_tolerance(axes: Any, wanted: Release, swing: Swing) -> None:
         low, high = (begin + swing.fall_s * (1.0 + s * TIME_SHARE) for s in (-1.0, 1.0))
         axes.plot([low, high], [10.0, 10.0], label="tolerance", **style)
         return
-    for n, crossing in enumerate(swing.crossings[: len(swing.peaks) + 1]):
-        if n == 1:  # half a period: the rule leaves it free
-            continue
-        wide = TIME_SHARE * swing.crossings[0]
-        if n >= 2:
-            wide += TIME_SHARE * (n - 1) * (crossing - swing.crossings[n - 2])
+    crossings = swing.crossings[: len(swing.peaks) + 1 : 2]  # whole periods apart
+    wide = 0.0
+    for n, (crossing, before) in enumerate(zip(crossings, [0.0, *crossings], strict=False)):
+        wide += TIME_SHARE * (n + 1) * (crossing - before)
         at = begin + crossing
         axes.plot([at - wide, at + wide], [0.0, 0.0], label=None if n else "tolerance", **style)
     starts = np.append(swing.crossings, np.inf) + begin

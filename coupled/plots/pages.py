@@ -12,6 +12,7 @@ from coupled.units import DEGREE_rad
 if TYPE_CHECKING:
     from coupled.calibration.documentation import Documentation
 
+NARROWEST = 7.4  # inches that a page's title needs
 GRAY, ORANGE, GREEN, BLUE = "0.62", "#d55e00", "#009e73", "#0072b2"
 
 
@@ -28,7 +29,8 @@ def plain(text: str, longest: int = 20) -> str:
 
 def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
     """Return a figure of so many panels, each `height` inches tall, and their axes."""
-    figure = Figure(figsize=(1.4 + 3.6 * columns, 1.1 + height * rows), layout="constrained")
+    wide = max(1.4 + 3.6 * columns, NARROWEST)
+    figure = Figure(figsize=(wide, 1.1 + height * rows), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 

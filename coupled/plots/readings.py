@@ -13,9 +13,23 @@ from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result
+    from coupled.calibration.estimate import Estimate
 
 _SETS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "black", "0.5")
 _MARKS = "osD^vP*X"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def plus_minus(found: Estimate) -> str:
+    """Return a figure with half of its interval, both to the latter's second digit."""
+    if not 0.0 < found.half_width < abs(found.value):
+        return f"{found.value:.6g} ± {found.half_width:.2g}"
+    power = int(np.floor(np.log10(abs(found.value))))
+    power = power if abs(power) > 3 else 0
+    value, wide = found.value / 10.0**power, found.half_width / 10.0**power
+    digits = max(1 - int(np.floor(np.log10(wide))), 0)
+    text = f"{value:.{digits}f} ± {wide:.{digits}f}"
+    return f"({text})·10{str(power).translate(_RAISED)}" if power else text
 
 
 def draw_readings(found: Result, source: str) -> Figure:
@@ -49,11 +63,10 @@ def draw_readings(found: Result, source: str) -> Figure:
     top.legend(fontsize=6 if many else 8, ncols=2 if many else 1, loc="upper left")
     d_unit = unit_of(found.control)
     s1, bend = line.s1, line.bend
-    text = f"S₁ = {s1.value:.5g} ± {s1.half_width:.2g} V/{d_unit}\n"
-    text += f"K = {bend.value:.4g} ± {bend.half_width:.2g} {d_unit}/N"
+    text = f"S₁ = {plus_minus(s1)} V/{d_unit}\nK = {plus_minus(bend)} {d_unit}/N"
     if unit == "cm":
         inches = bend.scaled(POUND_N / INCH_m)
-        text += f"\n   = {inches.value:.4f} ± {inches.half_width:.4f} in/lb"
+        text += f"\n   = {plus_minus(inches)} in/lb"
     text += f"\n{found.count} readings, ± 95 %"
     top.annotate(text, (0.98, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=9)
     figure.suptitle(

@@ -6,6 +6,7 @@ loader with its multiplier replaced by a voltage supply, as the null of eq. (14)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
@@ -74,26 +75,34 @@ def smooth(share: Floats) -> Floats:
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(share, 0.0, 1.0)))
 
 
-def supply_told(rig: Rig, control: str, supply_N: float, rise_s: float, rest_s: float) -> float:
-    """Return δc in d of a free control under a supply in the multiplier's place.
+def under_supply(
+    rig: Rig, control: str, rise_s: float, rest_s: float
+) -> Callable[[float, float], float]:
+    """Return what tells δc in d of a free control under a supply in the multiplier's place.
 
-    `supply_N` is the force that the supply's voltage v₂ stands for, v₂/S₂, positive with the
-    pilot's, turned up over `rise_s` and left for `rest_s`. The control starts at rest at
-    neutral, with no hand on it (v₃ = 0).
+    Its arguments are two forces in N that the supply's voltage v₂ stands for, v₂/S₂, positive
+    with the pilot's: it is turned to the first over `rise_s`, to the second over as long, and
+    left for `rest_s`. The control starts at rest at neutral, with no hand on it (v₃ = 0).
     """
-    controls = pack(alone(rig, control))
-    p, s = controls["parameters"], controls["state"]
-    p["loader"]["digital"] = 1  # F_mod is what is held, not a product
+    packed = pack(alone(rig, control))
+    packed["parameters"]["loader"]["digital"] = 1  # F_mod is what is held, not a product
     h = 1.0 / (rig.frame_rate * rig.substeps)
-    _supplied(p, s, supply_N, _turned_up(rise_s, rest_s, h), h)
-    return float(s["loader"]["computed"][0])
+    up, on = _turned(rise_s, rest_s, h)
+
+    def rests_at(first_N: float, then_N: float) -> float:
+        controls = packed.copy()
+        supply = first_N * up + (then_N - first_N) * on
+        _supplied(controls["parameters"], controls["state"], supply, h)
+        return float(controls["state"]["loader"]["computed"][0])
+
+    return rests_at
 
 
 @lru_cache(maxsize=8)
-def _turned_up(rise_s: float, rest_s: float, h: float) -> Floats:
-    """Return how far up a supply is at the nodes after the first, 0 to 1."""
-    nodes = np.arange(1.0, round((rise_s + rest_s) / h) + 1.0)
-    return smooth(nodes * (h / rise_s))
+def _turned(rise_s: float, rest_s: float, h: float) -> tuple[Floats, Floats]:
+    """Return how far two turns of a knob are, one after the other, at nodes after the first."""
+    turns = np.arange(1.0, round((2.0 * rise_s + rest_s) / h) + 1.0) * (h / rise_s)
+    return smooth(turns), smooth(turns - 1.0)
 
 
 @entry
@@ -103,10 +112,10 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 
 
 @entry
-def _supplied(parameters: Any, states: Any, supply: float, share: Floats, h: float) -> None:
+def _supplied(parameters: Any, states: Any, supply_N: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
     start_delay(p.loader, s.loader, 0.0)
     set_external(p.loader, s.loader, 1.0)
-    for node in range(len(share)):
-        s.modification.held = -supply * share[node]
+    for node in range(len(supply_N)):
+        s.modification.held = -supply_N[node]
         move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, h)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from coupled.calibration.estimate import Estimate
     from coupled.calibration.plan import Precision, Station
 
+CREEP = 3.0  # standard errors of the mean rise that are no chance
 LARGE, SMALL = 2.0, 0.4  # residuals over the instruments' errors that call for a word
 
 
@@ -42,8 +43,8 @@ def print_calibration(console: Console, found: Result) -> None:
     _row(table, "  ordinary least squares", found.plain.bend.scaled(factor))
     error = factor * found.plain.bend.error
     table.add_row("  normal equations, appendix A", _number(-b / a * factor, error), "", "")
-    _row(table, "S3, V/N, eq. (13)", found.s3)
-    _row(table, "  errors in both", found.s3_line)
+    _row(table, "S3, V/N", found.s3)
+    _row(table, "  mean of v3/F, eq. (13)", found.s3_mean)
     for i, (way, estimate) in enumerate(found.s2.items()):
         _row(table, f"{'  ' if i else 'S2, V/N, '}by {way}", estimate)
     sets = len(set(found.readings.label))
@@ -63,7 +64,7 @@ def print_calibration(console: Console, found: Result) -> None:
 def _row(table: Table, name: str, estimate: Estimate) -> None:
     error = estimate.error
     ends = f"{_number(estimate.low, error)} to {_number(estimate.high, error)}"
-    table.add_row(name, _number(estimate.value, error), f"{error:.2g}", ends)
+    table.add_row(name, _number(estimate.value, error), f"{error:#.2g}".rstrip("."), ends)
 
 
 def _number(value: float, error: float) -> str:
@@ -104,9 +105,46 @@ def _words(found: Result) -> list[str]:
             f"row {s.row} is left out: {s.columns} is {s.deviations:.0f} standard deviations"
             " off, mistyped?"
         )
-    words += _arc_words(found)
+    words += _creep_words(found) + _outcome_words(found) + _arc_words(found)
     words += [f"stale calibration in the rig file: {change}" for change in found.changed]
     return words
+
+
+def _creep_words(found: Result) -> list[str]:
+    """Return what the second looks show of a control that crept, and a null from one side."""
+    words = []
+    d, factor, unit = unit_of(found.control), 1000.0, "mm"
+    if d == "rad":
+        factor, unit = 1.0 / DEGREE_rad, "°"
+    rise = found.readings.deflection_rise
+    rise = rise[~np.isnan(rise)]
+    if len(rise) > 2:
+        error = float(np.std(rise, ddof=1) / np.sqrt(len(rise)))
+        mean = float(np.mean(rise))
+        text = f"ruler's second look less its first: {factor * mean:+.2g} {unit} on the mean"
+        text += f" (std. error {factor * error:.1g})"
+        if abs(mean) > CREEP * error > 0.0:
+            text += "; the control creeps while it is read, their mean allows for it"
+        words.append(text)
+    if found.one_sided:
+        words.append(
+            "The nulls are not four or more from both sides, and the control has friction: S2 is"
+            " widened for what a wandering hand does then. Take more from beyond (approach: in)."
+        )
+    return words
+
+
+def _outcome_words(found: Result) -> list[str]:
+    """Return what the figures give to those who fly with them."""
+    if found.outcome is None or found.outcome.deflection.error == 0.0:
+        return []
+    off, felt = found.outcome.deflection, found.outcome.felt
+    gradient = f"{found.outcome.gradient:.4g} N/{unit_of(found.control)}"
+    text = f"compensated with these, at {gradient} the aircraft gets the deflection to within"
+    text += f" {100 * off.half_width:.2g} %"
+    if felt is not None:
+        text += f" and the hand the gradient to within {100 * felt.half_width:.2g} %"
+    return [f"{text} (95 %)"]
 
 
 def _arc_words(found: Result) -> list[str]:
@@ -178,6 +216,9 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     table.add_row("bias of K, ordinary least squares", f"{100 * coverage.ordinary_bias:+.2f} %")
     table.add_row("scatter of K, errors in all variables", f"{100 * coverage.spread:.2f} %")
     table.add_row("a good reading taken for mistyped", f"{100 * coverage.accused:.1f} %")
+    table.add_row("compensated, deflection within 0.5 %", f"{100 * coverage.deflection:.1f} %")
+    table.add_row("compensated, felt gradient within 1 %", f"{100 * coverage.felt:.1f} %")
+    table.add_row("  both", f"{100 * coverage.circle:.1f} %")
     console.print(table)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.calibration.estimate import Instruments
-from coupled.calibration.readings import Readings
+from coupled.calibration.readings import Readings, readings_of
 from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Control, Rig
 from coupled.rig.rigfile import read_rig
@@ -44,19 +44,10 @@ def readings(
 ) -> Readings:
     """Return readings of these values, volts by eq. (3) unless given; no null."""
     n = len(delta)
-    none = np.empty(0)
-    return Readings(
-        row=np.arange(2, n + 2),
-        label=tuple(str(1 + i // per_set) for i in range(n)),
-        deflection=delta,
-        force=force,
-        v1=S1 * (delta - K * force) if v1 is None else v1,
-        v3=S3 * force if v3 is None else v3,
-        null_row=np.empty(0, np.int64),
-        null_v1=none,
-        null_v2=none,
-        null_v3=none,
-    )
+    four = (delta, force, S1 * (delta - K * force) if v1 is None else v1)
+    columns = np.stack((*four, S3 * force if v3 is None else v3, *np.full((2, n), np.nan)))
+    labels = [str(1 + i // per_set) for i in range(n)]
+    return readings_of(range(2, n + 2), labels, columns, [], np.empty((4, 0)))
 
 
 def with_errors(

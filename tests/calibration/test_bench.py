@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from coupled.authority import compare
-from coupled.calibration.belief import real_scales, with_calibration
-from coupled.calibration.bench import Bench, take_readings
+from coupled.calibration.belief import Scales, real_scales, with_calibration
+from coupled.calibration.bench import Bench, _meters_rig, _null, take_readings
 from coupled.calibration.calibrate import calibrate
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
-from coupled.calibration.plan import fewest, stations
+from coupled.calibration.outcome import deflection_off, felt_off
+from coupled.calibration.plan import stations
 from coupled.channels import ControlName
 from coupled.errors import InputError
 from coupled.flight.loop import fly
@@ -25,7 +26,7 @@ from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.rig.statics import static_line
-from coupled.rig.told import run_told, supply_told
+from coupled.rig.told import run_told, under_supply
 from tests.calibration.made import report_rig
 from tests.rigs import G_STIFF, K_REPORT
 from tests.rigs import bench as bench_rig
@@ -100,9 +101,53 @@ def test_the_bench_is_the_rig_that_flies() -> None:
 
 def test_a_supply_moves_the_control_as_the_hands_force_does() -> None:
     """At rest G_B·δc = v₂/S₂, with v₃ = 0: appendix B."""
-    rig = bench_rig()
-    assert supply_told(rig, "column", 28.0, 0.5, 4.0) == pytest.approx(0.05, rel=1e-9)
-    assert supply_told(rig, "column", -28.0, 0.5, 4.0) == pytest.approx(-0.05, rel=1e-9)
+    rests_at = under_supply(bench_rig(), "column", 0.5, 4.0)
+    assert rests_at(0.0, 28.0) == pytest.approx(0.05, rel=1e-9)
+    assert rests_at(0.0, -28.0) == pytest.approx(-0.05, rel=1e-9)
+
+
+def test_a_supply_from_beyond_comes_to_rest_on_frictions_other_side() -> None:
+    """G_B·δc = v₂/S₂ − f outward, + f where it was turned up further first."""
+    rests_at = under_supply(bench_rig({"friction_N": 6.0}), "column", 2.0, 4.0)
+    assert rests_at(45.0, 50.0) == pytest.approx(44.0 / 560.0, rel=2e-3)
+    assert rests_at(70.0, 50.0) == pytest.approx(56.0 / 560.0, rel=2e-3)
+
+
+def test_a_hand_that_eases_back_leaves_the_control_where_it_is() -> None:
+    """On the 737's column a wandering hand moves nothing between the ruler's look and v₁'s.
+
+    All instruments perfect: v₁ = S₁·(δ − K·F) is off by the wander of the bend alone,
+    2·0.3 % of K·F at most nine times in ten, and not by creep, which has one sign.
+    """
+    rig = read_rig(shipped_rigs()["737"])
+    tools = replace(perfect_instruments(), hand=0.003)
+    made = Bench(rig, "column", stations(rig, "column", 4, 4), tools, 0)
+    off = []
+    for seed in range(4):
+        r = take_readings(made, seed)
+        true, bend = real_scales(rig.controls["column"]), rig.controls["column"].loader.bend
+        off.append((r.v1 / true.s1 - r.deflection + bend * r.force) / (bend * r.force))
+        assert np.all(np.abs(r.deflection_rise) < 0.02 * bend * r.force)
+    share = np.concatenate(off)
+    assert abs(np.mean(share)) < 4.0 * np.std(share) / np.sqrt(len(share))
+    assert np.mean(np.abs(share) < 0.006) > 0.9
+
+
+@pytest.mark.parametrize(("name", "control"), [("737", "column"), ("c172p", "pedals")])
+def test_the_mean_of_both_sides_is_s2_where_one_side_is_not(
+    name: str, control: ControlName
+) -> None:
+    """Friction keeps a wandering hand's extreme: outward nulls are high, inward ones low."""
+    rig = read_rig(shipped_rigs()[name])
+    tools = replace(perfect_instruments(), hand=0.003)
+    made = Bench(rig, control, [], tools, 50)
+    null = _null(_meters_rig(rig, control), made, np.random.default_rng(1))
+    true = real_scales(rig.controls[control])
+    ratio = null[1] / null[2] * true.s3 / true.s2 - 1.0
+    out, back = ratio[null[3] > 0.0].mean(), ratio[null[3] < 0.0].mean()
+    assert out > 0.002
+    assert back < -0.002
+    assert abs(0.5 * (out + back)) < 0.0018  # 4 standard errors
 
 
 def test_scales_that_are_off_are_felt_by_the_host() -> None:
@@ -125,8 +170,16 @@ def test_a_seed_repeats_a_bench_and_another_does_not() -> None:
     one, two, other = (take_readings(made, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.v1, two.v1)
     assert np.any(one.v1 != other.v1)
-    assert np.allclose(one.deflection / 0.5e-3, np.round(one.deflection / 0.5e-3))
-    assert np.allclose(one.force / 0.5, np.round(one.force / 0.5))
+    for mean, rise, step in (
+        (one.deflection, one.deflection_rise, 0.5e-3),
+        (one.force, one.force_rise, 0.5),
+    ):
+        for look in (mean - 0.5 * rise, mean + 0.5 * rise):
+            np.testing.assert_allclose(look / step, np.round(look / step), atol=1e-6)
+        assert np.any(rise != 0.0)
+    once = take_readings(replace(made, again=False), 1)
+    assert np.all(once.deflection_looks == 1.0)
+    assert np.all(one.deflection_looks == 2.0)
 
 
 def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
@@ -168,9 +221,10 @@ def test_full_circle(tmp_path: Path) -> None:
     rig = base.model_copy(update={"controls": {"column": never}})
     assert flown(rig, "compensated").loss == pytest.approx(0.20, abs=0.012)
     tools = usual_instruments("column")
-    planned = [s for s, count in fewest(rig, "column", tools, 0.05) for _ in range(count)]
-    for seed in range(5):
-        readings = take_readings(Bench(rig, "column", planned, tools), seed)
+    true, bend = real_scales(never), never.loader.bend
+    for seed in range(4):
+        grid = stations(rig, "column", 5, 5)
+        readings = take_readings(Bench(rig, "column", grid, tools), seed)
         found = calibrate(readings, never, "column", tools, "bench")
         path = tmp_path / "new.toml"
         path.write_text(rig_text(with_calibration(rig, "column", found)), encoding="utf-8")
@@ -178,13 +232,22 @@ def test_full_circle(tmp_path: Path) -> None:
         print(f"full circle: loss {100 * after.loss:+.2f} %, felt {after.felt_ratio:.4f}")
         assert abs(after.loss) < 0.005
         assert after.felt_ratio == pytest.approx(1.0, abs=0.01)
+        # and it is what the closed form of the coverage's count says
+        s2 = found.s2["the null, eq. (14)"]
+        believed = Scales(found.line.s1.value, s2.value, found.s3.value)
+        k, stiff = found.line.bend.value, max(never.schedule.total_gradient)
+        off = deflection_off(believed, k, true, bend, stiff)
+        felt = felt_off(s2.value / true.s2, k, bend, (stiff, never.loader.basic_gradient))
+        assert after.loss == pytest.approx(-off, abs=4e-4)
+        read = after.felt_ratio * found.s3.value / true.s3  # a record has the force as read
+        assert read - 1.0 == pytest.approx(felt, abs=4e-4)
 
 
 def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
     """A fault crosses from a worker as the one line that it is."""
     rig = report_rig()
     few = stations(rig, "column", 3, 1)
-    with pytest.raises(InputError, match="holds 3 readings"):
+    with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
         measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)
 
 

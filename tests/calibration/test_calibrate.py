@@ -12,7 +12,8 @@ import pytest
 from coupled.calibration.belief import believed_scales, real_scales, stale, with_calibration
 from coupled.calibration.calibrate import calibrate
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
-from coupled.calibration.readings import Readings, read_readings
+from coupled.calibration.readings import Readings
+from coupled.calibration.readingsfile import read_readings
 from coupled.errors import InputError
 from coupled.rig.parameters import Control
 from coupled.rig.rigfile import read_rig
@@ -70,10 +71,14 @@ def test_noise_does_not_pass_for_a_second_gradient() -> None:
     ("change", "says"),
     [
         ({"force": np.full(25, 40.0)}, "rows 2 to 26: every force is the same"),
-        ({"deflection": np.full(25, 0.04)}, "every deflection is the same"),
         ({"v1": np.full(25, 4.0)}, "every v1 is the same"),
         ({"force": np.zeros(25)}, "is not 0 in 0 rows"),
-        ({"v1": -readings(*grid()).v1}, "check its sign"),
+        ({"v1": -readings(*grid()).v1}, "v1_V: falls as the deflection grows"),
+        ({"v3": -readings(*grid()).v3}, "v3_V: falls as the force grows"),
+        ({"v3": np.zeros(25)}, "every v3 is the same"),
+        ({"v1": S1 * (grid()[0] + K * grid()[1])}, "K comes out negative"),
+        ({"force": grid()[1] * np.where(np.arange(25) < 20, 1.0, -1.0)}, "row 22: force and defl"),
+        ({"deflection": 1000.0 * grid()[0]}, "row 2: deflection: is .* another unit"),
     ],
 )
 def test_readings_that_tell_nothing_are_refused(change: Any, says: str) -> None:
@@ -81,8 +86,24 @@ def test_readings_that_tell_nothing_are_refused(change: Any, says: str) -> None:
         fit(replace(readings(*grid()), **change))
 
 
+def test_a_control_held_at_one_deflection_tells_k_by_its_gradients() -> None:
+    """As the report found the loss: the same throw at low and high gradients."""
+    slopes = np.array([560.4, 900.0, 1300.0, 1700.0, 2189.1])
+    r = readings(np.full(5, 0.06), slopes * 0.06, per_set=1)
+    assert fit(r, tools=perfect_instruments()).line.bend.value == pytest.approx(K, rel=1e-9)
+
+
+def test_a_supply_against_the_hand_is_named() -> None:
+    good = readings(*grid())
+    null = {"null_v1": [9.0, 8.0], "null_v2": [5.0, -4.0], "null_v3": [5.0, 4.0]}
+    arrays = {name: np.array(values) for name, values in null.items()}
+    r = replace(good, null_row=np.array([27, 28]), null_side=np.ones(2), **arrays)
+    with pytest.raises(InputError, match="row 28: v2_V: has another sign than v3"):
+        fit(r)
+
+
 def test_too_few_readings() -> None:
-    with pytest.raises(InputError, match="holds 3 readings"):
+    with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
         fit(readings(*grid(3, 1), per_set=1))
 
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from coupled.calibration.documentation import document
+from coupled.calibration.estimate import Estimate
 from coupled.cli import main
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.documentation import draw_deflections, draw_forces, save_pages
+from coupled.plots.readings import plus_minus
 from coupled.plots.saving import save
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
@@ -36,7 +38,7 @@ def test_help_has_examples(folder: Path) -> None:
 def test_bench_calibrate_write_and_again(folder: Path) -> None:
     done = coupled(folder, "bench", "-o", "b.csv")
     assert done.returncode == 0, done.stderr
-    assert done.stdout == "readings: b.csv  (25 readings, 5 nulls)\n"
+    assert done.stdout == "readings: b.csv  (25 readings, 6 nulls)\n"
     words = ["calibrate", "b.csv", "--write", "new.toml", "--date", "1974-02-04"]
     done = coupled(folder, *words, "--figure", "f.png", "--json", "c.json")
     assert done.returncode == 0, done.stderr
@@ -180,6 +182,21 @@ def test_words_that_lead_nowhere_end_in_one_line(
     assert says in printed.err
     assert printed.out == ""
     assert files(folder) == {"r.csv"}
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (9.092e-5, 1e-6, "(9.09 ± 0.20)·10⁻⁵"),
+        (562.39, 1.0, "562.4 ± 2.0"),
+        (0.015922, 1e-4, "0.01592 ± 0.00020"),
+        (0.25, 0.0, "0.25 ± 0"),
+    ],
+)
+def test_a_figure_and_its_interval_end_at_the_same_digit(
+    value: float, error: float, text: str
+) -> None:
+    assert plus_minus(Estimate(value, error, 1e9)) == text
 
 
 def test_every_control_of_a_shipped_rig_is_drawn(tmp_path: Path) -> None:

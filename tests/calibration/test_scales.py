@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 from coupled.calibration import arc, scales
-from coupled.calibration.estimate import Estimate, mean_of, product, usual_instruments
+from coupled.calibration.estimate import Estimate, mean_of, product, total
 from coupled.rig.parameters import Gains
 from coupled.units import DEGREE_rad
-from tests.calibration.made import S3, grid, with_errors
-
-USUAL = usual_instruments("column")
 
 
 def test_eq_13_is_the_mean_of_the_ratios() -> None:
@@ -24,7 +20,7 @@ def test_eq_13_is_the_mean_of_the_ratios() -> None:
 
 def test_eq_14_is_the_ratio_of_the_null_times_s3() -> None:
     s3 = Estimate(0.25, 0.0, 24.0)
-    found = scales.s2_by_null(np.array([12.0, 18.0]), np.array([12.5, 18.75]), s3)
+    found = scales.s2_by_null(np.array([12.0, 18.0]), np.array([12.5, 18.75]), np.ones(2), s3)
     assert found.value == pytest.approx(0.24)
 
 
@@ -42,22 +38,32 @@ def test_a_product_adds_relative_variances() -> None:
     assert found.error == pytest.approx(6.0 * np.sqrt(2e-4))
     assert found.freedom == pytest.approx(20.0)
     exact = product(Estimate(2.0, 0.0, 10.0), Estimate(3.0, 0.0, 7.0))
+    summed = total(Estimate(2.0, 0.03, 10.0), Estimate(3.0, 0.04, 1e9))
+    assert (summed.value, summed.error) == (5.0, pytest.approx(0.05))
+    assert summed.freedom == pytest.approx(0.0025**2 / (0.0009**2 / 10.0), rel=1e-6)
     assert (exact.error, exact.low, exact.high) == (0.0, 6.0, 6.0)
 
 
-def test_s3_with_errors_in_both_is_the_brute_force_fit() -> None:
-    r = with_errors(*grid(), USUAL, np.random.default_rng(1))
-    sf, sv = np.sqrt(USUAL.force_variance(r.force)), np.sqrt(USUAL.voltage_variance(r.v3))
-    # The weights are those at the ordinary slope, as in the fit itself.
-    slope = float(r.force @ r.v3 / (r.force @ r.force))
-    found = scales.s3_by_line(r.force, r.v3, USUAL)
+def test_nulls_from_both_sides_are_free_of_what_friction_does() -> None:
+    """Each side off by 1 % the other way: the centre, and an error that the gap does not widen."""
+    s3 = Estimate(0.25, 0.0, 24.0)
+    side = np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    v3 = np.full(5, 20.0)
+    noise = np.array([1e-3, -2e-3, -1e-3, 2e-3, 0.0])
+    found = scales.s2_by_null(v3 * (0.96 + 0.0096 * side + noise), v3, side, s3)
+    plain = scales.s2_by_null(v3 * (0.96 + noise), v3, side, s3)
+    assert found.value == pytest.approx(0.24, rel=1e-3)
+    assert found.error == pytest.approx(plain.error, rel=1e-9)
+    assert found.freedom == pytest.approx(3.0)
 
-    def off(x: np.ndarray) -> np.ndarray:
-        return np.concatenate((((S3 * x[0]) * (r.force + sf * x[1:]) - r.v3) / sv, x[1:]))
 
-    brute = least_squares(off, np.ones(len(sf) + 1) * np.r_[1.0, np.zeros(len(sf))], xtol=1e-15)
-    assert found.value == pytest.approx(S3 * brute.x[0], rel=1e-5)
-    assert abs(found.value - slope) < found.error
+def test_nulls_from_one_side_are_widened_by_an_even_distribution() -> None:
+    s3 = Estimate(0.25, 0.0, 24.0)
+    v3, side = np.array([12.0, 20.0]), np.ones(2)
+    exact = scales.s2_by_null(0.96 * v3, v3, side, s3)
+    assert exact.error == 0.0
+    wide = scales.s2_by_null(0.96 * v3, v3, side, s3, 0.009)
+    assert wide.error == pytest.approx(0.009 * 0.24 / np.sqrt(3.0))
 
 
 def test_intervals_of_a_mean_hold_19_times_in_20() -> None:

@@ -1,0 +1,76 @@
+"""What a calibration is worth to those who fly: how far off deflection and feel may be.
+
+Compensated with Ŝ₁, Ŝ₂, Ŝ₃ and K̂, at rest without breakout and at a gradient G:
+
+    δ̂/δ = (S₁/Ŝ₁)·(1 − K·G) + K̂·G·S₃/Ŝ₃                      (the surface follows δ̂)
+    felt/specified = (G_L/(1 + K·G_L))/G,   G_L = G_B + (G/(1 − K̂·G) − G_B)·Ŝ₂/S₂
+
+Errors of S₁ and K come together from a fit, and mostly cancel in δ̂: it knows best what was read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupled.calibration.belief import Scales
+from coupled.calibration.errors_in_variables import JointFit
+from coupled.calibration.estimate import Estimate, total
+from coupled.rig.parameters import Control
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How far off δ̂ and the felt gradient may be, as shares, and at which gradient in N/d.
+
+    `felt` is None where S₂ was not found.
+    """
+
+    gradient: float
+    deflection: Estimate
+    felt: Estimate | None
+
+
+def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g: float) -> float:
+    """Return δ̂/δ − 1 at a gradient in N/d, for scales and K (d/N) believed and true."""
+    seen = true.s1 / found.s1 * (1.0 - true_bend * g)
+    return seen + bend * g * true.s3 / found.s3 - 1.0
+
+
+def felt_off(
+    s2_ratio: float, bend: float, true_bend: float, gradients: tuple[float, float]
+) -> float:
+    """Return felt over specified gradient less 1.
+
+    `s2_ratio` is S₂ believed over true, `gradients` (G, G_B) in N/d.
+    """
+    g, basic = gradients
+    held = basic + (g / (1.0 - bend * g) - basic) * s2_ratio
+    return held / (1.0 + true_bend * held) / g - 1.0
+
+
+def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | None:
+    """Return how far off deflection and feel may be at the gradient where that is most.
+
+    None where the structure is no stiffer than the gradient, which no compensation can give.
+    """
+    table = control.schedule.total_gradient
+    bend = fit.line.bend.value
+    tried = np.linspace(min(table), max(table), 9)
+    if bend * max(table) >= 1.0:
+        return None
+    found = [_at(fit, s2, float(g), control.loader.basic_gradient) for g in tried if g > 0.0]
+    return max(found, key=lambda one: one.deflection.half_width, default=None)
+
+
+def _at(fit: JointFit, s2: Estimate | None, g: float, basic: float) -> Outcome:
+    s1, bend, s3 = fit.line.s1.value, fit.line.bend.value, fit.s3.value
+    lost = bend * g
+    off = fit.estimate(0.0, -(1.0 - lost) / s1, g, -lost / s3)
+    if s2 is None:
+        return Outcome(g, off, None)
+    by_bend = fit.estimate(0.0, 0.0, g, 0.0)
+    by_s2 = (1.0 - lost) * (1.0 - basic / g * (1.0 - lost)) / s2.value
+    scaled = Estimate(0.0, abs(by_s2) * s2.error, s2.freedom)
+    return Outcome(g, off, total(by_bend, scaled))

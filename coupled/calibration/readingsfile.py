@@ -1,0 +1,231 @@
+"""Readings: a CSV that a person types, one row a reading, units in the columns' names.
+
+    gradient_set, deflection_…, force_…, v1_V, v3_V    and, for the null of eq. (14), v2_V
+
+A ruler and a scale that were read again after the voltmeter have deflection_after_… and
+force_after_… as well; their means count. A row with v2_V was noted without the multiplier;
+v2 is the supply's voltage that then brought v1 back, `approach` the side it was approached
+from: out, or in, after going further. Its deflection and force may be left empty. Rows are
+numbered as a text editor does, the heads being row 1.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.calibration.readings import Readings, readings_of
+from coupled.errors import InputError, nearest
+from coupled.files import write_text
+from coupled.schema import LARGEST
+from coupled.units import POUND_N, DEGREE_rad, INCH_m
+
+Floats = NDArray[np.float64]
+MOST_ROWS = 10_000
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf)", re.I)
+LABEL, APPROACH, REMARK = "gradient_set", "approach", "remark"
+SIDES = {"out": 1.0, "in": -1.0}
+LENGTHS = {"deflection_m": 1.0, "deflection_mm": 1e-3, "deflection_in": INCH_m}
+ANGLES = {"deflection_rad": 1.0, "deflection_deg": DEGREE_rad}
+FORCES = {"force_N": 1.0, "force_lb": POUND_N}
+
+
+def read_readings(path: Path, control: str) -> Readings:
+    """Return the readings of a file, for a control's kind of deflection."""
+    lines = _lines(path)
+    if not lines:
+        raise InputError(path, "", "holds nothing; its first row should name the columns")
+    (_, heads), *rows = lines
+    units = _units(path, heads, control)
+    if not rows:
+        raise InputError(path, "", "holds no readings below its column names")
+    if len(rows) > MOST_ROWS:
+        raise InputError(path, "", f"holds more than {MOST_ROWS} rows")
+    parsed = []
+    for number, cells in rows:
+        if not any(cells):
+            raise InputError(path, f"row {number}", "is empty; take it out")
+        if len(cells) != len(heads):
+            problem = f"has {len(cells)} cells, the columns are {len(heads)}"
+            raise InputError(path, f"row {number}", problem)
+        parsed.append((number, dict(zip(heads, cells, strict=True))))
+    return _assembled(path, parsed, units)
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Return (row number, stripped cells) of the file's rows, without blank ones at its end."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "", "is not text in UTF-8; save it as CSV in UTF-8") from None
+    if "\0" in text:
+        raise InputError(path, "", "is not text; a CSV file is wanted")
+    reader = csv.reader(io.StringIO(text.rstrip()), strict=True)
+    lines = []
+    try:
+        for cells in reader:
+            lines.append((reader.line_num, [cell.strip() for cell in cells]))
+    except csv.Error as error:
+        raise InputError(path, f"row {reader.line_num}", f"is not CSV: {error}") from None
+    return lines
+
+
+def _units(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, float]]:
+    """Return {quantity: (column, factor to SI)} once the columns are known and of one system."""
+    ours, other = (ANGLES, LENGTHS) if control == "wheel" else (LENGTHS, ANGLES)
+    known = [LABEL, APPROACH, REMARK, *ours, *FORCES, "v1_V", "v2_V", "v3_V"]
+    known += [_after(head) for head in [*ours, *FORCES]]
+    for head in heads:
+        if heads.count(head) > 1:
+            raise InputError(path, f"row 1: {head}", "stands there twice")
+        if head in other or head in [_after(name) for name in other]:
+            raise InputError(path, f"row 1: {head}", f"a {control} is read in {', '.join(ours)}")
+        if head not in known:
+            hint = (
+                "columns are parted by commas"
+                if ";" in head or "\t" in head
+                else nearest(head, known)
+            )
+            raise InputError(path, f"row 1: {head}", f"is no column of readings; {hint}")
+    found = {"v1": ("v1_V", 1.0), "v3": ("v3_V", 1.0)}
+    for quantity, choices in (("deflection", ours), ("force", FORCES)):
+        present = [head for head in heads if head in choices]
+        if len(present) > 1:
+            problem = f"mixes units: {' and '.join(present)}; give one of them"
+            raise InputError(path, "row 1", problem)
+        column = present[0] if present else f"{quantity} in {' or '.join(choices)}"
+        found[quantity] = (column, choices.get(column, 1.0))
+        again = [head for head in heads if head in [_after(name) for name in choices]]
+        if again and again != [_after(column)]:
+            problem = f"mixes units: {column} with {', '.join(again)}; give one unit"
+            raise InputError(path, "row 1", problem)
+        if again:
+            found[f"{quantity} after"] = (again[0], found[quantity][1])
+    for column in (LABEL, *(column for column, _ in found.values())):
+        if column not in heads:
+            raise InputError(path, "row 1", f"the column {column} is missing")
+    inches, pounds = "deflection_in" in heads, "force_lb" in heads
+    if control != "wheel" and inches != pounds:
+        problem = f"mixes units: {found['deflection'][0]} with {found['force'][0]}"
+        raise InputError(path, "row 1", f"{problem}; give inches and pounds, or metres and newtons")
+    if "v2_V" in heads:
+        found["v2"] = ("v2_V", 1.0)
+    return found
+
+
+def _after(column: str) -> str:
+    """Return the column of a second look, after the voltmeter's."""
+    return column.replace("_", "_after_", 1)
+
+
+def _assembled(
+    path: Path, rows: list[tuple[int, dict[str, str]]], units: dict[str, tuple[str, float]]
+) -> Readings:
+    taken: list[tuple[int, str, tuple[float, ...]]] = []
+    nulls: list[tuple[int, tuple[float, ...]]] = []
+    seen: dict[tuple[str, ...], int] = {}
+    for number, cells in rows:
+        null = "v2" in units and cells["v2_V"] != ""
+        may_lack = {"v2", "deflection after", "force after"}
+        may_lack |= {"deflection", "force"} if null else set()
+        value = {
+            quantity: _number(path, number, column, cells[column]) * factor
+            for quantity, (column, factor) in units.items()
+            if cells[column] or quantity not in may_lack
+        }
+        same = seen.setdefault(tuple(cells.values()), number)
+        if same != number:
+            problem = f"is the same as row {same}; no two readings are, take one out"
+            raise InputError(path, f"row {number}", problem)
+        if null:
+            if value["v2"] == 0.0 or value["v3"] == 0.0:
+                problem = "a null at 0 V tells nothing of S2; hold the control off neutral"
+                raise InputError(path, f"row {number}", problem)
+            side = _side(path, number, cells.get(APPROACH, ""))
+            nulls.append((number, (value["v1"], value["v2"], value["v3"], side)))
+        if "deflection" in value and "force" in value:
+            if not cells[LABEL]:
+                raise InputError(path, f"row {number}: {LABEL}", "is empty; name the gradient set")
+            means = [_mean(value, quantity) for quantity in ("deflection", "force")]
+            (delta, rise), (force, force_rise) = means
+            six = (delta, force, value["v1"], value["v3"], rise, force_rise)
+            taken.append((number, cells[LABEL], six))
+        elif any(quantity.split()[0] in ("deflection", "force") for quantity in value):
+            raise InputError(path, f"row {number}", "has a deflection or a force without the other")
+    return readings_of(
+        [number for number, *_ in taken],
+        [label for _, label, _ in taken],
+        np.array([six for *_, six in taken], float).reshape(-1, 6).T,
+        [number for number, _ in nulls],
+        np.array([four for _, four in nulls], float).reshape(-1, 4).T,
+    )
+
+
+def _mean(value: dict[str, float], quantity: str) -> tuple[float, float]:
+    """Return the mean of the looks at an instrument, and the second less the first."""
+    first, second = value[quantity], value.get(f"{quantity} after")
+    return (first, math.nan) if second is None else (0.5 * (first + second), second - first)
+
+
+def _side(path: Path, row: int, word: str) -> float:
+    """Return from which side a null was approached: outward unless the file says in."""
+    if word not in ("", *SIDES):
+        raise InputError(path, f"row {row}: {APPROACH}", f"{word!r} is neither out nor in")
+    return SIDES.get(word, 1.0)
+
+
+def _number(path: Path, row: int, column: str, cell: str) -> float:
+    place = f"row {row}: {column}"
+    if not cell:
+        raise InputError(path, place, "is empty; a reading has no gaps")
+    if not NUMBER.fullmatch(cell):
+        shown = cell if len(cell) <= 40 else cell[:37] + "..."
+        hint = "; write it with a point" if "," in cell else ""
+        raise InputError(path, place, f"{shown!r} is no number{hint}")
+    number = float(cell)
+    if not math.isfinite(number) or abs(number) > LARGEST:
+        raise InputError(path, place, f"{cell[:40]!r} is no finite number")
+    return number
+
+
+def write_readings(path: Path, readings: Readings, control: str, inches: bool = False) -> None:
+    """Write readings, and those of the null below them, as `read_readings` takes them."""
+    if control == "wheel":
+        columns = ("deflection_deg", "force_lb" if inches else "force_N")
+    else:
+        columns = ("deflection_in", "force_lb") if inches else ("deflection_m", "force_N")
+    one, two = {**LENGTHS, **ANGLES}[columns[0]], FORCES[columns[1]]
+    twice = not np.all(np.isnan(readings.deflection_rise))
+    heads = [LABEL, *columns, "v1_V", "v3_V"]
+    heads += [_after(columns[1]), _after(columns[0])] if twice else []
+    lines = [",".join([*heads, "v2_V", APPROACH])]
+    half = [np.nan_to_num(0.5 * rise) for rise in (readings.deflection_rise, readings.force_rise)]
+    numbers = [
+        (readings.deflection - half[0]) / one,
+        (readings.force - half[1]) / two,
+        readings.v1,
+        readings.v3,
+    ]
+    if twice:
+        numbers += [(readings.force + half[1]) / two, (readings.deflection + half[0]) / one]
+    for label, *row in zip(readings.label, *numbers, strict=True):
+        lines.append(",".join([label, *(_shown(x) for x in row), "", ""]))
+    gap = ",," if twice else ""
+    words = {side: word for word, side in SIDES.items()}
+    null = (readings.null_v3, readings.null_v2, readings.null_v1, readings.null_side)
+    for v3, v2, v1, side in zip(*null, strict=True):
+        lines.append(f"null,,,{_shown(v1)},{_shown(v3)},{gap}{_shown(v2)},{words[side]}")
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _shown(number: float) -> str:
+    """Return a number as short as it reads back the same, tails of arithmetic cut off."""
+    return repr(float(f"{number:.13g}"))

@@ -1,0 +1,62 @@
+"""What a calibration leaves of deflection and feel: the rig's own statics, and the scatter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.calibration.belief import Scales
+from coupled.calibration.errors_in_variables import errors_in_variables
+from coupled.calibration.estimate import Estimate, usual_instruments
+from coupled.calibration.outcome import deflection_off, expected, felt_off
+from coupled.rig.statics import static_line
+from tests.calibration.made import S1, S2, S3, K, column, grid, with_errors
+from tests.rigs import G_STIFF, K_REPORT, bench
+
+
+def test_closed_forms_are_the_rigs_statics() -> None:
+    """A host that believes 1.1·K, with S₁ real 0.93, S₂ 1.05 and S₃ 1.04 of what it believes."""
+    changes = {
+        "sensing.deflection_scale": 0.93,
+        "sensing.modifying_scale": 1.05,
+        "sensing.force_scale": 1.04,
+        "compensation.bend_m_per_N": 1.1 * K_REPORT,
+    }
+    rig = bench({f"controls.column.{key}": value for key, value in changes.items()})
+    line = static_line(rig, "column", 3000.0, np.array([0.03]))
+    felt = felt_off(1.0 / 1.05, 1.1 * K_REPORT, K_REPORT, (G_STIFF, 560.0))
+    assert line.force[0] / line.deflection[0] / G_STIFF - 1.0 == pytest.approx(felt, rel=1e-9)
+    # δ̂ at the gradient that is felt, which is not quite the one asked for
+    true, believed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
+    gradient = line.force[0] / line.deflection[0]
+    off = deflection_off(believed, 1.1 * K_REPORT, true, K_REPORT, float(gradient))
+    assert line.estimate[0] / line.deflection[0] - 1.0 == pytest.approx(off, rel=1e-9)
+
+
+def test_what_is_promised_is_the_scatter_that_comes() -> None:
+    rng, tools, control = np.random.default_rng(17), usual_instruments("column"), column()
+    true, offs, felts, errors = Scales(S1, S2, S3), [], [], []
+    for _ in range(400):
+        fit = errors_in_variables(with_errors(*grid(), tools, rng), tools)
+        s2 = Estimate(S2 * (1.0 + 0.002 * rng.standard_normal()), 0.002 * S2, 4.0)
+        outcome = expected(fit, s2, control)
+        assert outcome is not None
+        assert outcome.felt is not None
+        g, bend = outcome.gradient, fit.line.bend.value
+        believed = Scales(fit.line.s1.value, s2.value, fit.s3.value)
+        offs.append(deflection_off(believed, bend, true, K, g))
+        felts.append(felt_off(s2.value / S2, bend, K, (g, control.loader.basic_gradient)))
+        errors.append((outcome.deflection.error, outcome.felt.error))
+    promised = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert promised[0] == pytest.approx(np.std(offs), rel=0.12)
+    assert promised[1] == pytest.approx(np.std(felts), rel=0.12)
+
+
+def test_without_s2_the_feel_is_not_told_and_a_soft_structure_tells_nothing() -> None:
+    rng, tools = np.random.default_rng(2), usual_instruments("column")
+    fit = errors_in_variables(with_errors(*grid(), tools, rng), tools)
+    outcome = expected(fit, None, column())
+    assert outcome is not None
+    assert outcome.felt is None
+    stiff = column().schedule.model_copy(update={"total_gradient": [560.4] * 3 + [1.1 / K]})
+    assert expected(fit, None, column().model_copy(update={"schedule": stiff})) is None
