@@ -10,6 +10,7 @@ import copy
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from coupled.campaign.sensitivity import design
 from coupled.errors import InputError, nearest
 from coupled.files import sha256
 from coupled.flight.expectation import Figure
@@ -56,7 +58,7 @@ class SweepFile(Section):
     run: str = quantity("", min_length=1)
     case: str | None = None
     configurations: list[Configuration] = []
-    method: Literal["grid", "sobol", "random"] = "grid"
+    method: Literal["grid", "sobol", "random", "sensitivity"] = "grid"
     samples: int | None = quantity("", None, ge=1, le=MOST_FLIGHTS)
     seed: int = quantity("", 0, ge=0)
     reseed: bool = False
@@ -170,24 +172,37 @@ def _check_values(sweep: SweepFile, file: Path) -> None:
     for key in keys:
         if key.partition(".")[0] in _NO_CONDITION:
             raise InputError(file, "vary", f"{key} changes no flight")
-    if (sweep.method != "grid") != (sweep.samples is not None):
-        raise InputError(file, "samples", "is given with sobol and random, and not with grid")
+    _check_size(sweep, file)
     for i, vary in enumerate(sweep.vary):
-        place = f"vary[{i}]"
-        ranged = vary.low is not None and vary.high is not None
-        if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
-            raise InputError(file, place, "give values, or low and high")
-        if ranged and (sweep.method == "grid") != (vary.steps is not None):
-            raise InputError(
-                file, f"{place}.steps", "is given for a range in a grid, and only there"
-            )
-        low, high = vary.low or 0.0, vary.high or 0.0
-        if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
-            problem = "must be above low, and low above 0 where the spread is log"
-            raise InputError(file, f"{place}.high", problem)
-    flights = max(1, len(sweep.configurations)) * (sweep.samples or _grid_size(sweep))
+        _check_range(sweep, vary, f"vary[{i}]", file)
+
+
+def _check_size(sweep: SweepFile, file: Path) -> None:
+    if (sweep.method != "grid") != (sweep.samples is not None):
+        problem = "is given with sobol, random and sensitivity, and not with grid"
+        raise InputError(file, "samples", problem)
+    samples = sweep.samples or 0
+    if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
+        near = 2 ** max(3, round(math.log2(samples)))
+        raise InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
+    points = sweep.samples or _grid_size(sweep)
+    if sweep.method == "sensitivity":
+        points *= len(sweep.vary) + 2
+    flights = max(1, len(sweep.configurations)) * points
     if flights > MOST_FLIGHTS:
         raise InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
+
+
+def _check_range(sweep: SweepFile, vary: Vary, place: str, file: Path) -> None:
+    ranged = vary.low is not None and vary.high is not None
+    if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
+        raise InputError(file, place, "give values, or low and high")
+    if ranged and (sweep.method == "grid") != (vary.steps is not None):
+        raise InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
+    low, high = vary.low or 0.0, vary.high or 0.0
+    if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
+        problem = "must be above low, and low above 0 where the spread is log"
+        raise InputError(file, f"{place}.high", problem)
 
 
 def _grid_size(sweep: SweepFile) -> int:
@@ -233,7 +248,9 @@ def _points(sweep: SweepFile) -> list[tuple[Any, ...]]:
     if sweep.samples is None:
         return list(itertools.product(*(_grid_values(vary) for vary in sweep.vary)))
     width = len(sweep.vary)
-    if sweep.method == "sobol":
+    if sweep.method == "sensitivity":
+        shares = design(sweep.samples, width, sweep.seed)
+    elif sweep.method == "sobol":
         power = max(0, (sweep.samples - 1).bit_length())
         shares = qmc.Sobol(width, seed=sweep.seed).random_base2(power)[: sweep.samples]
     else:

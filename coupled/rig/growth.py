@@ -67,7 +67,6 @@ def _scale(s: ControlState, factor: float) -> None:
     s.linkage.grip *= factor
     s.hand.force *= factor
     s.hand.integral *= factor
-    s.modification.held *= factor
 
 
 @entry
