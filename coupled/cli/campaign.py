@@ -103,8 +103,8 @@ def sweep(
     pool_of = workers or os.cpu_count() or 1
     try:
         with executor(pool_of, cluster) as pool, opened(target, plan.identity) as journal:
-            if journal.rows:
-                err.print(f"{len(journal.rows)} flights are there already", highlight=False)
+            if journal.done:
+                err.print(f"{len(journal.done)} flights are there already", highlight=False)
             with progress() as advance:
                 found = fly_sweep(plan, journal, pool, advance)
             write_table(found, target / TABLE)
