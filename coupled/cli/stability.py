@@ -40,6 +40,7 @@ def stability(
     from coupled.plots.saving import check_format, save
     from coupled.plots.stability import draw_stability
     from coupled.rig.rigfile import read_rig
+    from coupled.stability.aircraft import bob_weight
     from coupled.stability.limits import disagreement, tell
     from coupled.stability.planes import KINDS, plane
     from coupled.tables.stability import print_limits, write_planes
@@ -65,6 +66,7 @@ def stability(
     every = []
     with progress() as advance:
         told = [tell(data, name) for name in bent]
+        bob = bob_weight(data, file) if "column" in bent else None
         for done, (name, kind) in enumerate(asked):
             advance(f"{name}, {kind}", done, len(asked))
             every.append(plane(data, name, kind))
@@ -73,7 +75,7 @@ def stability(
     write_planes(data, every, table)
     most, worst = (100.0 * share for share in disagreement(every))
     if json_file != "-":
-        print_limits(out, told)
+        print_limits(out, told, bob)
         found = sum(len(each.crossings) for each in every)
         say(
             f"{found} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"

@@ -12,6 +12,7 @@ from rich.table import Table
 from coupled.channels import unit_of
 from coupled.files import write_whole
 from coupled.rig.parameters import Rig
+from coupled.stability.aircraft import BobWeight
 from coupled.stability.limits import Limit, Told
 from coupled.stability.planes import Kind, Plane
 from coupled.units import MILLISECOND_s
@@ -30,7 +31,7 @@ _WORDS: dict[Kind, tuple[str, float]] = {
 }
 
 
-def print_limits(console: Console, told: Sequence[Told]) -> None:
+def print_limits(console: Console, told: Sequence[Told], bob: BobWeight | None) -> None:
     """Print the limits of each control at its stiffest gradient, simulated and by theory."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for head in ("", "stable", "simulated", "theory"):
@@ -45,6 +46,11 @@ def print_limits(console: Console, told: Sequence[Told]) -> None:
             word = f" as filed, {filed.hand}: growth, 1/s"
             side = "yes" if filed.simulated < 0.0 else "[red]no[/]"
             table.add_row(word, side, f"{filed.simulated:.2f}", f"{filed.theory:.2f}")
+    if bob is not None:
+        table.add_row(f"[bold]column through the aircraft, {bob.rate_rad_per_s:.3g} rad/s[/]")
+        flown = "–" if bob.simulated_N_per_g is None else f"{bob.simulated_N_per_g:.4g}"
+        word = f" bob weight, free hand, N/g (filed: {bob.filed_N_per_g:.3g})"
+        table.add_row(word, "below", flown, f"{bob.theory_N_per_g:.4g}")
     console.print(table, highlight=False)
 
 

@@ -25,6 +25,7 @@ from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.stability import planes
+from coupled.stability.aircraft import bob_weight
 from coupled.stability.limits import gradient_range, tell
 from coupled.stability.linear import frame_map, growth, held_limit, motion_matrix
 from coupled.stability.planes import crossings, linear_rig, plane, posed, simulated_along
@@ -222,6 +223,18 @@ def test_every_shipped_control_has_its_limits_where_theory_has_them(name: str) -
         else:
             assert belief.stable == "everywhere"
         assert limits["frame"].stable in ("below", "everywhere")
+
+
+def test_a_bob_weights_loop_through_the_aircraft_oscillates_where_nyquist_says() -> None:
+    for name, within in (("c172p", 0.01), ("t37", 0.01)):
+        file = shipped_rigs()[name]
+        rig = read_rig(file)
+        found = bob_weight(rig, file)
+        assert found is not None
+        assert found.simulated_N_per_g == pytest.approx(found.theory_N_per_g, rel=within)
+        assert found.filed_N_per_g == rig.controls["column"].loader.bob_weight
+        assert found.filed_N_per_g < 0.1 * found.theory_N_per_g
+    assert bob_weight(bench(), Path("bench.toml")) is None
 
 
 @pytest.fixture
