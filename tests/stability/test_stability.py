@@ -126,7 +126,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
     assert abs(apart[2]) < 0.012  # HELD_FAST gives by 1 %
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     mass=st.floats(0.5, 10.0),
     ratio=st.floats(0.05, 1.5),
@@ -139,6 +139,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
     integral=st.sampled_from([0.0, 2000.0]),
     multiplier=st.sampled_from(["hybrid", "digital"]),
     scale=st.floats(0.9, 1.1),
+    delay_s=st.sampled_from([0.0, 0.01]),
 )
 def test_any_rig_and_hand_grow_as_linear_theory_says(
     mass: float,
@@ -152,6 +153,7 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
     integral: float,
     multiplier: str,
     scale: float,
+    delay_s: float,
 ) -> None:
     gradient = share / K_REPORT
     spring = gradient / (1.0 - belief * share)
@@ -159,6 +161,7 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
         "mass_kg": mass,
         "damping_N_s_per_m": 2.0 * ratio * math.sqrt(spring * mass),
         "servo_frequency_Hz": servo_Hz,
+        "delay_s": delay_s,
         "controls.column.sensing.deflection_scale": scale,
         "controls.column.sensing.modifying_scale": scale**2,
     }
@@ -235,6 +238,15 @@ def test_a_bob_weights_loop_through_the_aircraft_oscillates_where_nyquist_says()
         assert found.filed_N_per_g == rig.controls["column"].loader.bob_weight
         assert found.filed_N_per_g < 0.1 * found.theory_N_per_g
     assert bob_weight(bench(), Path("bench.toml")) is None
+
+
+def test_a_late_force_takes_its_delay_off_the_damping() -> None:
+    """In a soft hand of stiffness k a delay τ acts as a damping of −k·τ."""
+    hand, delay_s = Hand(400.0), 0.02
+    prompt, late = column(), column(delay_s=delay_s)
+    lost = hand.stiffness * delay_s / (2.0 * MASS)
+    assert growth(late, hand) - growth(prompt, hand) == pytest.approx(lost, rel=0.15)
+    assert simulated(late, hand, 6.0) == pytest.approx(growth(late, hand), rel=0.005)
 
 
 @pytest.fixture
