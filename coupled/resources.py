@@ -35,6 +35,11 @@ def shipped_runs() -> dict[str, Path]:
     return {p.stem: p for p in sorted(runs_folder().glob("*.toml"))}
 
 
+def shipped_sweeps() -> dict[str, Path]:
+    """Return the shipped sweep files by name."""
+    return {p.stem: p for p in sorted(runs_folder().glob("sweeps/*.toml"))}
+
+
 def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = None) -> Path:
     """Return the file that a user's word means: a path, or the name of a shipped one.
 

@@ -21,6 +21,7 @@ PSF_Pa: Final[float] = constants.lbf / constants.foot**2
 POUND_PER_INCH_N_per_m: Final[float] = constants.lbf / constants.inch
 INCH_PER_POUND_m_per_N: Final[float] = constants.inch / constants.lbf
 DEGREE_rad: Final[float] = math.pi / 180.0
+MILLISECOND_s: Final[float] = constants.milli
 
 Dimension = tuple[int, int, int, int]  # powers of mass, length, time, angle
 

@@ -38,6 +38,7 @@ ORDER = [
 ORDER += [
     "authority",
     "maps",
+    "stability",
     "campaign",
     "calibration",
     "gap",

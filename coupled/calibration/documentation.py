@@ -49,8 +49,8 @@ def surface_travels(rig: Rig, file: Path) -> dict[str, float]:
     """Return each surface's travel in rad by its control, found by flying it; none on a bench."""
     if rig.flight is None:
         return {}
-    where = {"models": [aircraft_folder()], "file": file}
-    travels = check_direct_controls(rig.flight, 1.0 / rig.frame_rate, list(rig.controls), **where)
+    frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
+    travels = check_direct_controls(rig.flight, frame_s, controls, [aircraft_folder()], file)
     return {control: abs(travel) for control, travel in travels.items()}
 
 

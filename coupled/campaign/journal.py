@@ -21,11 +21,11 @@ Row = dict[str, Any]
 
 
 class Journal:
-    """The rows of the flights that are done, by the flight's number."""
+    """The rows of the flights that are done; in memory only their numbers, `done`."""
 
     def __init__(self, folder: Path, identity: str) -> None:
         self.path = folder / JOURNAL
-        self.rows: dict[int, Row] = {}
+        self.done: set[int] = set()
         self._read(identity)
 
     def _read(self, identity: str) -> None:
@@ -37,23 +37,28 @@ class Journal:
         if not whole:
             self._write(header, "wb")
             return
-        first, *lines = whole.decode("utf-8").splitlines()
+        first, *lines = whole.decode("utf-8")[:-1].split("\n")
         if first + "\n" != header:
             raise InputError(
                 self.path.parent,
                 "",
                 "holds another sweep, or what this one reads has changed since; give a new folder",
             )
-        for line in lines:
-            row = json.loads(line)
-            self.rows[row["flight"]] = row
+        self.done = {json.loads(line)["flight"] for line in lines}
         with self.path.open("r+b") as file:
             file.truncate(len(whole))
 
     def add(self, row: Row) -> None:
         """Keep a row: it is on the disk when this returns."""
         self._write(json.dumps(row, ensure_ascii=False) + "\n", "ab")
-        self.rows[row["flight"]] = row
+        self.done.add(row["flight"])
+
+    def rows(self) -> list[Row]:
+        """Return the rows, in the order of the flights, as they were written."""
+        with self.path.open(encoding="utf-8") as lines:
+            next(lines)
+            found = [json.loads(line) for line in lines]
+        return sorted(found, key=lambda row: int(row["flight"]))
 
     def _write(self, text: str, mode: str) -> None:
         try:

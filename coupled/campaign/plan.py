@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import itertools
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -18,9 +18,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import qmc
 
+from coupled.campaign.points import grid_size, points
 from coupled.errors import InputError, nearest
 from coupled.files import sha256
 from coupled.flight.expectation import Figure
@@ -31,7 +30,6 @@ from coupled.rig.parameters import PLAIN_NAME
 from coupled.rig.rigfile import change
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
 
-Floats = NDArray[np.float64]
 MOST_FLIGHTS = 1_000_000
 _NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_properties")
 FIGURES: tuple[Figure, ...] = ("loss", "felt_ratio", "force_N", "peak_rate_rad_per_s")
@@ -56,7 +54,7 @@ class SweepFile(Section):
     run: str = quantity("", min_length=1)
     case: str | None = None
     configurations: list[Configuration] = []
-    method: Literal["grid", "sobol", "random"] = "grid"
+    method: Literal["grid", "sobol", "random", "sensitivity"] = "grid"
     samples: int | None = quantity("", None, ge=1, le=MOST_FLIGHTS)
     seed: int = quantity("", 0, ge=0)
     reseed: bool = False
@@ -129,7 +127,7 @@ def jobs(plan: Plan) -> list[Job]:
     """Return every flight of a sweep; the same file gives the same flights."""
     sweep, found = plan.sweep, list[Job]()
     configurations: list[Any] = list(sweep.configurations) or [""]
-    for i, values in enumerate(_points(sweep)):
+    for i, values in enumerate(points(sweep)):
         changes = {
             key: value
             for vary, value in zip(sweep.vary, values, strict=True)
@@ -170,31 +168,36 @@ def _check_values(sweep: SweepFile, file: Path) -> None:
     for key in keys:
         if key.partition(".")[0] in _NO_CONDITION:
             raise InputError(file, "vary", f"{key} changes no flight")
-    if (sweep.method != "grid") != (sweep.samples is not None):
-        raise InputError(file, "samples", "is given with sobol and random, and not with grid")
+    _check_size(sweep, file)
     for i, vary in enumerate(sweep.vary):
-        place = f"vary[{i}]"
-        ranged = vary.low is not None and vary.high is not None
-        if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
-            raise InputError(file, place, "give values, or low and high")
-        if ranged and (sweep.method == "grid") != (vary.steps is not None):
-            raise InputError(
-                file, f"{place}.steps", "is given for a range in a grid, and only there"
-            )
-        low, high = vary.low or 0.0, vary.high or 0.0
-        if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
-            problem = "must be above low, and low above 0 where the spread is log"
-            raise InputError(file, f"{place}.high", problem)
-    flights = max(1, len(sweep.configurations)) * (sweep.samples or _grid_size(sweep))
+        _check_range(sweep, vary, f"vary[{i}]", file)
+
+
+def _check_size(sweep: SweepFile, file: Path) -> None:
+    if (sweep.method != "grid") != (sweep.samples is not None):
+        problem = "is given with sobol, random and sensitivity, and not with grid"
+        raise InputError(file, "samples", problem)
+    samples = sweep.samples or 0
+    if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
+        near = 2 ** max(3, round(math.log2(samples)))
+        raise InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
+    flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
+    if sweep.method == "sensitivity":
+        flights *= len(sweep.vary) + 2
     if flights > MOST_FLIGHTS:
         raise InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
 
 
-def _grid_size(sweep: SweepFile) -> int:
-    size = 1
-    for vary in sweep.vary:
-        size *= vary.steps or len(vary.values or ())
-    return size
+def _check_range(sweep: SweepFile, vary: Vary, place: str, file: Path) -> None:
+    ranged = vary.low is not None and vary.high is not None
+    if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
+        raise InputError(file, place, "give values, or low and high")
+    if ranged and (sweep.method == "grid") != (vary.steps is not None):
+        raise InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
+    low, high = vary.low or 0.0, vary.high or 0.0
+    if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
+        problem = "must be above low, and low above 0 where the spread is log"
+        raise InputError(file, f"{place}.high", problem)
 
 
 def _check_keys(
@@ -226,40 +229,6 @@ def _check_property(scenario: Scenario, key: str) -> None:
     except InputError as error:
         if error.key.endswith(key):
             raise
-
-
-def _points(sweep: SweepFile) -> list[tuple[Any, ...]]:
-    """Return the values of each point, in the order of the varied keys."""
-    if sweep.samples is None:
-        return list(itertools.product(*(_grid_values(vary) for vary in sweep.vary)))
-    width = len(sweep.vary)
-    if sweep.method == "sobol":
-        power = max(0, (sweep.samples - 1).bit_length())
-        shares = qmc.Sobol(width, seed=sweep.seed).random_base2(power)[: sweep.samples]
-    else:
-        shares = np.random.default_rng(sweep.seed).random((sweep.samples, width))
-    columns = [_drawn(vary, shares[:, i]) for i, vary in enumerate(sweep.vary)]
-    return list(zip(*columns, strict=True))
-
-
-def _grid_values(vary: Vary) -> list[Any]:
-    if vary.values is not None:
-        return vary.values
-    return _drawn(vary, np.linspace(0.0, 1.0, vary.steps or 2))
-
-
-def _drawn(vary: Vary, shares: Floats) -> list[Any]:
-    """Return the values at shares from 0 to 1 of a range, or of a list."""
-    if vary.values is not None:
-        places = np.minimum((shares * len(vary.values)).astype(int), len(vary.values) - 1)
-        return [vary.values[place] for place in places]
-    assert vary.low is not None
-    assert vary.high is not None
-    if vary.spread == "log":
-        values = vary.low * (vary.high / vary.low) ** shares
-    else:
-        values = vary.low + (vary.high - vary.low) * shares
-    return [float(value) for value in values]
 
 
 def _identity(sweep: SweepFile, files: set[Path]) -> str:

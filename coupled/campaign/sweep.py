@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, as_completed, wait
 from dataclasses import replace
 from functools import lru_cache
@@ -65,13 +65,13 @@ def fly_sweep(
     `progress` is called with flights done and to do since this began, so that the time left
     is judged by what is flown now.
     """
-    todo = [job for job in jobs(plan) if job.number not in journal.rows]
-    every = len(journal.rows) + len(todo)
+    todo = [job for job in jobs(plan) if job.number not in journal.done]
+    every = len(journal.done) + len(todo)
     for done, row in enumerate(_rows(plan, todo, pool), 1):
         journal.add(row)
         if progress is not None:
-            progress(f"{len(journal.rows)} of {every} flights", done, len(todo))
-    return table(plan, journal.rows)
+            progress(f"{len(journal.done)} of {every} flights", done, len(todo))
+    return table(plan, journal.rows())
 
 
 def _rows(plan: Plan, todo: Sequence[Job], pool: Executor) -> Iterator[Row]:
@@ -97,13 +97,13 @@ def _unpacked(packed: bytes) -> Plan:
     return plan
 
 
-def table(plan: Plan, rows: Mapping[int, Row]) -> pl.DataFrame:
-    """Return the table of rows, in the order of the flights; numbers as doubles."""
-    sweep, ordered = plan.sweep, [rows[number] for number in sorted(rows)]
+def table(plan: Plan, rows: Sequence[Row]) -> pl.DataFrame:
+    """Return the table of rows, as they stand; numbers as doubles."""
+    sweep = plan.sweep
     numbers = [*sweep.keep, *_extreme_names(sweep.extremes)]
     columns: dict[str, pl.Series] = {}
     for name in ("flight", *plan.keys, "configuration", "seed", *numbers, "ended_early"):
-        values = [row[name] for row in ordered]
+        values = [row[name] for row in rows]
         kind: Any = pl.Float64 if name in numbers else pl.Int64
         if name in plan.keys:
             real = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values)

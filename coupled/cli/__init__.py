@@ -1,6 +1,17 @@
 """The command line: parses, calls, prints. A module a group of commands."""
 
-from coupled.cli import bench, blind, calibration, campaign, document, flights, gaps, logs, maps
+from coupled.cli import (
+    bench,
+    blind,
+    calibration,
+    campaign,
+    document,
+    flights,
+    gaps,
+    logs,
+    maps,
+    stability,
+)
 from coupled.cli.app import app, main
 
 __all__ = [
@@ -15,4 +26,5 @@ __all__ = [
     "logs",
     "main",
     "maps",
+    "stability",
 ]

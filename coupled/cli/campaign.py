@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ import typer
 from coupled.cli.app import JsonOption, app
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
+from coupled.resources import find, shipped_sweeps
 from coupled.terminal import check_json, err, give_json, out, progress, say
 
 
@@ -51,9 +53,14 @@ def check(
         raise typer.Exit(1)
 
 
-@app.command(epilog="[dim]Examples: coupled sweep my-sweep.toml · coupled sweep s.toml -j 1[/]")
+@app.command(
+    epilog="[dim]Examples: coupled sweep my-sweep.toml · coupled sweep s.toml -j 1"
+    " · coupled sweep sensitivity[/]"
+)
 def sweep(
-    file: Annotated[Path, typer.Argument(help="A sweep file, TOML.")],
+    name: Annotated[
+        str, typer.Argument(metavar="FILE", help="A sweep file, TOML, or a shipped one's name.")
+    ],
     folder: Annotated[
         Path | None,
         typer.Option(help="Of the flights and their table.  [default: out/NAME]"),
@@ -74,11 +81,14 @@ def sweep(
     from coupled.campaign.journal import JOURNAL, opened
     from coupled.campaign.plan import read_plan
     from coupled.campaign.pool import executor
+    from coupled.campaign.sensitivity import INDICES, sensitivity, write_indices
     from coupled.campaign.sweep import TABLE, fly_sweep, write_table
     from coupled.plots.campaign import draw_sweep
     from coupled.plots.saving import check_format, save
-    from coupled.tables.campaign import print_sweep
+    from coupled.plots.sensitivity import draw_sensitivity
+    from coupled.tables.campaign import print_indices, print_sweep
 
+    file = find(name, shipped_sweeps(), "sweep")
     if cluster and workers is not None:
         raise InputError("--workers", "", "a cluster has its own; leave it out")
     plan = read_plan(file)
@@ -86,24 +96,31 @@ def sweep(
     if target.is_file():
         raise InputError(target, "", "is a file; give a folder")
     path = figure or target / "sweep.png"
-    own = [file, plan.run_file, target / JOURNAL, target / TABLE]
+    own = [file, plan.run_file, target / JOURNAL, target / TABLE, target / INDICES]
     check_format(path)
     check_target(path, own)
     check_json(json_file, [*own, path])
     pool_of = workers or os.cpu_count() or 1
     try:
         with executor(pool_of, cluster) as pool, opened(target, plan.identity) as journal:
-            if journal.rows:
-                err.print(f"{len(journal.rows)} flights are there already", highlight=False)
+            if journal.done:
+                err.print(f"{len(journal.done)} flights are there already", highlight=False)
             with progress() as advance:
                 found = fly_sweep(plan, journal, pool, advance)
             write_table(found, target / TABLE)
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    save(draw_sweep(found, plan.keys, plan.sweep.keep), path)
+    asked, told = plan.sweep, []
+    if asked.method == "sensitivity" and asked.samples is not None:
+        told = sensitivity(found, plan.keys, asked.keep, asked.samples)
+        write_indices(told, target / INDICES)
+    save(draw_sensitivity(told) if told else draw_sweep(found, plan.keys, asked.keep), path)
     if json_file != "-":
-        print_sweep(out, found, plan.sweep.keep)
+        print_sweep(out, found, asked.keep)
         say(f"table: {target / TABLE}  ({len(found)} flights)")
+        if told:
+            print_indices(out, told)
+            say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
-    give_json(found.to_dicts(), json_file)
+    give_json([asdict(index) for index in told] if told else found.to_dicts(), json_file)

@@ -12,7 +12,8 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,8 @@ _log = _Log()
 _base: Callable[[], Any] = jsbsim.FGJSBBase  # its debug level is the library's
 
 
-def packaged_models() -> dict[str, Path]:
+@lru_cache(maxsize=1)
+def packaged_models() -> Mapping[str, Path]:
     """Return the models that come with JSBSim: {name: folder of all models}."""
     root = Path(jsbsim.get_default_root_dir()) / "aircraft"
     return {folder.name: root for folder in root.iterdir() if _is_model(folder)}
@@ -161,7 +163,7 @@ class JSBSimAirframe:
     def _load(self, models: Sequence[Path], frame_s: float) -> Any:
         _base().debug_lvl = 0
         jsbsim.set_logger(_log)
-        known = packaged_models()
+        known = dict(packaged_models())
         for folder in reversed(models):
             known |= {m.name: folder for m in folder.iterdir() if _is_model(m)}
         name = self._flight.model

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import lru_cache, partial
+from pathlib import Path
 
 from coupled.channels import SURFACES, motion_channels
 from coupled.errors import InputError
@@ -17,32 +18,46 @@ from coupled.rig.parameters import Flight
 
 
 def check_direct_controls(
-    flight: Flight, frame_s: float, controls: Sequence[str], **where: Any
+    flight: Flight,
+    frame_s: float,
+    controls: Sequence[str],
+    models: Sequence[Path] = (),
+    file: object = "rig",
 ) -> Mapping[str, float]:
     """Fly a small step of each control on an aircraft of its own, and refuse what is not direct.
 
     Direct means: within one step the surface stands at its new place, stays there, and the
     aircraft turns to the side that the rig's signs say; where the rig asks for no direct
     controls, the surface need only have moved. Returns {control: surface travel in
-    rad per unit of command}.
+    rad per unit of command}. Kept per aircraft: a sweep's flights share few.
     """
+    return _travel(flight.model_dump_json(), frame_s, tuple(controls), tuple(models), file)
+
+
+@lru_cache(maxsize=256)
+def _travel(
+    flight_json: str,
+    frame_s: float,
+    controls: tuple[str, ...],
+    models: tuple[Path, ...],
+    file: object,
+) -> Mapping[str, float]:
     rates = {"column": "pitch_rate_rad_per_s", "wheel": "roll_rate_rad_per_s"}
+    flight = Flight.model_validate_json(flight_json)
+    frames = max(2, round(0.1 / frame_s))
+    channels = motion_channels(controls, flown=True)
+    fly = partial(_fly, flight, frame_s, controls, models, file, frames)
+    still = fly((0.0, 0.0, 0.0))
     travel = {}
     for i, control in enumerate(controls):
         surface = SURFACES[control]
-        still = JSBSimAirframe(flight, frame_s, controls, **where)
-        moved = JSBSimAirframe(flight, frame_s, controls, **where)
         step = 0.05 if control == "wheel" else -0.05  # positive force of the pilot
         commands = (step * (i == 0), step * (i == 1), step * (i == 2))
-        channels = motion_channels(controls, flown=True)
+        moved = fly(commands)
         at = channels.index(f"{surface}_rad")
         turn = channels.index(rates.get(control, "yaw_rate_rad_per_s"))
-        positions, rate = [], 0.0
-        for _ in range(max(2, round(0.1 / frame_s))):
-            still.step((0.0, 0.0, 0.0))
-            moved.step(commands)
-            positions.append(moved.motion()[at] - still.motion()[at])
-            rate = moved.motion()[turn] - still.motion()[turn]
+        positions = [a[at] - b[at] for a, b in zip(moved, still, strict=True)]
+        rate = moved[-1][turn] - still[-1][turn]
         first, last = positions[0], positions[-1]
         fault = ""
         if not flight.direct_controls:
@@ -55,10 +70,28 @@ def check_direct_controls(
             fault = f"turns the wrong way on a positive {control}"
         if fault:
             raise InputError(
-                where.get("file", "rig"),
+                file,
                 "flight.model",
                 f"{flight.model} has no direct controls: it {fault};"
                 " c172p, T37, 737, B747 and awjsra fly with theirs",
             )
         travel[control] = first / step
     return travel
+
+
+def _fly(
+    flight: Flight,
+    frame_s: float,
+    controls: Sequence[str],
+    models: Sequence[Path],
+    file: object,
+    frames: int,
+    commands: tuple[float, float, float],
+) -> list[tuple[float, ...]]:
+    """Return the motion of an aircraft of its own under commands, frame by frame."""
+    airframe = JSBSimAirframe(flight, frame_s, controls, models, file)
+    motions = []
+    for _ in range(frames):
+        airframe.step(commands)
+        motions.append(airframe.motion())
+    return motions

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -185,7 +186,6 @@ def _manifest(
         met = np.flatnonzero(data[:, channels.index(control_channels(control)[-1])])
         if met.size:
             stops[control] = float(data[met[0], channels.index(TIME)])
-    libraries = ("jsbsim", "numpy", "numba", "scipy")
     return {
         "run": scenario.run.name,
         "case": scenario.label,
@@ -198,9 +198,11 @@ def _manifest(
         "inputs_sha256": {
             path.name: sha256(path) for path in input_files(scenario) if path.is_file()
         },
-        "versions": {
-            "coupled": version("coupled"),
-            "python": platform.python_version(),
-            **{name: version(name) for name in libraries},
-        },
+        "versions": dict(_versions()),
     }
+
+
+@lru_cache(maxsize=1)
+def _versions() -> dict[str, str]:
+    found = {"coupled": version("coupled"), "python": platform.python_version()}
+    return found | {name: version(name) for name in ("jsbsim", "numpy", "numba", "scipy")}

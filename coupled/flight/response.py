@@ -28,6 +28,7 @@ _FADE, _WAIT, _MEASURED = 2.0, 2.0, 4.0  # periods
 _LEAST_WAIT_s = 10.0  # the short period of the slowest aircraft here has died down by then
 _DRIFT = 3  # order of the polynomial that takes what drifts
 PITCH = LONGITUDINAL.index("pitch_rad")
+LOAD = LONGITUDINAL.index("load_factor")
 
 
 class Response(NamedTuple):
@@ -36,6 +37,7 @@ class Response(NamedTuple):
     pitch: complex  # rad
     flight_path: complex  # rad, over the frame before (`path_angle`)
     airspeed: complex  # true, m/s
+    load_factor: complex
     pressure_Pa: float  # q̄ of the trim
 
 
@@ -73,8 +75,8 @@ def _response(
     drift = np.polynomial.chebyshev.chebvander(np.linspace(-1.0, 1.0, t.size), _DRIFT)
     basis = np.column_stack((np.sin(rate * t), np.cos(rate * t), drift))
     found = np.linalg.lstsq(basis, 0.5 * (up - down)[late], rcond=None)[0]
-    pitch, path, speed = (found[0] + 1j * found[1]) / _SIZE
-    return Response(complex(pitch), complex(path), complex(speed), pressure_Pa)
+    pitch, path, speed, load = (found[0] + 1j * found[1]) / _SIZE
+    return Response(complex(pitch), complex(path), complex(speed), complex(load), pressure_Pa)
 
 
 def _aircraft(
@@ -84,14 +86,14 @@ def _aircraft(
 
 
 def _fly(airframe: JSBSimAirframe, command: Floats, frame_s: float) -> Floats:
-    """Return pitch, path and speed under an elevator command, shape (frames, 3)."""
-    rows = np.empty((command.size, 3))
+    """Return pitch, path, speed and load factor under an elevator command, shape (frames, 4)."""
+    rows = np.empty((command.size, 4))
     before = airframe.motion()[ALTITUDE]
     for row, value in zip(rows, command.tolist(), strict=True):
         motion = airframe.motion()
         path = path_angle(motion, before, frame_s)
         before = motion[ALTITUDE]
-        row[:] = motion[PITCH], path, motion[SPEED]
+        row[:] = motion[PITCH], path, motion[SPEED], motion[LOAD]
         airframe.step((value, 0.0, 0.0))
     return rows
 

@@ -10,10 +10,11 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from coupled.campaign.sweep import AS_FILED
+from coupled.campaign.words import parameter
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_ROWS, _MOST_COLUMNS = 4, 4
-_FIGURES = {
+FIGURES = {
     "asked_norm": "surface asked, of travel",
     "reached_norm": "surface reached, of travel",
     "loss": "authority lost, share",
@@ -42,7 +43,7 @@ def draw_sweep(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str])
     for row, name in enumerate(figures):
         for column, key in enumerate(numeric):
             _panel(panels[row, column], found, keys, key, _other(numeric, column), name)
-        panels[row, 0].set_ylabel(_FIGURES[name])
+        panels[row, 0].set_ylabel(FIGURES[name])
     for column, key in enumerate(numeric):
         panels[-1, column].set_xlabel(parameter(key))
         other = _other(numeric, column)
@@ -56,26 +57,6 @@ def draw_sweep(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str])
     if len(labels) > 1 or "ended early" in labels:
         drawn.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)
     return drawn
-
-
-def parameter(key: str) -> str:
-    """Return a key for people: `column loader bend, m/N` for that of a rig."""
-    words = key.split(".")
-    last, unit = _unit(words[-1])
-    passed = ("rig", "controls", "flight", "properties")
-    name = " ".join([word for word in words[:-1] if word not in passed] + [last.replace("_", " ")])
-    return f"{name}, {unit}" if unit else name
-
-
-def _unit(word: str) -> tuple[str, str]:
-    """Return a key's name and its unit: after the first part that is one."""
-    parts = word.split("_")
-    units = ("m", "rad", "s", "N", "Pa", "kg", "Hz", "V", "bits", "norm", "J")
-    for i, part in enumerate(parts[1:], 1):
-        if part in units:
-            unit = " ".join(parts[i:]).replace(" per ", "/").replace(" ", "·")
-            return "_".join(parts[:i]), "of travel" if unit == "norm" else unit
-    return word, ""
 
 
 def _other(keys: Sequence[str], column: int) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_type_hints
 
@@ -47,9 +48,21 @@ def bound(kernel: F, *arguments: Any) -> F:
     much as the physics. It takes arguments of just these types and no others.
     """
     dispatcher: Any = kernel
-    types = tuple(numba.typeof(argument) for argument in arguments)
+    types = tuple(_type_of(argument) for argument in arguments)
     dispatcher.compile(types)
     return cast(F, dispatcher.get_overload(types))
+
+
+def _type_of(argument: Any) -> Any:
+    """Return an argument's type; numba takes milliseconds over the layout of a control."""
+    if isinstance(argument, np.ndarray) and argument.flags.c_contiguous:
+        return _type_of_array(argument.dtype, argument.ndim)
+    return numba.typeof(argument)
+
+
+@lru_cache(maxsize=64)
+def _type_of_array(dtype: np.dtype[Any], dimensions: int) -> Any:
+    return numba.typeof(np.empty((1,) * dimensions, dtype))
 
 
 def _cache_folder(chosen: str, beside: Path) -> str:

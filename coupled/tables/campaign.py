@@ -11,10 +11,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from coupled.campaign.words import wanted
+from coupled.campaign.words import parameter, wanted
 
 if TYPE_CHECKING:
+    from coupled.campaign.sensitivity import Index
     from coupled.campaign.verdict import Verdict
+
+_SHOWN = 6  # parameters of a figure, the strongest
 
 
 def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
@@ -61,3 +64,30 @@ def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -
         first = ended.row(0, named=True)
         why = f"the first, flight {first['flight']}: {first['ended_early']}"
         console.print(f"[yellow]{len(ended)} of {len(found)} ended early[/]; {escape(why)}")
+
+
+def print_indices(console: Console, told: Sequence[Index]) -> None:
+    """Print of each figure the parameters that matter most, by their total index."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("shares of the variance", overflow="fold")
+    for head in ("alone", "95 %", "with others", "95 %"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for (configuration, figure), group in groupby(told, key=lambda i: (i.configuration, i.figure)):
+        ordered = sorted(group, key=lambda index: -(index.total or 0.0))
+        table.add_row(f"[bold]{escape(configuration)}: {figure}[/]", *[""] * 4)
+        for index in ordered[:_SHOWN]:
+            table.add_row(f" {escape(parameter(index.key).partition(',')[0])}", *_shares(index))
+    console.print(table, highlight=False)
+
+
+def _shares(index: Index) -> tuple[str, ...]:
+    cells: list[str] = []
+    for value, low, high in (
+        (index.first, index.first_low, index.first_high),
+        (index.total, index.total_low, index.total_high),
+    ):
+        if value is None or low is None or high is None:
+            cells += ["–", ""]
+        else:
+            cells += [f"{value:.3f}", f"{low:.3f} to {high:.3f}"]
+    return tuple(cells)

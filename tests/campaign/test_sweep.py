@@ -22,8 +22,9 @@ from coupled.campaign.journal import JOURNAL, opened
 from coupled.campaign.plan import Plan, jobs, read_plan
 from coupled.campaign.pool import Here, executor
 from coupled.campaign.sweep import fly_job, fly_sweep, write_table
+from coupled.campaign.words import parameter
 from coupled.errors import InputError
-from coupled.plots.campaign import draw_sweep, parameter
+from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
 from tests.campaign.test_check import BENCH
 from tests.test_cli import SHORT, coupled, files
@@ -320,6 +321,7 @@ def test_a_parameter_is_drawn_with_its_unit() -> None:
     assert parameter("rig.flight.calibrated_airspeed_m_per_s") == "calibrated airspeed, m/s"
     assert parameter("pilot.column.force_N") == "pilot column force, N"
     assert parameter("seed") == "seed"
+    assert parameter("rig.controls.column.rigging.stretch_loss_per_Pa").endswith("loss, 1/Pa")
 
 
 CLUSTER = """

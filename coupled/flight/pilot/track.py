@@ -78,8 +78,8 @@ class Track(Pilot):
             answer = elevator_response(rig.flight, frame_s, controls, rig_file, rate)
             limbs = self._limbs(rig, answer.pressure_Pa, rate)
             limbs *= delay_response(self.delay, frame_s, rate)
-            by_pilot = [limbs * motion for motion in answer[:3]]
-            return Response(by_pilot[0], by_pilot[1], by_pilot[2], answer.pressure_Pa)
+            pitch, path, speed, load = (limbs * motion for motion in answer[:4])
+            return Response(pitch, path, speed, load, answer.pressure_Pa)
 
         at_inner = element(self.crossover if self.what == "pitch" else self.pitch_crossover)
         if self.what == "pitch":

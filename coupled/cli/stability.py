@@ -1,0 +1,89 @@
+"""The command of a rig's stability: stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupled.channels import unit_of
+from coupled.cli.app import JsonOption, app
+from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.errors import InputError, nearest
+from coupled.files import check_target
+from coupled.resources import find, shipped_rigs
+from coupled.terminal import check_json, give_json, out, progress, say
+
+
+@app.command(
+    epilog="[dim]Examples: coupled stability 737"
+    " · coupled stability my.toml --control wheel -o wheel.png[/]"
+)
+def stability(
+    rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
+    control: Annotated[
+        str, typer.Option(help="column, wheel or pedals.  [default: all that bend]")
+    ] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Figure, PNG, PDF or SVG.  [default: out/RIG-stability.png]"
+        ),
+    ] = None,
+    json_file: JsonOption = "",
+) -> None:
+    """Map where a rig is stable, simulated and by linear theory, over K·G_T.
+
+    Against the host's K̂, the frame of a digital product, the hand's stiffness and the servo.
+    """
+    from coupled.plots.saving import check_format, save
+    from coupled.plots.stability import draw_stability
+    from coupled.rig.rigfile import read_rig
+    from coupled.stability.aircraft import bob_weight
+    from coupled.stability.limits import disagreement, tell
+    from coupled.stability.planes import KINDS, plane
+    from coupled.tables.stability import print_limits, write_planes
+
+    file = find(rig, shipped_rigs(), "rig")
+    data = read_rig(file)
+    names = [name for name in data.controls if control in ("", name)]
+    if not names:
+        raise InputError(file, "--control", f"no {control!r}; {nearest(control, data.controls)}")
+    bent = [name for name in names if data.controls[name].loader.bend > 0.0]
+    if not bent:
+        d = unit_of(names[0])
+        key = f"controls.{names[0]}.loader.bend_{d}_per_N"
+        raise InputError(file, key, "is 0 and nothing bends; a map over K·G_T needs a K above 0")
+    path = output or Path("out") / f"{data.name}-stability.png"
+    table = path.with_suffix(".csv")
+    check_format(path)
+    for target in (path, table):
+        check_target(target, [file])
+    check_json(json_file, [file, path, table])
+    say_stale(data)
+    asked = [(name, kind) for name in bent for kind in KINDS]
+    every = []
+    with progress() as advance:
+        told = [tell(data, name) for name in bent]
+        bob = bob_weight(data, file) if "column" in bent else None
+        for done, (name, kind) in enumerate(asked):
+            advance(f"{name}, {kind}", done, len(asked))
+            every.append(plane(data, name, kind))
+    planes = {name: [each for each in every if each.control == name] for name in bent}
+    save(draw_stability(data, planes), path)
+    write_planes(data, every, table)
+    most, worst = (100.0 * share for share in disagreement(every))
+    if json_file != "-":
+        print_limits(out, told, bob)
+        found = sum(len(each.crossings) for each in every)
+        say(
+            f"{found} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"
+            f" theory, all within {worst:.2f} %"
+        )
+        say(f"written: {path}")
+        say(f"written: {table}")
+    limits = [each.as_dict() for each in told]
+    give_json(
+        {"rig": data.name, "controls": limits, "greatest_difference_percent": worst}, json_file
+    )

@@ -1,0 +1,77 @@
+"""Sobol's indices drawn: bars of what each parameter does alone, and with others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from coupled.campaign.sensitivity import Index
+from coupled.campaign.words import parameter
+from coupled.plots.campaign import FIGURES
+from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
+
+_LONGEST = 44  # letters of a parameter
+
+
+def draw_sensitivity(told: Sequence[Index]) -> Figure:
+    """Draw the indices: a row a figure, a column a configuration, bars a parameter.
+
+    The parameters stand in the order of their greatest total index, the strongest on top.
+    """
+    configurations = list(dict.fromkeys(index.configuration for index in told))
+    figures = list(dict.fromkeys(index.figure for index in told))
+    keys = sorted(
+        dict.fromkeys(index.key for index in told),
+        key=lambda key: max(index.total or 0.0 for index in told if index.key == key),
+    )
+    height = 0.9 + len(figures) * (0.75 + 0.24 * len(keys))
+    size = (4.2 + 3.4 * len(configurations), height)
+    drawn = Figure(figsize=size, layout="constrained")
+    grid = drawn.subplots(
+        len(figures), len(configurations), squeeze=False, sharex=True, sharey=True
+    )
+    for row, figure in zip(grid, figures, strict=True):
+        for axes, configuration in zip(row, configurations, strict=True):
+            here = {
+                index.key: index
+                for index in told
+                if (index.figure, index.configuration) == (figure, configuration)
+            }
+            _panel(axes, [here[key] for key in keys])
+            axes.set_title(f"{FIGURES[figure]}: {plain(configuration)}", fontsize=10)
+            axes.set_yticks(range(len(keys)), [_words(key) for key in keys], fontsize=8)
+    for axes in grid[-1]:
+        axes.set_xlabel("share of the figure's variance", fontsize=9)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
+    return drawn
+
+
+def _words(key: str) -> str:
+    """Return a parameter without its unit, which its share does not have."""
+    return plain(parameter(key).partition(",")[0], _LONGEST)
+
+
+def _panel(axes: Any, indices: Sequence[Index]) -> None:
+    told = [
+        (at, (i.first, i.first_low, i.first_high), (i.total, i.total_low, i.total_high))
+        for at, i in enumerate(indices)
+        if i.total is not None
+    ]
+    axes.set_xlim(-0.03, 1.08)
+    axes.grid(axis="x", alpha=0.25)
+    axes.tick_params(labelsize=8)
+    if not told:
+        axes.text(0.5, 0.5, "does not vary", transform=axes.transAxes, ha="center", color=GRAY)
+    for label, color, shift, which in (
+        ("alone (first)", BLUE, 0.2, 1),
+        ("with others (total)", ORANGE, -0.2, 2),
+    ):
+        places = np.array([row[0] for row in told], dtype=float) + shift
+        values = np.array([row[which] for row in told], dtype=float).reshape(-1, 3)
+        axes.barh(places, values[:, 0], 0.36, color=color, label=label)
+        bounds = np.abs(values[:, 1:] - values[:, :1]).T
+        axes.errorbar(values[:, 0], places, xerr=bounds, fmt="none", ecolor="black", elinewidth=0.8)

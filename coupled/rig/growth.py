@@ -1,0 +1,91 @@
+"""How fast a control let go from a small deflection grows or dies, by the stages that fly.
+
+Every frame is that of `frame`. The state is brought back to its size before it leaves the
+range of doubles, which a linear rig does not notice, and what it had grown is kept.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import entry, stage
+from coupled.rig.control import ControlArray, ControlState
+from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame
+from coupled.rig.hand import grip_force
+from coupled.rig.loader import start_delay
+from coupled.rig.packing import Hand, pack
+from coupled.rig.parameters import Rig
+
+Floats = NDArray[np.float64]
+_LEAST_FRAMES = 96
+_LARGEST, _SMALLEST = 1e3, 1e-3
+
+
+def growth(rig: Rig, hand: Hand, seconds: float) -> float:
+    """Return the rate at which the motion of a rig's only control grows, 1/s; negative: it dies.
+
+    The slope of the logarithm of the state's size over the latter half of the time, which must
+    be long beside the motion's period. Infinite where a frame is more than doubles can hold.
+    The rig is to be linear: without friction, breakout, play and limits.
+    """
+    frames = max(_LEAST_FRAMES, math.ceil(seconds * rig.frame_rate))
+    (name, control), *others = rig.controls.items()
+    assert not others
+    stiffness = control.loader.basic_gradient + max(control.schedule.total_gradient)
+    packed = pack(rig, {name: hand})
+    logs = np.empty(frames)
+    _grow(packed, math.sqrt(stiffness / control.loader.mass), logs)
+    late = logs[frames // 2 :]
+    if not np.all(np.isfinite(late)):
+        return math.inf
+    times = np.arange(late.size) / rig.frame_rate
+    # Weights that fade at both ends let a swing of the size about its trend fall out.
+    weights = np.sin(np.pi * (np.arange(late.size) + 0.5) / late.size)
+    return float(np.polyfit(times - times.mean(), late, 1, w=weights)[0])
+
+
+@stage
+def _size(s: ControlState, rate: float) -> float:
+    """Return the size of a motion, d/s: speeds, and deflections by a typical rate in rad/s."""
+    moved = s.loader.rate * s.loader.rate + s.linkage.rate * s.linkage.rate
+    away = s.loader.computed * s.loader.computed + s.linkage.position * s.linkage.position
+    return math.sqrt(moved + rate * rate * away)
+
+
+@stage
+def _scale(s: ControlState, factor: float) -> None:
+    """Make the whole state so much larger."""
+    s.loader.computed *= factor
+    s.loader.rate *= factor
+    s.loader.delayed *= factor
+    s.loader.history *= factor
+    s.linkage.position *= factor
+    s.linkage.rate *= factor
+    s.linkage.grip *= factor
+    s.hand.force *= factor
+    s.hand.integral *= factor
+
+
+@entry
+def _grow(controls: ControlArray, rate: float, logs: Floats) -> None:
+    """Run a control from a deflection with some speed; write its size's logarithm each frame."""
+    p, s = controls[0].parameters, controls[0].state
+    still = np.zeros(p.clock.substeps + 1)
+    out = np.zeros(CHANNELS_PER_CONTROL)
+    s.loader.computed, s.loader.rate = 1.0, 0.7 * rate
+    s.linkage.position = s.linkage.grip = 0.8
+    grip_force(p.hand, s.hand, p.linkage, s.linkage, 0.0, 0.0, 0.0, p.clock.substep)
+    start_delay(p.loader, s.loader, s.hand.force)
+    grown = 0.0
+    for k in range(len(logs)):
+        out[:] = 0.0  # what it holds is the noise of what is read
+        host_frame(p, s, s.hand.force, 0.0, 0.0, out)
+        run_frame(p, s, still, still, 0, 1.0)
+        size = _size(s, rate)
+        logs[k] = grown + math.log(size) if size > 0.0 else -math.inf
+        if size > _LARGEST or 0.0 < size < _SMALLEST:
+            grown += math.log(size)
+            _scale(s, 1.0 / size)

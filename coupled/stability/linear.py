@@ -1,0 +1,144 @@
+"""Linear theory of the rig: the poles of its loops, or the eigenvalues of its frame's exact map.
+
+    loader    m·δc'' + c·δc' + (G_B + ΔG)·δc = F(t − τ)
+    servo     x'' = ω²·(δc − x) − 2ζω·x'
+    grip      δ = x + K·F
+    hand      F = −k_h·δ − c_h·δ' − k_I·∫δ dt
+
+A force that does not answer to the grip (a free hand) leaves the loader alone: it is stable
+while its spring G_B + ΔG is positive, that is while K̂·G_T < 1. A hand closes a loop around
+loader, servo and structure, whose stiffness is at most 1/K. τ is the loader's delay and one
+substep, in which hand and loader exchange force and motion; it is taken by its Padé fraction
+of second order.
+
+The digital product ΔG·δc stands still over a frame of T seconds, so the state goes by
+
+    z(t + T) = (exp(A·T) − ∫exp(A·s) ds·B·ΔG·C)·z(t),    δc = C·z
+
+whose eigenvalues λ tell of stability; the growth is ln|λ|/T. Without a basic gradient and with
+c/m = a the criterion has a closed form, `held_limit`; for small frames T < 2c/ΔG, since the
+product comes half a frame late: the damping ratio falls by ω·T/4.
+
+δ̂ = δc + K̂·F goes to the surface only. It closes no loop but that of the aircraft.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from coupled.rig.packing import Hand
+from coupled.rig.parameters import Control, Rig
+
+Floats = NDArray[np.float64]
+_COMPUTED, _RATE, _POSITION, _SPEED = range(4)
+
+
+def added_gradient(control: Control) -> float:
+    """Return ΔG as it is made, N/d, at the first gradient of the schedule: eq. (12)."""
+    asked, host = control.schedule.total_gradient[0], control.compensation
+    if host.gradient:
+        asked /= 1.0 - host.bend * asked
+    known = control.loader.basic_gradient if host.basic_gradient is None else host.basic_gradient
+    return (asked - known) / control.sensing.modifying_scale
+
+
+def poles_growth(matrices: Floats) -> Floats:
+    """Return the greatest real part of the eigenvalues of matrices, 1/s, shape (…, n, n)."""
+    return np.asarray(np.max(np.linalg.eigvals(matrices).real, axis=-1))
+
+
+def map_growth(maps: Floats, frame_s: Floats | float) -> Floats:
+    """Return how fast what a map makes of a frame grows, 1/s, for maps of shape (…, n, n)."""
+    radius = np.max(np.abs(np.linalg.eigvals(maps)), axis=-1)
+    return np.asarray(np.log(np.maximum(radius, 1e-300)) / frame_s)
+
+
+def growth(rig: Rig, hand: Hand) -> float:
+    """Return the growth of a linear rig's only control, 1/s, as its multiplier has it."""
+    (control,) = rig.controls.values()
+    matrix = motion_matrix(rig, hand)
+    if control.loader.multiplier == "hybrid":
+        return float(poles_growth(matrix))
+    return float(map_growth(frame_map(matrix, control, 1.0 / rig.frame_rate), 1.0 / rig.frame_rate))
+
+
+def motion_matrix(rig: Rig, hand: Hand) -> Floats:
+    """Return A of z' = A·z; its first states are δc, δc', x, x'.
+
+    A hybrid ΔG is in it, a digital one is not.
+    """
+    (control,) = rig.controls.values()
+    loader, width = control.loader, 4
+    stiffness = loader.basic_gradient
+    if loader.multiplier == "hybrid":
+        stiffness += added_gradient(control)
+    w = 2.0 * math.pi * loader.servo_frequency
+    a = np.zeros((8, 8))
+    a[_COMPUTED, _RATE] = a[_POSITION, _SPEED] = 1.0
+    a[_RATE, :2] = -stiffness / loader.mass, -loader.damping / loader.mass
+    a[_SPEED, [_COMPUTED, _POSITION, _SPEED]] = w * w, -w * w, -2.0 * loader.servo_damping_ratio * w
+    if hand.stiffness == hand.damping == hand.integral == 0.0:
+        return a[:4, :4].copy()
+    width, force = _add_hand(a, hand, loader.bend)
+    late_s = loader.delay + 1.0 / (rig.frame_rate * rig.substeps)
+    # e^(−τs) = 1 − (12/τ)·s/(s² + (6/τ)·s + 12/τ²)
+    a[width, width + 1] = 1.0
+    a[width + 1] = force
+    a[width + 1, [width, width + 1]] -= 12.0 / late_s**2, 6.0 / late_s
+    a[_RATE] += force / loader.mass
+    a[_RATE, width + 1] -= 12.0 / late_s / loader.mass
+    return a[: width + 2, : width + 2].copy()
+
+
+def _add_hand(a: Floats, hand: Hand, bend: float) -> tuple[int, Floats]:
+    """Add the hand's own states; return how many there are now, and F as a row of all, N."""
+    width, force = 4, np.zeros(len(a))
+    answer = np.zeros(len(a))
+    answer[[_POSITION, _SPEED]] = -hand.stiffness, -hand.damping
+    integral = width
+    if hand.integral > 0.0:
+        answer[integral] = 1.0
+        width += 1
+    give = 1.0 + bend * hand.stiffness
+    if bend * hand.damping > 0.0:  # the bend's own speed is damped too: F has a lag
+        a[width] = answer / (bend * hand.damping)
+        a[width, width] = -give / (bend * hand.damping)
+        force[width] = 1.0
+        width += 1
+    else:
+        force = answer / give
+    if hand.integral > 0.0:
+        a[integral] = -hand.integral * bend * force
+        a[integral, _POSITION] -= hand.integral
+    return width, force
+
+
+def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:
+    """Return the exact map of a frame over which the digital product stands still."""
+    n = len(matrix)
+    grown = np.zeros((n + 1, n + 1))
+    grown[:n, :n] = matrix
+    grown[_RATE, n] = -added_gradient(control) * control.sensing.deflection_scale
+    grown[_RATE, n] /= control.loader.mass
+    over = expm(grown * frame_s)
+    found = over[:n, :n].copy()
+    found[:, _COMPUTED] += over[:n, n]
+    return np.asarray(found)
+
+
+def held_limit(mass: float, damping: float, frame_s: float) -> float:
+    """Return the greatest ΔG in N/d whose product may stand still over a frame, where G_B = 0.
+
+    By Jury's criterion for the two eigenvalues, with a = c/m and e = exp(−a·T): they pass
+    through the unit circle as a pair at ΔG = m·a²·(1 − e)/(1 − e − a·T·e), or one of them
+    through −1 at 2·m·a²·(1 + e)/(a·T·(1 + e) − 2·(1 − e)), whichever comes first.
+    """
+    a = damping / mass
+    turn, decay = a * frame_s, math.exp(-a * frame_s)
+    pair = a * a * (1.0 - decay) / (1.0 - decay - turn * decay)
+    flip = 2.0 * a * a * (1.0 + decay) / (turn * (1.0 + decay) - 2.0 * (1.0 - decay))
+    return mass * min(pair, flip)
