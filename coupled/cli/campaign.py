@@ -74,10 +74,12 @@ def sweep(
     from coupled.campaign.journal import JOURNAL, opened
     from coupled.campaign.plan import read_plan
     from coupled.campaign.pool import executor
+    from coupled.campaign.survival import limits
     from coupled.campaign.sweep import TABLE, fly_sweep, write_table
     from coupled.plots.campaign import draw_sweep
     from coupled.plots.saving import check_format, save
-    from coupled.tables.campaign import print_sweep
+    from coupled.plots.survival import draw_survival
+    from coupled.tables.campaign import print_survival, print_sweep
 
     if cluster and workers is not None:
         raise InputError("--workers", "", "a cluster has its own; leave it out")
@@ -101,9 +103,15 @@ def sweep(
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    save(draw_sweep(found, plan.keys, plan.sweep.keep), path)
+    numeric = [key for key in plan.keys if found[key].dtype.is_numeric()]
+    alive = limits(found, numeric[0]) if plan.sweep.survive and numeric else []
+    if alive:
+        save(draw_survival(plan.sweep.name, numeric[0], alive), path)
+    else:
+        save(draw_sweep(found, plan.keys, plan.sweep.keep), path)
     if json_file != "-":
         print_sweep(out, found, plan.sweep.keep)
+        print_survival(out, alive)
         say(f"table: {target / TABLE}  ({len(found)} flights)")
         say(f"figure: {path}")
     give_json(found.to_dicts(), json_file)

@@ -34,10 +34,11 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
 
 
 class Measure(Section):
-    """What a comparison looks at: the control, and the change of attitude that is timed."""
+    """What a comparison looks at: the control, the change of attitude that is timed, a channel."""
 
     control: ControlName | None = None
     attitude_change: float = quantity("rad", 0.1, gt=0)
+    drawn: str | None = None
 
 
 class Bench(Section):
@@ -183,7 +184,11 @@ def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> 
         raise
     if run.measure.control is not None and run.measure.control not in rig.controls:
         raise InputError(file, "measure.control", f"{rig_file.name} has no {run.measure.control}")
-    return Scenario(run, file, rig, rig_file, ready, case.label, case.rig)
+    made = Scenario(run, file, rig, rig_file, ready, case.label, case.rig)
+    drawn = run.measure.drawn
+    if drawn is not None and drawn not in made.channels:
+        raise InputError(file, "measure.drawn", f"no {drawn!r}; {nearest(drawn, made.channels)}")
+    return made
 
 
 def _refuse_doubles(run: RunFile, file: Path) -> None:

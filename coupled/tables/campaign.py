@@ -14,6 +14,7 @@ from rich.table import Table
 from coupled.campaign.words import wanted
 
 if TYPE_CHECKING:
+    from coupled.campaign.survival import Limit
     from coupled.campaign.verdict import Verdict
 
 
@@ -61,3 +62,19 @@ def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -
         first = ended.row(0, named=True)
         why = f"the first, flight {first['flight']}: {first['ended_early']}"
         console.print(f"[yellow]{len(ended)} of {len(found)} ended early[/]; {escape(why)}")
+
+
+def print_survival(console: Console, limits: Sequence[Limit]) -> None:
+    """Print what each configuration survives, and its boundary beside the closed form's."""
+    if not limits:
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("", no_wrap=True)
+    for head in ("survived", "boundary", "closed form"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for limit in limits:
+        places = (limit.boundary, limit.predicted)
+        cells = ["–" if value is None else f"{value:.4g}" for value in places]
+        name = f"[bold]{escape(limit.configuration)}[/]"
+        table.add_row(name, f"{limit.survived} of {limit.flights}", *cells)
+    console.print(table, highlight=False)
