@@ -112,7 +112,7 @@ class Track(Pilot):
         arm = (self.arm_stiffness + self.arm_damping * s) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame
         # The host takes δc, ahead of the servo, which only the arm feels.
-        drive = COMMAND_SIGN[control.surface] / control.travel
+        drive: complex = COMMAND_SIGN[control.surface] / control.travel
         drive /= (1.0 + rigging.stretch_loss * pressure_Pa) * (1.0 + rigging.lag * s)
         return complex(drive * late / ((1.0 + self.lag * s) * (feel + arm)))
 
