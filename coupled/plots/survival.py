@@ -31,9 +31,11 @@ def draw_survival(name: str, key: str, limits: Sequence[Limit]) -> Figure:
             axes.annotate(
                 f"{limit.boundary:.3g}",
                 (limit.boundary, y),
-                xytext=(4, 7),
+                xytext=(4, 8),
                 textcoords="offset points",
                 fontsize=8,
+                va="center",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
             )
         if limit.predicted is not None:
             ends = [y - 0.38, y + 0.38]
@@ -47,6 +49,10 @@ def draw_survival(name: str, key: str, limits: Sequence[Limit]) -> Figure:
         Line2D([], [], color=_LOST, marker="x", linestyle="", markersize=5, label="lost"),
         Line2D([], [], color="black", linewidth=1.6, label="boundary"),
     ]
+    if any(0.0 < share < 1.0 for limit in limits for _, share in limit.shares):
+        some = Line2D([], [], color=_LIVES, marker="o", linestyle="", alpha=0.5, markersize=5)
+        some.set_label("survived by some")
+        handles.insert(1, some)
     if any(limit.predicted is not None for limit in limits):
         label = "rigid boundary × (1 − closed form's loss)"
         handles.append(Line2D([], [], color="#0072b2", linestyle=":", label=label))

@@ -100,7 +100,7 @@ def test_the_loop_crosses_over_as_set(
     assert isinstance(pilots, Track)
     found, left = measured(record, seen[what], pilots)
     print(f"{rig} {what}: {found:.3f} of {crossover} rad/s, {left:.3f} of {margin} rad")
-    # Small sines: the T-37's tables have kinks, which a target of 2 mrad already feels (0.04 rad).
+    # Small sines: the T-37's tables have kinks, which larger ones feel.
     assert found == pytest.approx(crossover, rel=0.01)
     assert left == pytest.approx(margin, abs=0.015)
 
