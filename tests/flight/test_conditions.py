@@ -146,6 +146,17 @@ def test_a_property_is_led_to_its_value(tmp_path: Path) -> None:
     assert record["true_airspeed_m_per_s"][-1] < record["true_airspeed_m_per_s"][0] - 0.5
 
 
+def test_ice_on_the_flaps_brakes_by_its_drag(tmp_path: Path) -> None:
+    """A model's own coefficient, led up: m·V' = −q̄·S·ΔC_D·sin²(flap) at once, of 40,000 lb."""
+    event = '[event.ice]\nat_s = 1.0\nproperty = "awjsra/flap-drag"\nto = 0.366\n'
+    iced, clean = flown(tmp_path, event, rig="awjsra"), flown(tmp_path, "", rig="awjsra")
+    area, mass = 865.0 * FOOT_m**2, 40_000.0 * POUND_N / 9.80665
+    drag = clean["dynamic_pressure_Pa"][120] * area * 0.2 * np.sin(np.radians(65.0)) ** 2
+    slower = clean["true_airspeed_m_per_s"] - iced["true_airspeed_m_per_s"]
+    assert slower[120] == pytest.approx(0.0, abs=1e-9)
+    assert slower[180] == pytest.approx(0.5 * drag / mass, rel=0.05)
+
+
 def loaded(rig: str, **changes: float) -> JSBSimAirframe:
     flight = read_run({"737": "pull-up-737", "awjsra": "awjsra-shear"}[rig])[0].rig.flight
     assert flight is not None

@@ -74,6 +74,26 @@ def test_the_hand_lets_go_of_its_reach() -> None:
     assert abs(record["column_deflection_m"][-1]) < 1e-4
 
 
+def test_the_grip_comes_to_the_reach_as_a_clamp_does() -> None:
+    """The error dies as exp(−6·t), once the loader's own swing of 9 1/s has."""
+    hand = {"kind": "step", "force_N": 600.0, "rise_s": 0.0, "reach_m": REACH}
+    rig = configure(bench({"servo_frequency_Hz": 500.0}), "rigid")
+    left = REACH - pushed(rig, hand)["column_deflection_m"]
+    for row in (220, 240, 260):
+        assert left[row] / left[row - 20] == pytest.approx(np.exp(-6.0 * 0.2), rel=0.02)
+
+
+@pytest.mark.parametrize("configuration", ["uncompensated", "compensated"])
+def test_a_reach_never_makes_a_hand_stronger(configuration: Configuration) -> None:
+    rig = read_rig(shipped_rigs()["737"]).model_copy(update={"flight": None})
+    hand = {"kind": "doublet", "force_N": 900.0, "half_period_s": 0.4, "rise_s": 0.35}
+    bent = configure(rig, configuration)
+    free = pushed(bent, hand, q=15_000.0)["column_force_N"]
+    near = pushed(bent, {**hand, "reach_m": 0.1}, q=15_000.0)["column_force_N"]
+    assert np.abs(near).max() < np.abs(free).max()
+    assert np.all(near * np.sign(free) <= np.abs(free) + 1e-9)
+
+
 @pytest.mark.parametrize("name", sorted(shipped_rigs()))
 def test_every_rig_stands_still_at_the_reach(name: str) -> None:
     """By the strongest short pushes: with friction, breakout, two segments, and any K·G_T."""
