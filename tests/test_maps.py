@@ -73,9 +73,7 @@ def test_the_command_writes_figures_and_tables(
     ("words", "says"),
     [
         (["nonsense"], "nonsense: is no shipped rig"),
-        (["bench", "--record", "missing.csv"], "missing.csv: cannot be read"),
         (["bench", "--record", "alien.csv"], "alien.csv: dynamic_pressure_Pa: no such column"),
-        (["bench", "--output", "map.txt"], "map.txt: a figure ends in"),
     ],
 )
 def test_a_map_of_nothing_is_one_line_and_writes_nothing(
