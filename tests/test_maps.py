@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -64,3 +67,29 @@ def test_the_command_writes_figures_and_tables(
     ran = CliRunner().invoke(app, ["map", "t37", "--output", "t37.png"])
     assert ran.exit_code == 0, ran.output
     assert np.all(read_columns(tmp_path / "t37-feel.csv")["specified_force_per_g_N"] > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["nonsense"], "nonsense: is no shipped rig"),
+        (["bench", "--record", "alien.csv"], "alien.csv: dynamic_pressure_Pa: no such column"),
+    ],
+)
+def test_a_map_of_nothing_is_one_line_and_writes_nothing(
+    tmp_path: Path, words: list[str], says: str
+) -> None:
+    (tmp_path / "alien.csv").write_text("time_s,column_force_N\n0.0,1.0\n0.1,1.0\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "coupled", "map", *words],
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "COLUMNS": "200", "NO_COLOR": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert says in done.stderr
+    assert [path.name for path in tmp_path.rglob("*")] == ["alien.csv"]

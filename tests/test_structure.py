@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from coupled import channels
-from coupled.campaign.plan import SweepFile, Vary
+from coupled.campaign.plan import Survive, SweepFile, Vary
+from coupled.flight.event import Event
 from coupled.flight.expectation import Expect
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Measure, RunFile
+from coupled.flight.weather import Gust, Turbulence
 from coupled.flight.wind import Wind
 from coupled.logs.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
@@ -107,7 +109,8 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
-    sections += [RunFile, Bench, Wind, Measure, Expect, SweepFile, Vary]
+    sections += [RunFile, Bench, Wind, Gust, Turbulence, Event, Measure, Expect]
+    sections += [SweepFile, Vary, Survive]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:
         for key in file_keys(section, "{d}"):
@@ -116,6 +119,8 @@ def test_every_key_of_the_files_is_documented() -> None:
             if key in ("gains", "calibration", "rigging", "noise", "measure"):
                 continue
             if key in ("bench", "wind", "case", "expect", "kind", "vary"):
+                continue
+            if key in ("gust", "turbulence", "event", "survive"):
                 continue
             if section is LogMap:
                 assert f"[{key}" in text, key

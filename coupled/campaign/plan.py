@@ -47,6 +47,14 @@ class Vary(Section):
     spread: Literal["even", "log"] = "even"
 
 
+class Survive(Section):
+    """What a flight has to keep to be survived: a channel within bounds, in every row."""
+
+    channel: str = quantity("", min_length=1)
+    least: float | None = None
+    most: float | None = None
+
+
 class SweepFile(Section):
     """The keys of a sweep file."""
 
@@ -60,6 +68,7 @@ class SweepFile(Section):
     reseed: bool = False
     keep: list[Figure] = quantity("", list(FIGURES), min_length=1)
     extremes: list[str] = []
+    survive: list[Survive] = []
     vary: list[Vary] = quantity("", min_length=1)
 
 
@@ -100,11 +109,13 @@ def read_plan(file: Path) -> Plan:
     """Return the sweep of a file, every value tried, the run's own faults blamed on the run."""
     table = load_toml(file)
     known_keys(table, file_keys(SweepFile, "m"), file, "")
-    varied = table.get("vary", [])
-    if not isinstance(varied, list):
-        raise InputError(file, "vary", "each is written [[vary]]")
-    if varied:
-        table["vary"] = [build(Vary, item, file, f"vary[{i}]") for i, item in enumerate(varied)]
+    kinds: dict[str, type[Section]] = {"vary": Vary, "survive": Survive}
+    for key, kind in kinds.items():
+        listed = table.get(key, [])
+        if not isinstance(listed, list):
+            raise InputError(file, key, f"each is written [[{key}]]")
+        if listed:
+            table[key] = [build(kind, item, file, f"{key}[{i}]") for i, item in enumerate(listed)]
     sweep = build(SweepFile, table, file, "")
     _check_values(sweep, file)
     run_file = find(sweep.run, shipped_runs(), "run", beside=file.parent)
@@ -116,10 +127,15 @@ def read_plan(file: Path) -> Plan:
             raise InputError(file, "case", f"no {sweep.case!r}; {nearest(sweep.case, labels)}")
     base = try_changes({})
     files = {*input_files(base), *_check_keys(sweep, file, try_changes)}
-    for channel in sweep.extremes:
+    for i, each in enumerate(sweep.survive):
+        if each.least is None and each.most is None:
+            raise InputError(file, f"survive[{i}]", "has no bound: give least or most")
+    named = [("extremes", channel) for channel in sweep.extremes]
+    named += [(f"survive[{i}].channel", each.channel) for i, each in enumerate(sweep.survive)]
+    for key, channel in named:
         if channel not in base.channels:
             hint = nearest(channel, base.channels)
-            raise InputError(file, "extremes", f"no channel {channel!r}; {hint}")
+            raise InputError(file, key, f"no channel {channel!r}; {hint}")
     return Plan(sweep, file, run_file, run_table, _identity(sweep, files))
 
 

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from coupled.authority import judge
 from coupled.campaign.journal import Journal, Row
-from coupled.campaign.plan import Job, Plan, jobs
+from coupled.campaign.plan import Job, Plan, Survive, jobs
 from coupled.errors import InputError
 from coupled.files import write_whole
 from coupled.flight.loop import fly
@@ -28,6 +29,7 @@ from coupled.record import Record
 Progress = Callable[[str, int, int], None]
 AS_FILED = "as filed"
 TABLE = "table.parquet"
+SURVIVED = "survived"
 _AHEAD = 64  # flights that wait for a worker
 
 
@@ -38,6 +40,7 @@ def fly_job(plan: Plan, job: Job) -> Row:
     row |= {key: _cell(job.changes[key]) for key in plan.keys}
     row["configuration"] = job.configuration or AS_FILED
     row |= dict.fromkeys((*sweep.keep, *_extreme_names(sweep.extremes)))
+    row |= {SURVIVED: None} if sweep.survive else {}
     try:
         scenario = plan.scenario(job.changes)
         if job.seed is not None:
@@ -54,6 +57,8 @@ def fly_job(plan: Plan, job: Job) -> Row:
     outcome = judge(scenario, job.configuration or AS_FILED, record).as_dict()
     row |= {name: outcome[name] for name in sweep.keep}
     row |= _extremes(record, sweep.extremes)
+    if sweep.survive:
+        row[SURVIVED] = not ended and all(_kept(record[s.channel], s) for s in sweep.survive)
     return {**row, "ended_early": outcome["ended_early"]}
 
 
@@ -102,7 +107,8 @@ def table(plan: Plan, rows: Sequence[Row]) -> pl.DataFrame:
     sweep = plan.sweep
     numbers = [*sweep.keep, *_extreme_names(sweep.extremes)]
     columns: dict[str, pl.Series] = {}
-    for name in ("flight", *plan.keys, "configuration", "seed", *numbers, "ended_early"):
+    alive = [SURVIVED] if sweep.survive else []
+    for name in ("flight", *plan.keys, "configuration", "seed", *numbers, *alive, "ended_early"):
         values = [row[name] for row in rows]
         kind: Any = pl.Float64 if name in numbers else pl.Int64
         if name in plan.keys:
@@ -111,6 +117,8 @@ def table(plan: Plan, rows: Sequence[Row]) -> pl.DataFrame:
             values = [v if v is None or real else str(v) for v in values]
         elif name in ("configuration", "ended_early"):
             kind = pl.String
+        elif name == SURVIVED:
+            kind = pl.Boolean
         columns[name] = pl.Series(name, values, dtype=kind, strict=False)
     return pl.DataFrame(columns)
 
@@ -123,6 +131,12 @@ def write_table(found: pl.DataFrame, path: Path) -> None:
 def _cell(value: Any) -> Any:
     """Return a varied value as a cell takes it: a number or word as it is, else as JSON."""
     return value if isinstance(value, (int, float, str)) else json.dumps(value, default=str)
+
+
+def _kept(values: NDArray[np.float64], survive: Survive) -> bool:
+    low = -np.inf if survive.least is None else survive.least
+    high = np.inf if survive.most is None else survive.most
+    return bool(np.all((values >= low) & (values <= high)))
 
 
 def _extreme_names(channels: Sequence[str]) -> list[str]:

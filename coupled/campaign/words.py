@@ -27,7 +27,7 @@ def parameter(key: str) -> str:
     """Return a key for people: `column loader bend, m/N` for that of a rig."""
     words = key.split(".")
     last, unit = _unit(words[-1])
-    passed = ("rig", "controls", "flight", "properties")
+    passed = ("rig", "controls", "flight", "properties", "event")
     name = " ".join([word for word in words[:-1] if word not in passed] + [last.replace("_", " ")])
     return f"{name}, {unit}" if unit else name
 

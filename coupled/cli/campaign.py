@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,11 @@ from coupled.errors import InputError
 from coupled.files import check_target, write_text
 from coupled.resources import find, shipped_sweeps
 from coupled.terminal import check_json, err, give_json, out, progress, say
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from coupled.campaign.plan import Plan
 
 
 @app.command(
@@ -81,12 +86,9 @@ def sweep(
     from coupled.campaign.journal import JOURNAL, opened
     from coupled.campaign.plan import read_plan
     from coupled.campaign.pool import executor
-    from coupled.campaign.sensitivity import INDICES, sensitivity, write_indices
+    from coupled.campaign.sensitivity import INDICES
     from coupled.campaign.sweep import TABLE, fly_sweep, write_table
-    from coupled.plots.campaign import draw_sweep
-    from coupled.plots.saving import check_format, save
-    from coupled.plots.sensitivity import draw_sensitivity
-    from coupled.tables.campaign import print_indices, print_sweep
+    from coupled.plots.saving import check_format
 
     file = find(name, shipped_sweeps(), "sweep")
     if cluster and workers is not None:
@@ -111,13 +113,36 @@ def sweep(
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
+    _show(plan, found, target, path, json_file)
+
+
+def _show(plan: Plan, found: pl.DataFrame, target: Path, path: Path, json_file: str) -> None:
+    """Draw and print a sweep's table, with its indices or boundaries where they are asked for."""
+    from coupled.campaign.sensitivity import INDICES, sensitivity, write_indices
+    from coupled.campaign.survival import limits
+    from coupled.campaign.sweep import TABLE
+    from coupled.plots.campaign import draw_sweep
+    from coupled.plots.saving import save
+    from coupled.plots.sensitivity import draw_sensitivity
+    from coupled.plots.survival import draw_survival
+    from coupled.tables.campaign import print_indices, print_survival, print_sweep
+
     asked, told = plan.sweep, []
     if asked.method == "sensitivity" and asked.samples is not None:
         told = sensitivity(found, plan.keys, asked.keep, asked.samples)
         write_indices(told, target / INDICES)
-    save(draw_sensitivity(told) if told else draw_sweep(found, plan.keys, asked.keep), path)
+    numeric = [key for key in plan.keys if found[key].dtype.is_numeric()]
+    alive = limits(found, numeric[0]) if asked.survive and numeric else []
+    if told:
+        drawn = draw_sensitivity(told)
+    elif alive:
+        drawn = draw_survival(asked.name, numeric[0], alive)
+    else:
+        drawn = draw_sweep(found, plan.keys, asked.keep)
+    save(drawn, path)
     if json_file != "-":
         print_sweep(out, found, asked.keep)
+        print_survival(out, alive)
         say(f"table: {target / TABLE}  ({len(found)} flights)")
         if told:
             print_indices(out, told)

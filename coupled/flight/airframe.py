@@ -21,39 +21,24 @@ import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import LATERAL, LONGITUDINAL, SURFACES, motion_channels
+from coupled.channels import LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.flight.altered import altered
-from coupled.flight.everyframe import motion_reader, stepper
+from coupled.flight.everyframe import (
+    LATERAL_PROPERTIES,
+    LONGITUDINAL_PROPERTIES,
+    Lever,
+    motion_reader,
+    stepper,
+)
 from coupled.flight.gusts import dryden, gusty
+from coupled.flight.loading import load
 from coupled.flight.newton import newton_trim
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
 
-# JSBSim's property behind each motion channel, in the channels' order.
-_LONGITUDINAL = (
-    "aero/qbar-psf",
-    "accelerations/Nz",
-    "fcs/elevator-pos-rad",
-    "velocities/q-rad_sec",
-    "aero/alpha-rad",
-    "attitude/theta-rad",
-    "velocities/vt-fps",
-    "position/h-sl-ft",
-)
-_LATERAL = (
-    "fcs/left-aileron-pos-rad",
-    "fcs/rudder-pos-rad",
-    "velocities/p-rad_sec",
-    "velocities/r-rad_sec",
-    "aero/beta-rad",
-    "attitude/phi-rad",
-    "attitude/psi-rad",
-)
-assert len(_LONGITUDINAL) == len(LONGITUDINAL)
-assert len(_LATERAL) == len(LATERAL)
 ALTITUDE = LONGITUDINAL.index("altitude_m")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
 SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
@@ -125,19 +110,21 @@ class JSBSimAirframe:
         seed: int = 0,
         air_m_per_s: Iterable[float] | None = None,
     ) -> None:
-        self._file, self._record_file = file, record_file
+        self._file = file
         self._flight, self._controls = flight, tuple(controls)
         self._fdm = self._load(models, frame_s)
         self._trim()
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
         self.motion = motion_reader(
-            [self._node(name).get_double_value for name in _LONGITUDINAL],
-            [self._node(name).get_double_value for name in _LATERAL] if lateral else [],
+            [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES],
+            [self._node(name).get_double_value for name in LATERAL_PROPERTIES] if lateral else [],
         )
         self._height = self._node(_HEIGHT).get_double_value
         touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
         self._touching = [self._node(name).get_double_value for name in touching]
-        self._extra = [self._node(name, "record_properties").get_double_value for name in record]
+        self._extra = [
+            self._node(name, "record_properties", record_file).get_double_value for name in record
+        ]
         writes = []
         for control in controls:
             node = self._node(_COMMANDS[SURFACES[control]])
@@ -190,7 +177,7 @@ class JSBSimAirframe:
         self._properties = fdm.get_property_manager()
         # By this list, since asking the manager for a malformed name ends the process.
         lines = fdm.query_property_catalog("").split("\n")
-        self._catalog = {line.rpartition(" (")[0] for line in lines}
+        self._catalog = {name: access for name, _, access in (x.rpartition(" (") for x in lines)}
         return fdm
 
     def _set(self, name: str, value: float) -> None:
@@ -198,24 +185,20 @@ class JSBSimAirframe:
         key = f"properties.{name}"
         if name.startswith(("simulation/", "ic/")) or name == "propulsion/set-running":
             raise self._fault(key, "is set from the rig's other keys; leave it out")
-        if name not in self._catalog:
-            hint = difflib.get_close_matches(name[:100], self._catalog, n=1)
-            like = f", but {hint[0]}" if hint else ""
-            raise self._fault(
-                key, f"{self._flight.model} has no such property{like}; none is created"
-            )
-        node = self._node(name)
+        node = self._node(name, f"flight.{key}", self._file)
         node.set_double_value(value)
         if not math.isclose(node.get_double_value(), value, rel_tol=1e-6, abs_tol=1e-12):
             raise self._fault(key, f"{self._flight.model} does not let it be set to {value:g}")
 
-    def _node(self, name: str, key: str = "model") -> Any:
+    def _node(self, name: str, key: str = "model", file: object = None) -> Any:
         node = self._properties.get_node(name) if name in self._catalog else None
         if node is None:
             problem = f"{self._flight.model} has no property {name!r}"
             if key == "model":
                 raise self._fault(key, problem + ", so it cannot be flown by its controls")
-            raise InputError(self._record_file, key, problem + "; none is created")
+            near = difflib.get_close_matches(name[:100], self._catalog, n=1)
+            like = f", but {near[0]}" if near else ""
+            raise InputError(file, key, f"{problem}{like}; none is created")
         return node
 
     def _trim(self) -> None:
@@ -229,6 +212,8 @@ class JSBSimAirframe:
                 node = self._properties.get_node(f"fcs/{lever}-cmd-norm[{engine}]")
                 if node is not None:
                     node.set_double_value(1.0)
+        if (fault := load(fdm, flight, self._catalog)) is not None:
+            raise self._fault(*fault)
         for name, value in flight.properties.items():
             self._set(name, value)
         _log.text = ""
@@ -280,6 +265,19 @@ class JSBSimAirframe:
             self.step((first * command, second * command, third * command))
             positions[i] = self.motion()[at]
         return commands, positions
+
+    def has(self, name: str) -> bool:
+        """Tell whether the model has a property."""
+        return name in self._catalog
+
+    def lever(self, name: str, file: object, key: str) -> Lever:
+        """Return a property that may be set in flight; a fault is that of a key in a file."""
+        if name.startswith(("simulation/", "ic/")):
+            raise InputError(file, key, f"{name} is not the aircraft's; it is not set in flight")
+        if "W" not in self._catalog.get(name, "W"):
+            raise InputError(file, key, f"{self._flight.model} does not let {name} be set")
+        node = self._node(name, key, file)
+        return Lever(node.set_double_value, node.get_double_value)
 
     def set_gust(self, up_m_per_s: float) -> None:
         """Let a gust rise at this speed from the next step on, beside any wind."""

@@ -1,10 +1,42 @@
-"""The two calls of every frame, to read the motion and to run: written out, to be quick."""
+"""The calls of every frame, to read the motion, to run and to move a lever: quick ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
+from coupled.channels import LATERAL, LONGITUDINAL
 from coupled.units import FOOT_m, PSF_Pa
+
+# JSBSim's property behind each motion channel, in the channels' order.
+LONGITUDINAL_PROPERTIES = (
+    "aero/qbar-psf",
+    "accelerations/Nz",
+    "fcs/elevator-pos-rad",
+    "velocities/q-rad_sec",
+    "aero/alpha-rad",
+    "attitude/theta-rad",
+    "velocities/vt-fps",
+    "position/h-sl-ft",
+)
+LATERAL_PROPERTIES = (
+    "fcs/left-aileron-pos-rad",
+    "fcs/rudder-pos-rad",
+    "velocities/p-rad_sec",
+    "velocities/r-rad_sec",
+    "aero/beta-rad",
+    "attitude/phi-rad",
+    "attitude/psi-rad",
+)
+assert len(LONGITUDINAL_PROPERTIES) == len(LONGITUDINAL)
+assert len(LATERAL_PROPERTIES) == len(LATERAL)
+
+
+class Lever(NamedTuple):
+    """A property of a model that may be set in flight, in JSBSim's unit."""
+
+    set: Callable[[float], object]
+    read: Callable[[], float]
 
 
 def motion_reader(

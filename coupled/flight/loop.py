@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from itertools import chain
@@ -18,15 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import TIME, control_channels, record_channels
+from coupled.channels import TIME, ControlName, control_channels, record_channels
 from coupled.errors import InputError
 from coupled.files import sha256
 from coupled.flight.airframe import ALTITUDE, JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
+from coupled.flight.conditions import meet
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.pilot import Action, Table
 from coupled.flight.scenario import Scenario
-from coupled.flight.wind import blown
 from coupled.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
@@ -51,19 +52,10 @@ def fly(
     airframe = make_airframe(scenario, air_m_per_s)
     frames, substeps = scenario.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
-    pressure_Pa = airframe.motion()[0]
-    actions = {
-        name: pilot.meet(rig, scenario.rig_file, scenario.file, run.seed).act(
-            rig.controls[name],
-            gradient_at(rig.controls[name], pressure_Pa),
-            name,
-            scenario.file.parent,
-        )
-        for name, pilot in scenario.pilots.items()
-    }
+    actions = _actions(scenario, airframe.motion()[0])
     names = list(rig.controls)
     channels = record_channels(names, rig.flight is not None)
-    controls = pack(rig, {name: action.hand for name, action in actions.items()})
+    controls = pack(rig, {str(name): action.hand for name, action in actions.items()})
     script = _script(names, actions, frames * substeps + 1, h)
     data = _noise(channels, rig.noise, frames, run.seed)
     hands = controls["state"]["hand"]
@@ -129,9 +121,21 @@ def make_airframe(scenario: Scenario, air_m_per_s: Sequence[float] | None = None
             raise
         place = f"case {scenario.label!r}: rig.{error.key}"
         raise InputError(scenario.file, place, error.problem) from None
-    if run.wind is not None:
-        airframe.step = blown(airframe.step, airframe.blow, run.wind, frame_s)
+    meet(airframe, run, scenario.file, frame_s, run.seed)
     return airframe
+
+
+def _actions(scenario: Scenario, pressure_Pa: float) -> dict[ControlName, Action]:
+    """Return what each pilot does on a control, within reach, at the dynamic pressure of trim."""
+    rig, found = scenario.rig, {}
+    for name, pilot in scenario.pilots.items():
+        control = rig.controls[name]
+        gradient = gradient_at(control, pressure_Pa)
+        met = pilot.meet(rig, scenario.rig_file, scenario.file, scenario.run.seed)
+        action = met.act(control, gradient, name, scenario.file.parent)
+        hand = replace(action.hand, reach=pilot.reach, gradient=gradient)
+        found[name] = replace(action, hand=hand)
+    return found
 
 
 def gradient_at(control: Control, pressure_Pa: float) -> float:

@@ -15,9 +15,9 @@ from typing import Any, Literal, cast
 
 from coupled.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.errors import InputError, nearest
+from coupled.flight.conditions import Conditions, build_conditions
 from coupled.flight.expectation import Expect, check_expectations
 from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, Track, read_force_table
-from coupled.flight.wind import Wind, check_wind
 from coupled.resources import find, shipped_rigs, shipped_runs
 from coupled.rig.parameters import PLAIN_NAME, Rig
 from coupled.rig.rigfile import change, read_rig
@@ -34,10 +34,11 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
 
 
 class Measure(Section):
-    """What a comparison looks at: the control, and the change of attitude that is timed."""
+    """What a comparison looks at: the control, the change of attitude that is timed, a channel."""
 
     control: ControlName | None = None
     attitude_change: float = quantity("rad", 0.1, gt=0)
+    drawn: str | None = None
 
 
 class Bench(Section):
@@ -55,7 +56,7 @@ class Case(Section):
     pilot: dict[str, Any] = {}
 
 
-class RunFile(Section):
+class RunFile(Conditions):
     """The tables of a run file, its pilots apart."""
 
     name: str = quantity("", pattern=PLAIN_NAME)
@@ -67,7 +68,6 @@ class RunFile(Section):
     configurations: list[Configuration] = quantity("", list(CONFIGURATIONS), min_length=1)
     measure: Measure = Measure()
     bench: Bench | None = None
-    wind: Wind | None = None
     case: list[Case] = []
     expect: list[Expect] = []
 
@@ -139,9 +139,9 @@ def scenarios_from_table(table: dict[str, Any], file: Path) -> list[Scenario]:
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
     known_keys(table, keys, file, "")
-    for key, section in (("bench", Bench), ("wind", Wind)):
-        if key in table:
-            table[key] = build(section, table[key], file, key)
+    if "bench" in table:
+        table["bench"] = build(Bench, table["bench"], file, "bench")
+    build_conditions(table, file)
     for key, each in (("case", Case), ("expect", Expect)):
         listed = table.get(key, [])
         if not isinstance(listed, list):
@@ -150,8 +150,6 @@ def scenarios_from_table(table: dict[str, Any], file: Path) -> list[Scenario]:
     run = build(RunFile, table, file, "")
     if run.bench is not None:
         _check_bench(run.bench, file)
-    if run.wind is not None:
-        check_wind(run.wind, file)
     _refuse_doubles(run, file)
     variants = run.case or [Case(label=run.name)]
     found = [_scenario(run, file, pilots, case, i) for i, case in enumerate(variants)]
@@ -169,8 +167,8 @@ def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> 
         raise InputError(file, "bench", f"{rig_file.name} has an aircraft, which gives q̄ itself")
     if rig.flight is None and run.record_properties:
         raise InputError(file, "record_properties", f"{rig_file.name} has no aircraft to ask")
-    if rig.flight is None and run.wind is not None:
-        raise InputError(file, "wind", f"{rig_file.name} has no aircraft to blow on")
+    if rig.flight is None and run.given:
+        raise InputError(file, run.given[0], f"{rig_file.name} has no aircraft for it")
     pilots = copy.deepcopy(pilots)
     for key, value in case.pilot.items():
         place = f"case[{index}].pilot.{key}"
@@ -186,7 +184,11 @@ def _scenario(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> 
         raise
     if run.measure.control is not None and run.measure.control not in rig.controls:
         raise InputError(file, "measure.control", f"{rig_file.name} has no {run.measure.control}")
-    return Scenario(run, file, rig, rig_file, ready, case.label, case.rig)
+    made = Scenario(run, file, rig, rig_file, ready, case.label, case.rig)
+    drawn = run.measure.drawn
+    if drawn is not None and drawn not in made.channels:
+        raise InputError(file, "measure.drawn", f"no {drawn!r}; {nearest(drawn, made.channels)}")
+    return made
 
 
 def _refuse_doubles(run: RunFile, file: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.campaign.words import parameter
 from coupled.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.errors import InputError
 from coupled.record import Record
@@ -135,7 +136,14 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
 
 
 def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
-    """Pitch, roll or yaw rate."""
+    """Pitch, roll or yaw rate, or the channel that the run wants drawn."""
+    drawn = case[0].scenario.run.measure.drawn
+    if drawn is not None:
+        for flight in case:
+            axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight.configuration))
+        axes.set_xlabel("time, s")
+        axes.set_ylabel(parameter(drawn))
+        return
     name = _RATE[case[0].scenario.control]
     for flight in case:
         rate = flight.record[f"{name}_rad_per_s"] / DEGREE_rad

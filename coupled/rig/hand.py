@@ -17,6 +17,15 @@ Its full strength lasts for an endurance, after which it has its lasting strengt
 until it has rested:
 
     effort' = (|F| − F_lasting)/(F_strongest − F_lasting), within 0 and the endurance
+
+Nor does it go further than its reach r, on either side: where the limb is straight, or the
+control at its stop in the cab. Its force is then at most
+
+    F = c·w·(r − δ) − m·w·δ' + I,      I' = G·w·(r − δ)
+
+which takes the grip to r as a clamp does, with the loader's own m and c, the specified
+gradient G and a bandwidth w. Until that is the limit I is the force that holds the grip where
+it is, so that the grip comes to r as exp(−w·t), and not past it.
 """
 
 from __future__ import annotations
@@ -37,6 +46,11 @@ class HandParameters(Protocol):
     strongest: float  # N, for a short time; 0 for a hand without limit
     lasting: float  # N, for any time
     endurance: float  # s at full strength
+    reach: float  # d, on both sides; 0 for a hand that goes as far as the control
+    reach_stiffness: float  # c·w, N/d
+    reach_damping: float  # m·w, N·s/d
+    reach_gradient: float  # G, N/d
+    reach_bandwidth: float  # w, 1/s
 
 
 class HandState(Protocol):
@@ -47,6 +61,8 @@ class HandState(Protocol):
     muscle: float  # u behind the muscle's lag, N
     integral: float  # the integral term, N
     effort: float  # s at full strength that the hand has behind it
+    holding: float  # I, N, to the force's side
+    straight: float  # the side on which the reach is the limit, or 0
 
 
 HAND_PARAMETERS = layout(HandParameters)
@@ -57,7 +73,7 @@ HAND_STATE = layout(HandState)
 def only_scripted(p: HandParameters) -> bool:
     """Tell whether a hand holds what is asked of it as it is: no impedance, no limit."""
     impedance = p.stiffness != 0.0 or p.damping != 0.0 or p.integral != 0.0
-    return not impedance and p.strongest == 0.0
+    return not impedance and p.strongest == 0.0 and p.reach == 0.0
 
 
 @stage
@@ -70,6 +86,38 @@ def within_strength(p: HandParameters, s: HandState, force: float, h: float) -> 
     effort = s.effort + h * (abs(held) - p.lasting) / (p.strongest - p.lasting)
     s.effort = min(max(effort, 0.0), p.endurance)
     return held
+
+
+@stage
+def within_reach(
+    p: HandParameters,
+    s: HandState,
+    linkage_p: LinkageParameters,
+    linkage: LinkageState,
+    asked: float,
+    before: float,
+    h: float,
+) -> float:
+    """Return the force of one asked for, N, that leaves the grip within reach.
+
+    `before` is the force at the last node, N. The bend is taken implicitly, as with an
+    impedance.
+    """
+    side = 1.0 if asked > 0.0 else -1.0
+    slope = bend_slope(linkage_p, before)
+    at = side * (linkage.grip + bend(linkage_p, before))
+    left = p.reach - at
+    if s.straight != side:
+        s.holding = min(side * before, p.reach_gradient * at)
+    most = p.reach_stiffness * left - p.reach_damping * side * linkage.rate + s.holding
+    change = (most - side * before) / (1.0 + slope * (p.reach_stiffness + p.reach_damping / h))
+    most = side * before + change
+    if side * asked <= most and left > 0.0:
+        s.straight = 0.0
+        return asked
+    s.straight = side
+    s.holding += p.reach_gradient * p.reach_bandwidth * h * (left - slope * change)
+    return side * min(most, side * asked)
 
 
 @stage
@@ -87,8 +135,10 @@ def grip_force(
 
     `script` is F_script in N, `held` and `held_rate` are δ_set and its rate.
     """
-    target = script + s.muscle
+    before, target = s.force, script + s.muscle
     if p.stiffness == 0.0 and p.damping == 0.0 and p.integral == 0.0:
+        if p.reach > 0.0:
+            target = within_reach(p, s, linkage_p, linkage, target, before, h)
         s.force = within_strength(p, s, target, h)
         return s.force
     slope = bend_slope(linkage_p, s.force)
@@ -98,6 +148,8 @@ def grip_force(
     change = (asked - s.force) / (1.0 + slope * (p.stiffness + p.damping / h))
     s.force += change
     s.integral += p.integral * h * (error - slope * change)
+    if p.reach > 0.0:
+        s.force = within_reach(p, s, linkage_p, linkage, s.force, before, h)
     s.force = within_strength(p, s, s.force, h)
     return s.force
 

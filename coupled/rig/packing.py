@@ -10,7 +10,7 @@ import numpy as np
 
 from coupled.rig.control import CONTROL, ControlArray
 from coupled.rig.linkage import servo_weights
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control, Loader, Rig
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class Hand:
 
     stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s.
     `strongest` (0: no limit) and `lasting`, N, can be held for `endurance_s` and for any time.
+    `reach`, d (0: none), is how far it goes; `gradient`, N/d, what it then holds against.
     """
 
     stiffness: float = 0.0
@@ -28,7 +29,11 @@ class Hand:
     strongest: float = 0.0
     lasting: float = 0.0
     endurance_s: float = 0.0
+    reach: float = 0.0
+    gradient: float = 0.0
 
+
+REACH_BANDWIDTH = 6.0  # rad/s, with which a hand comes to the end of its reach, as a clamp's
 
 # JSBSim's sign for nose up, right wing down, nose right, confirmed by flying each model.
 COMMAND_SIGN = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
@@ -41,7 +46,7 @@ def pack(rig: Rig, hands: dict[str, Hand] | None = None) -> ControlArray:
     h = frame_s / rig.substeps
     for p, (name, control) in zip(packed["parameters"], rig.controls.items(), strict=True):
         p["clock"]["substeps"], p["clock"]["substep"] = rig.substeps, h
-        _pack_hand(p["hand"], (hands or {}).get(name, Hand()), h)
+        _pack_hand(p["hand"], (hands or {}).get(name, Hand()), control.loader, h)
         _pack_host(p, control, frame_s)
         _pack_loader(p, control, h)
         _pack_linkage(p["linkage"], control, h)
@@ -55,11 +60,14 @@ def first_order_gain(lag_s: float, step_s: float) -> float:
     return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0
 
 
-def _pack_hand(p: Any, hand: Hand, h: float) -> None:
+def _pack_hand(p: Any, hand: Hand, loader: Loader, h: float) -> None:
     p["stiffness"], p["damping"], p["integral"] = hand.stiffness, hand.damping, hand.integral
     p["lag_gain"] = first_order_gain(hand.lag_s, h)
     p["strongest"], p["lasting"] = hand.strongest, hand.lasting
     p["endurance"] = hand.endurance_s
+    p["reach"], w = hand.reach, REACH_BANDWIDTH
+    p["reach_stiffness"], p["reach_damping"] = w * loader.damping, w * loader.mass
+    p["reach_gradient"], p["reach_bandwidth"] = hand.gradient, w
 
 
 def _pack_host(p: Any, control: Control, frame_s: float) -> None:

@@ -133,7 +133,7 @@ class Control(Section):
 
 
 class Flight(Section):
-    """The JSBSim model, how it is trimmed and flown, two of its moments, and the air."""
+    """The JSBSim model, how it is loaded, trimmed and flown, two of its moments, the air."""
 
     model: str = quantity("", min_length=1)
     altitude: float = quantity("m")
@@ -145,6 +145,8 @@ class Flight(Section):
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
+    cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
+    fuel: float = quantity("", 1.0, ge=0, le=100)
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}

@@ -15,6 +15,7 @@ from coupled.campaign.words import parameter, wanted
 
 if TYPE_CHECKING:
     from coupled.campaign.sensitivity import Index
+    from coupled.campaign.survival import Limit
     from coupled.campaign.verdict import Verdict
 
 _SHOWN = 6  # parameters of a figure, the strongest
@@ -91,3 +92,19 @@ def _shares(index: Index) -> tuple[str, ...]:
         else:
             cells += [f"{value:.3f}", f"{low:.3f} to {high:.3f}"]
     return tuple(cells)
+
+
+def print_survival(console: Console, limits: Sequence[Limit]) -> None:
+    """Print what each configuration survives, and its boundary beside the closed form's."""
+    if not limits:
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("", no_wrap=True)
+    for head in ("survived", "boundary", "closed form"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for limit in limits:
+        places = (limit.boundary, limit.predicted)
+        cells = ["–" if value is None else f"{value:.4g}" for value in places]
+        name = f"[bold]{escape(limit.configuration)}[/]"
+        table.add_row(name, f"{limit.survived} of {limit.flights}", *cells)
+    console.print(table, highlight=False)

@@ -73,9 +73,9 @@ def sines(crossover: float) -> list[float]:
 @pytest.mark.parametrize(
     ("rig", "what", "crossover", "margin", "size"),
     [
-        ("report-column", "pitch", 2.0, 0.7, "sine_rad = 0.0005"),
-        ("report-column", "pitch", 3.0, 0.5, "sine_rad = 0.0005"),
-        ("awjsra", "pitch", 1.5, 0.7, "sine_rad = 0.002"),
+        ("report-column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
+        ("report-column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
+        ("awjsra", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
         ("report-column", "flight_path", 0.7, 0.9, "sine_rad = 0.001\nintegral_rad_per_s = 1.0"),
         ("report-column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),
     ],
@@ -100,8 +100,9 @@ def test_the_loop_crosses_over_as_set(
     assert isinstance(pilots, Track)
     found, left = measured(record, seen[what], pilots)
     print(f"{rig} {what}: {found:.3f} of {crossover} rad/s, {left:.3f} of {margin} rad")
-    assert found == pytest.approx(crossover, rel=0.02)
-    assert left == pytest.approx(margin, abs=0.07)
+    # Small sines: the T-37's tables have kinks, which larger ones feel.
+    assert found == pytest.approx(crossover, rel=0.01)
+    assert left == pytest.approx(margin, abs=0.015)
 
 
 @pytest.mark.parametrize("element", [0.3 * np.exp(-2.9j), 7.0 * np.exp(-1.3j), np.exp(2.6j)])

@@ -40,6 +40,7 @@ class Pilot(Section):
 
     kind: str
     start: float = quantity("s", 1.0, ge=0, le=7200)
+    reach: float = quantity("{d}", 0.0, ge=0)
 
     def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
         """Return what this pilot does on a control.

@@ -111,7 +111,8 @@ class Track(Pilot):
         feel = loader.mass * s**2 + loader.damping * s + gradient
         arm = (self.arm_stiffness + self.arm_damping * s) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame
-        drive = COMMAND_SIGN[control.surface] / control.travel * follows
+        # The host takes δc, ahead of the servo, which only the arm feels.
+        drive: complex = COMMAND_SIGN[control.surface] / control.travel
         drive /= (1.0 + rigging.stretch_loss * pressure_Pa) * (1.0 + rigging.lag * s)
         return complex(drive * late / ((1.0 + self.lag * s) * (feel + arm)))
 

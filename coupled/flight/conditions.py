@@ -1,0 +1,61 @@
+"""The adverse conditions of a run: its wind, gust, turbulence and events, read and made to act."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from coupled.errors import InputError
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.event import Event, check_events, happening
+from coupled.flight.weather import Gust, Turbulence, check_gust, gusting, stir
+from coupled.flight.wind import Wind, blown, check_wind
+from coupled.schema import Section, build
+
+_TABLES: dict[str, type[Section]] = {"wind": Wind, "gust": Gust, "turbulence": Turbulence}
+
+
+class Conditions(Section):
+    """What a run file may say of them."""
+
+    wind: Wind | None = None
+    gust: Gust | None = None
+    turbulence: Turbulence | None = None
+    event: dict[str, Event] = {}
+
+    @property
+    def given(self) -> list[str]:
+        """The tables that are there."""
+        return [key for key in Conditions.model_fields if getattr(self, key)]
+
+
+def build_conditions(table: dict[str, Any], file: object) -> None:
+    """Put sections in the place of a run's tables, each checked."""
+    for key, section in _TABLES.items():
+        if key in table:
+            table[key] = build(section, table[key], file, key)
+    events = table.get("event", {})
+    if not isinstance(events, dict):
+        raise InputError(file, "event", "each is written [event.NAME]")
+    if events:
+        table["event"] = {
+            name: build(Event, event, file, f"event.{name}") for name, event in events.items()
+        }
+        check_events(table["event"], file)
+    if "wind" in table:
+        check_wind(table["wind"], file)
+    if "gust" in table:
+        check_gust(table["gust"], file)
+
+
+def meet(
+    airframe: JSBSimAirframe, conditions: Conditions, file: object, frame_s: float, seed: int
+) -> None:
+    """Let an aircraft in trim meet the conditions from now on."""
+    if conditions.turbulence is not None:
+        stir(airframe, conditions.turbulence, file, seed)
+    if conditions.gust is not None:
+        airframe.step = gusting(airframe, conditions.gust, file, frame_s)
+    if conditions.event:
+        airframe.step = happening(airframe, conditions.event, file, frame_s)
+    if conditions.wind is not None:
+        airframe.step = blown(airframe.step, airframe.blow, conditions.wind, frame_s)

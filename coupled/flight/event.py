@@ -1,0 +1,130 @@
+"""What happens to the aircraft in flight: an engine stops, the trim runs away, a lever moves.
+
+Each event is a table of a run file, `[event.NAME]`, of one of three kinds. The aircraft starts
+in trim and whole; what is wrong with it comes later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from coupled.channels import SURFACES, ControlName
+from coupled.errors import InputError
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.schema import Section, named, quantity
+
+Step = Callable[[tuple[float, float, float]], None]
+Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
+_TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
+# Fuel cut and magnetos off, for the engine that JSBSim has picked; −1 picks all.
+_OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
+_PICK = "propulsion/active_engine"
+
+
+class Event(Section):
+    """One event: `engine_out`, or `trim` with `by_norm`, or `property` with `to`."""
+
+    at: float = quantity("s", ge=0, le=7200)
+    over: float = quantity("s", 0.0, ge=0, le=7200)
+    engine_out: int | None = quantity("", None, ge=0, le=99)
+    trim: ControlName | None = None
+    by: float | None = quantity("norm", None, ge=-2, le=2)
+    of_model: str | None = named("property", None, min_length=1, max_length=200)
+    to: float | None = None
+
+
+def check_events(events: Mapping[str, Event], file: object) -> None:
+    """Refuse an event that is none of the three kinds, or two at once."""
+    for name, event in events.items():
+        place = f"event.{name}"
+        kinds = {"engine_out": event.engine_out, "trim": event.trim, "property": event.of_model}
+        given = [key for key, value in kinds.items() if value is not None]
+        if len(given) != 1:
+            raise InputError(file, place, "give one of engine_out, trim and property")
+        values = {"by_norm": ("trim", event.by), "to": ("property", event.to)}
+        for key, (kind, value) in values.items():
+            if (given[0] == kind) != (value is not None):
+                raise InputError(file, f"{place}.{key}", f"is given with {kind}, and only there")
+        if event.engine_out is not None and event.over > 0.0:
+            raise InputError(file, f"{place}.over_s", "an engine stops at once; leave it out")
+
+
+def happening(
+    airframe: JSBSimAirframe, events: Mapping[str, Event], file: object, frame_s: float
+) -> Step:
+    """Return the aircraft's step, with what happens by the start of each set before it."""
+    makers = (_trim, _engine, _property)
+    moves = [
+        (event, move)
+        for name, event in events.items()
+        for make in makers
+        if (move := make(airframe, event, file, f"event.{name}")) is not None
+    ]
+    step, frame = airframe.step, 0
+
+    def run(commands: tuple[float, float, float], /) -> None:
+        nonlocal frame, moves
+        time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
+        frame += 1
+        for event, move in moves:
+            if time >= event.at:
+                move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
+        moves = [(event, move) for event, move in moves if time < event.at + event.over]
+        step(commands)
+
+    return run
+
+
+def _trim(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+    """Return what moves the trim, by a share of the surface's travel; two may move one."""
+    if event.trim is None or event.by is None:
+        return None
+    name = f"fcs/{_TRIMS[event.trim]}-trim-cmd-norm"
+    lever = airframe.lever(name, file, f"{place}.trim")
+    whole, before = COMMAND_SIGN[SURFACES[event.trim]] * event.by, 0.0
+
+    def move(share: float) -> None:
+        nonlocal before
+        lever.set(lever.read() + whole * (share - before))
+        before = share
+
+    return move
+
+
+def _engine(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+    """Return what stops an engine."""
+    if event.engine_out is None:
+        return None
+    number = f"[{event.engine_out}]" if event.engine_out else ""  # as JSBSim lists them
+    running = f"propulsion/engine{number}/set-running"
+    if not airframe.has(running):
+        raise InputError(file, f"{place}.engine_out", "there is no such engine; the first is 0")
+    pick = airframe.lever(_PICK, file, place)
+    levers = [
+        (airframe.lever(name, file, place), to) for name, to in _OFF.items() if airframe.has(name)
+    ]
+    levers.append((airframe.lever(running, file, place), 0.0))
+
+    def move(share: float) -> None:
+        pick.set(float(event.engine_out or 0))
+        for lever, value in levers:
+            lever.set(value)
+        pick.set(-1.0)
+
+    return move
+
+
+def _property(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+    """Return what leads a property of the model to a value."""
+    if event.of_model is None or event.to is None:
+        return None
+    lever, to = airframe.lever(event.of_model, file, f"{place}.property"), event.to
+    begun: float | None = None
+
+    def move(share: float) -> None:
+        nonlocal begun
+        begun = lever.read() if begun is None else begun
+        lever.set(begun + (to - begun) * share)
+
+    return move
