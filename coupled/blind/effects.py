@@ -158,11 +158,14 @@ def _pressure_lag(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"lag_s": size}
 
 
+# What a rig is set to is off by less in trials without an effect, so less is none.
+BEYOND = 0.03
+
 EFFECTS = (
     Kind("coulomb_friction", "loader", 0.03, 15.0, _coulomb),
     Kind("stribeck_friction", "loader", 0.03, 12.0, _stribeck),
-    Kind("viscous_damping", "loader", 0.01, 1.0, _scaled("damping")),
-    Kind("inertia", "loader", 0.01, 1.0, _scaled("mass")),
+    Kind("viscous_damping", "loader", BEYOND, 1.0, _scaled("damping")),
+    Kind("inertia", "loader", BEYOND, 1.0, _scaled("mass")),
     Kind("gradient_error", "loader", 0.001, 0.4, _scaled("basic_gradient")),
     Kind("cubic_stiffness", "loader", 0.0005, 1.0, _cubic),
     Kind("breakout", "loader", 0.03, 15.0, _added("breakout", "breakout_N")),
@@ -174,7 +177,7 @@ EFFECTS = (
     Kind("bend", "linkage", 0.005, 1.2, _bend),
     Kind("stiffening_bend", "linkage", 0.05, 3.0, _stiffening),
     Kind("backlash", "linkage", 2e-5, 4e-3, _added("play", "play_m")),
-    Kind("servo_lag", "linkage", 0.01, 1.2, _scaled("servo_rate")),
+    Kind("servo_lag", "linkage", BEYOND, 1.2, _scaled("servo_rate")),
     Kind("servo_rate_limit", "linkage", 0.05, 2.5, _servo_limit),
     Kind("arc_geometry", "linkage", 1.0, 1.0, _arc),
     Kind("cable_stretch", "surface", 0.0005, 0.6, _stretch, flown=True),
