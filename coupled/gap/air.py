@@ -55,7 +55,7 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
     climb, climb_error = _climb(record, frame_s, rng)
     rough = climb - smoothed(speed) * np.sin(pitch - alpha)
     hiss = white(rough)
-    smoother = Smoother.of(rough, order=1)
+    smoother = Smoother.of(rough, (1,))
     calm = smoother.smooth(rough)
     error = smoother.wiener_error(hiss, len(rough), rng) + climb_error
     # The smoother takes some of a faint gust with the noise, which its own rms would miss.

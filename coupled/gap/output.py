@@ -17,6 +17,7 @@ Part = Literal["all", "fitted", "held"]
 STRETCH_s = 2.5  # a stretch of the record, fitted or held out
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
+LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
 _KEPT = 4  # predictions remembered
 
 
@@ -25,7 +26,8 @@ class Output:
     """One measured output of a stage, and how a rig predicts it from the measured input.
 
     `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
-    standard deviation from record to record. `record` numbers the record that it is of.
+    standard deviation from record to record, `smoothed` the share of it that a smoothed input has.
+    `record` numbers the record that it is of.
     """
 
     stage: str
@@ -36,6 +38,7 @@ class Output:
     frame_rate_Hz: float
     record: int = 0
     spread: float = 0.0
+    smoothed: float = 0.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def residual(self, rig: Rig, part: Part = "all") -> Floats:
@@ -63,7 +66,7 @@ class Output:
     @property
     def limit(self) -> float:
         """The gap up to which noise may be all there is."""
-        return max(CLEAR, 1.0 + SIGMAS * self.spread)
+        return max(CLEAR, 1.0 + SIGMAS * self.spread + LOST * self.smoothed)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""

@@ -2,17 +2,19 @@
 
 A stage driven by a noisy input answers to noise that the rig never felt, and a fit then
 mistakes the missing answer for more inertia, or a lag (errors in variables). The inputs are
-smooth on the scale of a frame, so the Whittaker smoother with third differences (n = 3),
+smooth on the scale of a frame, so the Whittaker smoother with n-th differences, n up to 3,
 
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
-takes the noise off; λ is chosen by generalised cross-validation (Craven and Wahba, 1979), which
+takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979), which
 leaves sharp inputs sharp.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,21 +31,21 @@ def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
 
 @dataclass(frozen=True)
 class Smoother:
-    """A Whittaker smoother, its strength found by cross-validation on one signal."""
+    """A Whittaker smoother, its order and strength found by cross-validation on one signal."""
 
     gain: Floats  # H at each frequency of the lengthened signal
     reach: int  # frames by which a signal is lengthened at either end
 
     @classmethod
-    def of(cls, signal: Floats, order: int = 3) -> Smoother:
-        """Return the one that suits a signal, with differences of this order."""
+    def of(cls, signal: Floats, orders: Sequence[int] = (3, 2, 1)) -> Smoother:
+        """Return the one that suits a signal best, with differences of one of these orders."""
         reach = min(len(signal) - 1, 200)
         long = _lengthened(signal, reach)
-        sharpness = (2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))) ** (2 * order)
+        rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
         power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2
         best, gain = np.inf, np.ones_like(power)
-        for strength in np.logspace(-3, 12, 61):
-            passed = 1.0 / (1.0 + strength * sharpness)
+        for order, strength in product(orders, np.logspace(-3, 12, 61)):
+            passed = 1.0 / (1.0 + strength * rate ** (2 * order))
             score = np.mean((1.0 - passed) ** 2 * power) / np.mean(1.0 - passed) ** 2
             if score < best:
                 best, gain = score, passed

@@ -130,9 +130,12 @@ class Reader:
         """Return an output whose floor is its own noise and its input's, carried through."""
         base = predict(self.rig)
         tries = [noisy(self.rig, k) - base for k in range(TRIES)]
-        floor = float(np.hypot(own, np.sqrt(np.mean(np.square(tries)))))
+        carried = float(np.sqrt(np.mean(np.square(tries))))
+        floor = float(np.hypot(own, carried))
         made = self._output(stage, name, measured, predict, floor)
-        return replace(made, spread=spread(tries, own)) if floor > 0.0 else made
+        if floor <= 0.0:
+            return made
+        return replace(made, spread=spread(tries, own), smoothed=carried / floor)
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float

@@ -69,7 +69,7 @@ def test_wieners_error_is_what_the_smoother_leaves_of_a_random_walk() -> None:
     for _ in range(30):
         walk = np.cumsum(0.2 * rng.normal(size=2400))
         rough = walk + level * rng.normal(size=2400)
-        smoother = Smoother.of(rough, order=1)
+        smoother = Smoother.of(rough, (1,))
         left.append(np.mean((smoother.smooth(rough) - walk) ** 2))
         told.append(np.mean(smoother.wiener_error(level, 2400, rng) ** 2))
     assert np.mean(told) == pytest.approx(np.mean(left), rel=0.1)
