@@ -6,8 +6,8 @@ smooth on the scale of a frame, so the Whittaker smoother with n-th differences,
 
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
-takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979), which
-leaves sharp inputs sharp.
+takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979),
+which leaves sharp inputs sharp.
 """
 
 from __future__ import annotations
