@@ -100,7 +100,8 @@ def watch(folder: Path, workers: int, flights: int) -> Watched:
         done = max(0, journal.read_bytes().count(b"\n") - 1) if journal.exists() else 0
         if done:
             rows.append((time.perf_counter(), done))
-        if done >= max(1, len(parent) * (flights - 4) // 4) and len(parent) < 5:
+        # The last look is ahead of the end, where the table is made and drawn.
+        if done >= max(1, len(parent) * (19 * flights // 20) // 4) and len(parent) < 5:
             try:
                 inside = max((resident_mb(each) for each in workers_of(process.pid)), default=0.0)
                 parent.append(resident_mb(process.pid))
@@ -160,4 +161,4 @@ def test_a_sweeps_rate_and_memory(tmp_path: Path) -> None:
     # A Sobol sequence of fewer points is the beginning of one of more.
     assert pl.read_parquet(tmp_path / "1" / "table.parquet").equals(table.head(fewer))
     if FLIGHTS >= 10 * MANY:
-        assert two.rate / one.rate > 1.6
+        assert two.rate / one.rate > 1.8
