@@ -51,6 +51,16 @@ def check_target(path: Path, inputs: Iterable[Path] = ()) -> None:
         raise InputError(path, "", "cannot be written there") from None
 
 
+def read_text(path: Path, wanted: str) -> str:
+    """Return a text file in UTF-8, with a mark at its start or without; `wanted` is said if not."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "", f"is not text in UTF-8; {wanted}") from None
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8, whole."""
     write_whole(path, lambda part: part.write_text(text, encoding="utf-8"))

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from coupled.errors import InputError, nearest
+from coupled.files import read_text
 
 
 class Section(BaseModel):
@@ -51,13 +52,7 @@ def file_keys(section: type[Section], d: str) -> dict[str, str]:
 
 def load_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's tables."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "", "is not text in UTF-8; a TOML file is wanted") from None
-    return loads_toml(text, path)
+    return loads_toml(read_text(path, "a TOML file is wanted"), path)
 
 
 def loads_toml(text: str, file: object) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from coupled.calibration.readings import Readings, readings_of
 from coupled.errors import InputError, nearest
-from coupled.files import write_text
+from coupled.files import read_text, write_text
 from coupled.schema import LARGEST
 from coupled.units import POUND_N, DEGREE_rad, INCH_m
 
@@ -60,12 +60,7 @@ def read_readings(path: Path, control: str) -> Readings:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Return (row number, stripped cells) of the file's rows, without blank ones at its end."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "", "is not text in UTF-8; save it as CSV in UTF-8") from None
+    text = read_text(path, "save it as CSV in UTF-8")
     if "\0" in text:
         raise InputError(path, "", "is not text; a CSV file is wanted")
     reader = csv.reader(io.StringIO(text.rstrip()), strict=True)

@@ -1,15 +1,9 @@
-"""A user's own log made a record: units, clocks, gaps, verdicts, and everything that is refused."""
+"""A user's own log made a record: units, clocks, gaps, verdicts, and the command."""
 
 from __future__ import annotations
 
 import io
-import json
-import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -18,57 +12,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import io as scipy_io
 
-from coupled.cli import app
 from coupled.errors import InputError
 from coupled.logs import plausible
 from coupled.logs.importing import import_log
 from coupled.logs.mapping import CHANNELS, factor_of, own_unit
-from coupled.record import read_record
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.units import parse_unit, unit_names, units_like
-
-ROWS = 600
-RNG = np.random.default_rng(3)
-TIME_s = np.arange(ROWS) / 60.0
-DEFLECTION_m = 0.03 * np.sin(TIME_s) + 2e-5 * RNG.standard_normal(ROWS)
-GRADIENT = 560.0
-FORCE_N = GRADIENT * 0.03 * np.sin(TIME_s) + 0.1 * RNG.standard_normal(ROWS)
-
-MAP = """
-[clock]
-from = "T"
-unit = "ms"
-
-[channels.column_force_N]
-from = "F"
-unit = "lbf"
-sign = -1
-
-[channels.column_computed_m]
-from = "D"
-unit = "in"
-"""
-
-
-def text(time_ms: Any = None, force: Any = None, deflection: Any = None, form: str = ".12g") -> str:
-    columns = (
-        1000.0 * TIME_s if time_ms is None else time_ms,
-        -FORCE_N / 4.4482216152605 if force is None else force,
-        DEFLECTION_m / 0.0254 if deflection is None else deflection,
-    )
-    rows = [",".join(format(x, form) for x in row) for row in zip(*columns, strict=True)]
-    return "T,F,D\n" + "\n".join(rows) + "\n"
-
-
-GOOD = text()
-
-
-def imported(folder: Path, log: str | bytes = GOOD, log_map: str = MAP, name: str = "log.csv"):
-    (folder / name).write_bytes(log.encode() if isinstance(log, str) else log)
-    (folder / "map.toml").write_text(log_map, encoding="utf-8")
-    return import_log(folder / name, folder / "map.toml")
-
+from tests.logs.made import (
+    FORCE_N,
+    GOOD,
+    MAP,
+    ROWS,
+    DEFLECTION_m,
+    TIME_s,
+    imported,
+    text,
+)
 
 # Units
 
@@ -342,215 +302,8 @@ def test_figures_on_white_noise_raise_no_doubt() -> None:
     )
 
 
-# What is refused: one line, nothing written
-
-
-def damaged(kind: str, cut: Callable[[bytes], bytes]) -> bytes:
-    frame, buffer = pl.read_csv(io.BytesIO(GOOD.encode())), io.BytesIO()
-    if kind == "parquet":
-        frame.write_parquet(buffer)
-    else:
-        vectors = {name: frame[name].to_numpy()[:, None] for name in frame.columns}
-        scipy_io.savemat(buffer, vectors, do_compression=kind == "packed")
-    return cut(buffer.getvalue())
-
-
-JUNK = bytes(range(256)) * 40
-LINES = GOOD.splitlines()
-
-
-def edited(row: int, line: str) -> str:
-    return "\n".join([*LINES[:row], line, *LINES[row + 1 :]])
-
-
-LOGS: dict[str, tuple[str, str | bytes, str]] = {
-    "empty": ("log.csv", b"", "is empty"),
-    "junk": ("log.csv", JUNK, "not text in UTF-8"),
-    "zeros": ("log.csv", bytes(999), "bytes that are no text"),
-    "header only": ("log.csv", "T,F,D\n", "no row of numbers"),
-    "one row": ("log.csv", "T,F,D\n0,1,2\n", "fewer than two rows"),
-    "two names": ("log.csv", GOOD.replace("T,F,D", "T,F,F"), "F: stands there twice"),
-    "semicolons": ("log.csv", GOOD.replace(",", ";"), "another log.delimiter"),
-    "words": ("log.csv", edited(7, "100.0,hello,1"), "F: row 8 holds 'hello'"),
-    "inf": ("log.csv", edited(7, "100.0,inf,1"), "F: row 8 holds no finite number"),
-    "huge": ("log.csv", edited(7, "100.0,1e300,1"), "F: row 8 holds 1e+300"),
-    "no time": ("log.csv", edited(7, ",1,1"), "T: row 8 has no time"),
-    "time twice": ("log.csv", edited(7, LINES[6]), "T: row 8 repeats the time"),
-    "time back": ("log.csv", edited(7, "20,1,1"), "T: row 8: time goes back"),
-    "time nan": ("log.csv", edited(7, "nan,1,1"), "T: row 8 has no time"),
-    "a long gap": ("log.csv", "\n".join(LINES[:9] + LINES[20:]), "11 rows are missing"),
-    "ragged": ("log.csv", edited(7, "100,1,1,1,1,1"), "is not a table"),
-    "cut short": ("log.csv", GOOD[: len(GOOD) // 2] + "\n9999", "log.csv"),
-    "no log": ("nolog.xyz", GOOD, "its format is not known"),
-    "no mat": ("log.mat", JUNK, "is not a MATLAB file"),
-    "empty mat": ("log.mat", b"", "is not a MATLAB file"),
-    "text as mat": ("log.mat", GOOD, "is not a MATLAB file"),
-    "v7.3": ("log.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "save it with -v7"),
-    "hdf5": ("log.mat", b"\x89HDF\r\n\x1a\n" + bytes(600), "save it with -v7"),
-    "half a mat": ("log.mat", damaged("mat", lambda b: b[:4000]), "log.mat"),
-    "half a packed mat": ("log.mat", damaged("packed", lambda b: b[:4000]), "log.mat"),
-    "turned mat": ("log.mat", damaged("packed", lambda b: b[:300] + b[299::-1]), "log.mat"),
-    "no parquet": ("log.parquet", JUNK, "is not a Parquet file"),
-    "half a parquet": (
-        "log.parquet",
-        damaged("parquet", lambda b: b[:4000]),
-        "is not a Parquet file",
-    ),
-    "bad parquet": (
-        "log.parquet",
-        damaged("parquet", lambda b: b[:60] + bytes(len(b) - 120) + b[-60:]),
-        "log.parquet",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", LOGS)
-def test_a_log_that_is_none_is_one_line(tmp_path: Path, case: str) -> None:
-    name, content, says = LOGS[case]
-    with pytest.raises(InputError) as refusal:
-        imported(tmp_path, content, name=name)
-    assert says in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-    assert len(str(refusal.value)) < 500
-
-
-MAPS: dict[str, tuple[str, str, str]] = {
-    "toml": ("[clock]", "[clock", "is not valid TOML"),
-    "twice": ("column_computed_m", "column_force_N", "is not valid TOML"),
-    "channel": ("column_computed_m", "column_computd_m", "did you mean column_computed_m"),
-    "time": ("column_computed_m", "time_s", "the time is given by [clock]"),
-    "unit": ('"lbf"', '"lbff"', "no known unit; did you mean lbf?"),
-    "dimension": ('"lbf"', '"in"', "'in' is a length, column_force_N a force: N, daN"),
-    "square": ('"lbf"', '"lbf^9"', "no known unit"),
-    "long unit": ('"lbf"', '"' + "N/" * 5000 + '"', "no known unit"),
-    "no unit": ('unit = "lbf"', "", "channels.column_force_N.unit: is missing"),
-    "column": ('"F"', '"Force"', "log.csv has no 'Force'"),
-    "no from": ('from = "F"', "", "channels.column_force_N.from: is missing"),
-    "key": ("sign = -1", "sgin = -1", "did you mean sign?"),
-    "sign": ("sign = -1", "sign = -2", "channels.column_force_N.sign"),
-    "scale": ("sign = -1", "scale = 0", "must not be 0"),
-    "nan": ("sign = -1", "scale = nan", "channels.column_force_N.scale"),
-    "huge": ("sign = -1", "scale = 1e11", "larger than any real one"),
-    "delay": ("sign = -1", "delay_s = -1", "channels.column_force_N.delay_s"),
-    "clock unit": ('"ms"', '"N"', "clock.unit: 'N' is a force"),
-    "clock column": ('"T"', '"TT"', "clock.from: log.csv has no 'TT'"),
-    "two clocks": ('unit = "ms"', "rate_Hz = 60", "give either from"),
-    "no clock": ('from = "T"', "", "give either from"),
-    "cut": ('unit = "ms"', 'unit = "ms"\nstart_s = 5\nend_s = 4', "clock.end_s: must lie after"),
-    "late": ('unit = "ms"', 'unit = "ms"\nstart_s = 500', "no rows between"),
-    "invented": ('unit = "ms"', 'unit = "ms"\nframe_rate_Hz = 2000', "would be invented"),
-    "table": ("[clock]", "log = 3\n[clock]", "log: should be a table"),
-    "format": ("[clock]", 'log.format = "xls"\n[clock]', "log.format"),
-    "commas": ("[clock]", 'log.decimal = ","\n[clock]', "is the decimal comma as well"),
-    "delimiter": ("[clock]", 'log.delimiter = ";;"\n[clock]', "log.delimiter"),
-    "odd delimiter": ("[clock]", 'log.delimiter = "→"\n[clock]', "delimiter"),
-    "quote delimiter": ("[clock]", "log.delimiter = '\"'\n[clock]", "one plain character"),
-    "encoding": ("[clock]", 'log.encoding = "utf-16"\n[clock]', "log"),
-    "skip": ("[clock]", "log.skip_rows = 90000\n[clock]", "is empty"),
-    "channels": ("[channels.column_force_N]", "[chanels.column_force_N]", "unknown key"),
-}
-
-
-@pytest.mark.parametrize("case", MAPS)
-def test_a_map_that_is_wrong_is_one_line(tmp_path: Path, case: str) -> None:
-    old, new, says = MAPS[case]
-    assert old in MAP
-    with pytest.raises(InputError) as refusal:
-        imported(tmp_path, log_map=MAP.replace(old, new, 1))
-    assert says in str(refusal.value)
-    assert len(str(refusal.value)) < 600
-
-
 def test_an_even_log_without_stamps(tmp_path: Path) -> None:
     rate = MAP.replace('from = "T"\nunit = "ms"', "rate_Hz = 60")
     record, account = imported(tmp_path, log_map=rate)
     np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-10)
     assert account["unmapped"] == ["T"]
-
-
-# The command
-
-
-def coupled(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "coupled", *words],
-        check=False,
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-
-
-def test_the_command_writes_a_record_and_says_what_it_thinks(tmp_path: Path) -> None:
-    imported(tmp_path)
-    done = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "a/r.csv")
-    assert done.returncode == 0, done.stderr
-    assert max(len(line) for line in done.stdout.splitlines()) <= 80
-    assert "even, taken as they are" in done.stdout
-    np.testing.assert_allclose(read_record(tmp_path / "a/r.csv")["column_force_N"], FORCE_N)
-    manifest = json.loads((tmp_path / "a/r.manifest.json").read_text())
-    assert set(manifest["inputs_sha256"]) == {"log.csv", "map.toml"}
-    assert manifest["map"]["channels"]["column_force_N"]["sign"] == -1
-    assert manifest["import"]["clock"]["frames"] == ROWS
-    (tmp_path / "log.csv").write_text(edited(7, "20,1,1"))
-    bad = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "b.csv")
-    assert (bad.returncode, bad.stdout, bad.stderr.count("\n")) == (2, "", 1)
-    assert bad.stderr.startswith("error: log.csv: T: row 8: time goes back")
-    assert not (tmp_path / "b.csv").exists()
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["log.csv", "--map", "map.toml", "-o", "log.csv"],
-        ["log.csv", "--map", "map.toml", "-o", "link.csv"],
-        ["log.csv", "--map", "map.toml", "-o", "r.xls"],
-        ["log.csv", "--map", "map.toml", "-o", "log.csv/r.csv"],
-        ["log.csv", "--map", "map.toml", "--json", "map.toml"],
-        ["log.csv", "--map", "map.toml", "-o", "r.csv", "--json", "r.manifest.json"],
-        ["log.csv", "--map", "map.toml", "--rig", "nothing"],
-        ["log.csv", "--map", "none.toml"],
-        ["log.csv", "--map", "log.csv"],
-        ["none.csv", "--map", "map.toml"],
-        [".", "--map", "map.toml"],
-        ["folder.csv", "--map", "map.toml"],
-        ["a" * 5000 + ".csv", "--map", "map.toml"],
-        ["/dev/zero", "--map", "dev.toml"],
-    ],
-    ids=lambda words: " ".join(words)[:40],
-)
-def test_words_that_lead_nowhere_write_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
-) -> None:
-    imported(tmp_path)
-    (tmp_path / "dev.toml").write_text('log.format = "csv"\n' + MAP)
-    (tmp_path / "folder.csv").mkdir()
-    (tmp_path / "link.csv").symlink_to(tmp_path / "log.csv")
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError):
-        app(["import", *words], standalone_mode=False)
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
-
-
-def test_the_map_of_the_manual_reads_the_log_that_it_describes(tmp_path: Path) -> None:
-    manual = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
-    log_map = manual.partition("## Map of a log")[2].partition("```toml\n")[2].partition("```")[0]
-    time = np.arange(1200) / 120.0
-    late = np.sin(time - 0.004)
-    lines = ["# test 7", "TIME;FORCE_LB;COL_IN;GRIP;QBAR;NOTE", "ms;lbf;in;;psf;"]
-    for k, t in enumerate(time):
-        counts = 2048 + 409.6 * np.sin(t)
-        pressure = "" if k % 10 and k != len(time) - 1 else "20.9"
-        row = f"{1000 * t:.3f};{-late[k]:.9f};{np.sin(t):.9f};{counts:.6f};{pressure};ok"
-        lines.append(row.replace(".", ","))
-    record, account = imported(tmp_path, "\r\n".join(lines), log_map)
-    signal = np.sin(record.time_s)
-    np.testing.assert_allclose(record["column_force_N"], 4.4482216152605 * signal, atol=2e-4)
-    np.testing.assert_allclose(record["column_computed_m"], 0.0254 * signal, atol=1e-9)
-    np.testing.assert_allclose(record["column_deflection_m"], 0.0254 * signal, atol=1e-8)
-    np.testing.assert_allclose(record["dynamic_pressure_Pa"], 20.9 * 47.88025898)
-    assert account["unmapped"] == ["NOTE"]
-    assert account["channels"]["dynamic_pressure_Pa"]["filled_cells"] > 1000
