@@ -165,6 +165,10 @@ def _changed(
     case = chosen[0] if chosen else listed[0]
     for key, value in changes.items():
         head, _, rest = key.partition(".")
+        event, known = rest.partition(".")[0], tables.get("event", {})
+        if head == "event" and isinstance(known, dict) and event not in known:
+            near = nearest(event, known) if known else "it has none"
+            raise InputError(file, key, f"the run has no event {event!r}; {near}")
         if head in ("rig", "pilot") and rest:
             case.setdefault(head, {})[rest] = value
         elif not change(tables, key, value):

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ from coupled.flight.scenario import Scenario
 from coupled.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
-from coupled.rig.frame import step_frame
+from coupled.rig.frame import step_frame_there, whereabouts
 from coupled.rig.packing import pack
 from coupled.rig.parameters import Control
 
@@ -60,11 +59,12 @@ def fly(
     data = _noise(channels, rig.noise, frames, run.seed)
     hands = controls["state"]["hand"]
     looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
-    motions: list[tuple[float, ...]] = []
     extra: list[tuple[float, ...]] = []
 
     read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
-    rig_frame = bound(step_frame, controls, script, data, 0, 1.0, 1.0)
+    arrays = whereabouts(controls, script, data)
+    place = int(arrays.ctypes.data)
+    rig_frame = bound(step_frame_there, place, 0, read(), 1.0)
     flown, asked = rig.flight is not None, bool(run.record_properties)
     ended: dict[str, Any] | None = None
     done = 0
@@ -79,8 +79,7 @@ def fly(
                 for state, look in looks:
                     state["command"] = look(k / rig.frame_rate, motion)
             load = motion[1] if flown else 1.0
-            commands = rig_frame(controls, script, data, k, motion[0], load)
-            motions.append(motion)
+            commands = rig_frame(place, k, motion, load)
             if asked:
                 extra.append(airframe.extra())
             step(commands)
@@ -90,7 +89,6 @@ def fly(
     except KeyboardInterrupt:
         ended = {"reason": "interrupted", "time_s": done / rig.frame_rate}
     data = data[:done]
-    _add_motion(data, motions[:done])
     lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
     if lost.size:
         data = data[: lost[0]]
@@ -146,7 +144,7 @@ def gradient_at(control: Control, pressure_Pa: float) -> float:
 
 def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
     """Return the hands' script on all nodes, shape (controls, 2, nodes): N and d."""
-    times: Floats = np.arange(nodes, dtype=np.float64) * h
+    times = _times(nodes, h)
     script = np.zeros((len(names), 2, nodes))
     for name, action in actions.items():
         force, held = script[names.index(name)]
@@ -157,12 +155,12 @@ def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: flo
     return script
 
 
-def _add_motion(data: Floats, motions: list[tuple[float, ...]]) -> None:
-    """Add the motion to the last columns of the record; q̄, their first, the kernel wrote."""
-    if motions:
-        width = len(motions[0])
-        values = np.fromiter(chain.from_iterable(motions), np.float64, len(motions) * width)
-        data[:, data.shape[1] - width + 1 :] += values.reshape(-1, width)[:, 1:]
+@lru_cache(maxsize=1)
+def _times(nodes: int, h: float) -> Floats:
+    """Return the times of all nodes, s; flights of a campaign share them."""
+    times: Floats = np.arange(nodes, dtype=np.float64) * h
+    times.flags.writeable = False
+    return times
 
 
 def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, seed: int) -> Floats:

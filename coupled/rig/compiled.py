@@ -18,7 +18,9 @@ from typing import Any, TypeVar, cast, get_type_hints
 
 import numba
 import numpy as np
+from numba import types
 from numba.core import config
+from numba.extending import intrinsic
 
 # Below this a decaying state is at rest; further down subnormal numbers slow the processor.
 TINY = 1e-100
@@ -48,9 +50,22 @@ def bound(kernel: F, *arguments: Any) -> F:
     much as the physics. It takes arguments of just these types and no others.
     """
     dispatcher: Any = kernel
-    types = tuple(_type_of(argument) for argument in arguments)
-    dispatcher.compile(types)
-    return cast(F, dispatcher.get_overload(types))
+    kinds = tuple(_type_of(argument) for argument in arguments)
+    dispatcher.compile(kinds)
+    return cast(F, dispatcher.get_overload(kinds))
+
+
+def _pointer(context: Any, address: Any) -> Any:
+    """Return an address as a pointer, for `numba.carray`; inside kernels only."""
+
+    def generate(generator: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], generator.get_value_type(signature.return_type))
+
+    return types.voidptr(types.intp), generate
+
+
+pointer: Any = intrinsic(_pointer)
+carray: Any = numba.carray
 
 
 def _type_of(argument: Any) -> Any:

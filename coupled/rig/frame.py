@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compensation import estimate
-from coupled.rig.compiled import entry, stage
-from coupled.rig.control import ControlArray, ControlParameters, ControlState
+from coupled.rig.compiled import carray, entry, pointer, stage
+from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.hand import grip_force, move_muscle, only_scripted
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
@@ -110,21 +110,24 @@ def step_frame(
     script: Floats,
     record: Floats,
     k: int,
-    dynamic_pressure: float,
+    motion: tuple[float, ...],
     load_factor: float,
 ) -> tuple[float, float, float]:
-    """Run frame k of all controls, write their part of row k, return the surface commands.
+    """Run frame k of all controls, write row k but for its time, return the surface commands.
 
     controls  shape (n,), n ≤ 3
     script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
-    record    shape (frames, channels): t, 9 a control, q̄, and more; comes holding the noise
+    record    shape (frames, channels): t, 9 a control, the motion; comes holding the noise
               that is added to what is read
+    motion    what the airframe tells at t_k, q̄ in Pa first
     The commands are in ±1, one a control, 0 for a control that is absent.
     """
     first_command = second_command = third_command = 0.0
     row = record[k]
     pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
-    row[pressure_at] += dynamic_pressure
+    # Here, not after the flight: a frame then leaves no object behind.
+    for i in range(len(motion)):
+        row[pressure_at + i] += motion[i]
     for i in range(len(controls)):
         p, s = controls[i].parameters, controls[i].state
         force, held = script[i, 0], script[i, 1]
@@ -136,7 +139,7 @@ def step_frame(
             start_delay(p.loader, s.loader, s.hand.force)
         first = 1 + CHANNELS_PER_CONTROL * i
         out = row[first : first + CHANNELS_PER_CONTROL]
-        command = host_frame(p, s, s.hand.force, row[pressure_at], dynamic_pressure, out)
+        command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)
         run_frame(p, s, force, held, node, load_factor)
         if i == 0:
             first_command = command
@@ -145,3 +148,30 @@ def step_frame(
         else:
             third_command = command
     return first_command, second_command, third_command
+
+
+def whereabouts(controls: ControlArray, script: Floats, record: Floats) -> NDArray[np.int64]:
+    """Return where the arrays of `step_frame` lie, for `step_frame_there`; keep all four alive."""
+    assert all(array.flags.c_contiguous for array in (controls, script, record))
+    return np.array(
+        [
+            *(controls.ctypes.data, len(controls)),
+            *(script.ctypes.data, script.shape[2]),
+            *(record.ctypes.data, *record.shape),
+        ]
+    )
+
+
+@entry
+def step_frame_there(
+    address: int, k: int, motion: tuple[float, ...], load_factor: float
+) -> tuple[float, float, float]:
+    """Run `step_frame` on the arrays whose whereabouts lie at an address.
+
+    To hand over three arrays at every frame costs as much as half of the physics.
+    """
+    at = carray(pointer(address), 7, np.int64)
+    controls = carray(pointer(at[0]), (at[1],), CONTROL)
+    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
+    record = carray(pointer(at[4]), (at[5], at[6]), np.float64)
+    return step_frame(controls, script, record, k, motion, load_factor)

@@ -108,7 +108,7 @@ def _turned(rise_s: float, rest_s: float, h: float) -> tuple[Floats, Floats]:
 @entry
 def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> None:
     for k in range(len(pressure)):
-        step_frame(controls, script, record, k, pressure[k], 1.0)
+        step_frame(controls, script, record, k, (pressure[k],), 1.0)
 
 
 @entry

@@ -111,6 +111,16 @@ def test_each_boundary_of_the_recovery_lies_where_the_docs_have_it(
     assert row[SURVIVED] is alive
 
 
+def test_a_sweep_over_an_event_misspelled_names_the_one_it_is_near(folder: Path) -> None:
+    text = (runs_folder() / "sweeps" / "recovery.toml").read_text()
+    text = text.replace("event.runaway.", "event.runway.")
+    (folder / "s.toml").write_text(text)
+    with pytest.raises(
+        InputError, match=r"event\.runway.*: the run has no event 'runway'; did you"
+    ):
+        read_plan(folder / "s.toml")
+
+
 def test_every_shipped_sweep_can_be_flown() -> None:
     files = sorted((runs_folder() / "sweeps").glob("*.toml"))
     assert len(files) >= 2

@@ -1,0 +1,39 @@
+"""The frame step that is told where its arrays lie does what the frame step does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.resources import shipped_rigs
+from coupled.rig.frame import step_frame, step_frame_there, whereabouts
+from coupled.rig.packing import pack
+from coupled.rig.rigfile import read_rig
+
+FRAMES = 40
+MOTION = (3000.0, 1.2, *np.linspace(-1.0, 1.0, 13).tolist())
+
+
+@pytest.mark.parametrize("rig_name", ["737", "bench"])
+def test_by_address_as_by_array(rig_name: str) -> None:
+    rig = read_rig(shipped_rigs()[rig_name])
+    width = 1 + 9 * len(rig.controls) + len(MOTION)
+    rng = np.random.default_rng(5)
+    noise = 1e-3 * rng.standard_normal((FRAMES, width))
+    script = rng.standard_normal((len(rig.controls), 2, FRAMES * rig.substeps + 1)).cumsum(axis=2)
+    given, placed = (pack(rig), noise.copy()), (pack(rig), noise.copy())
+    at = whereabouts(placed[0], script, placed[1])
+    for k in range(FRAMES):
+        by_array = step_frame(given[0], script, given[1], k, MOTION, MOTION[1])
+        by_address = step_frame_there(int(at.ctypes.data), k, MOTION, MOTION[1])
+        assert by_array == by_address
+    assert np.array_equal(given[1], placed[1])
+    assert given[0].tobytes() == placed[0].tobytes()
+    assert placed[1][:, -len(MOTION) :] == pytest.approx(noise[:, -len(MOTION) :] + MOTION)
+
+
+def test_arrays_that_do_not_lie_in_one_piece_are_not_taken() -> None:
+    rig = read_rig(shipped_rigs()["bench"])
+    controls, script = pack(rig), np.zeros((1, 2, 9))
+    with pytest.raises(AssertionError):
+        whereabouts(controls, script, np.zeros((8, 12))[:, ::2])
