@@ -70,10 +70,12 @@ def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Fl
         climb = rate_of(smoothed(height), 1.0 / frame_s)
         noisy = climb + rng.normal(0.0, white(height), len(height))
         return climb, smoothed(noisy) - climb
-    along = rate_of(smoothed(speed), 1.0 / frame_s)
-    along += GRAVITY_m_per_s2 * np.sin(smoothed(pitch - alpha))
-    lift = record[LOAD] * np.cos(pitch) * GRAVITY_m_per_s2
-    upward = lift + along * np.sin(pitch) - GRAVITY_m_per_s2
+    normal, calm = record[LOAD] * GRAVITY_m_per_s2, smoothed(alpha)
+    # What the aircraft feels along its path is of its thrust and drag, and of a part of its lift.
+    path = rate_of(smoothed(speed), 1.0 / frame_s)
+    path += GRAVITY_m_per_s2 * np.sin(smoothed(pitch - alpha))
+    ahead = (path + normal * np.sin(calm)) / np.cos(calm)
+    upward = normal * np.cos(pitch) + ahead * np.sin(pitch) - GRAVITY_m_per_s2
     sigma = GRAVITY_m_per_s2 * white(record[LOAD]), white(height)
     hiss = rng.normal(0.0, sigma[0], len(height)), rng.normal(0.0, sigma[1], len(height))
     return _held(upward, height, frame_s, sigma), _held(*hiss, frame_s, sigma)
@@ -86,7 +88,7 @@ def _held(upward: Floats, height: Floats, frame_s: float, sigma: tuple[float, fl
     (I + λ·D₂ᵀD₂)·d = h − ∬a with λ = (σ_h/(σ_a·Δt²))².
     """
     climbs = np.cumsum(upward) * frame_s
-    lacks = height - np.cumsum(climbs) * frame_s
+    lacks = height - (np.cumsum(climbs) - 0.5 * climbs) * frame_s
     frames = np.arange(len(height))
     slow = Polynomial.fit(frames, lacks, 6)(frames)  # what would cost the equations digits
     weight = min((sigma[1] / max(sigma[0] * frame_s**2, 1e-12)) ** 2, STIFFEST)

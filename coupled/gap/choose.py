@@ -15,7 +15,7 @@ import numpy as np
 
 from coupled.channels import ControlName
 from coupled.gap.case import Case, Tell
-from coupled.gap.effects import EFFECTS, TOLERANCE, Effect
+from coupled.gap.effects import EFFECTS, SETTINGS, TOLERANCE, Effect
 from coupled.gap.fit import Fit, shows_in
 from coupled.gap.output import Output, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
@@ -25,7 +25,10 @@ LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without 
 RIVAL = 4.0  # and by which the best must beat another to be the only answer
 LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
 MISMATCH = 0.03  # share of a gap that the physics of a right effect may leave
-SIMPLER = 0.1  # share of the gain by which more numbers must win where fewer close the gap
+# By which, or by which share of the gain, more numbers must win where fewer close the gap.
+SIMPLER, SIMPLER_SHARE = 6.0, 0.05
+FAINT, LAW = 2.0, 12.0  # a gap under which the law of dry friction has to be told by such a gain
+DRY = ("coulomb_friction", "stribeck_friction")
 SPARE = 4.0  # an effect that others have made needless: it would be missed by less
 MOST = 4  # effects in one answer
 
@@ -82,7 +85,7 @@ def search(
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
-        steps.append(_step(best, ranked))
+        steps.append(_step(best, ranked, _faint(case, settled, best.effect)))
         current = case.fit((*current.effects, best.effect), start=best.fit.values)
         needless = _needless(case, current)
         if needless is not None:
@@ -91,12 +94,19 @@ def search(
             current = case.fit(rest, start=current.values)
             if needless is best.effect:
                 break
-    steps = [_again(case, current, step) if len(steps) > 1 else step for step in steps]
+    if len(steps) > 1:
+        steps = [_again(case, settled, current, step) for step in steps]
     tried = next((gains for gains in rounds if gains), {})
     return Choice(tuple(steps), current, settled, tried, tuple(rounds))
 
 
-def _again(case: Case, current: Fit, step: Step) -> Step:
+def _faint(case: Case, settled: Fit, effect: Effect) -> bool:
+    """Tell whether no stage in which an effect shows has a clear gap."""
+    gaps = stage_gaps(case.outputs, settled.rig)
+    return all(gaps.get(stage, 0.0) < FAINT for stage in shows_in(effect))
+
+
+def _again(case: Case, settled: Fit, current: Fit, step: Step) -> Step:
     """Return a step whose rivals are tried again, now that the other effects are known."""
     if not step.rivals:
         return step
@@ -110,7 +120,7 @@ def _again(case: Case, current: Fit, step: Step) -> Step:
     ]
     ranked = ranked_by_gain(case.outputs, without, found)
     own = next(candidate for candidate in ranked if candidate.effect is step.effect)
-    return _step(own, ranked)
+    return _step(own, ranked, _faint(case, settled, step.effect))
 
 
 def _needless(case: Case, current: Fit) -> Effect | None:
@@ -128,16 +138,29 @@ def _needless(case: Case, current: Fit) -> Effect | None:
     return None if spare is None else spare[1]
 
 
-def _step(best: Candidate, ranked: Sequence[Candidate]) -> Step:
-    """Return a found effect with its rivals; what holds it as a special case is none."""
+def _step(best: Candidate, ranked: Sequence[Candidate], faint: bool) -> Step:
+    """Return a found effect with its rivals; what holds it as a special case is none.
+
+    Unless the gap is faint: no law of dry friction is exact, and there one passes for another.
+    """
     others = [
         other
         for other in ranked
         if other is not best and len(other.effect.free) <= len(best.effect.free)
     ]
     rivals = tuple(other for other in others if other.gain > best.gain - RIVAL)
+    if faint:
+        rivals += tuple(
+            other for other in ranked if _other_law(best, other) and other not in rivals
+        )
     weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
     return Step(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
+
+
+def _other_law(best: Candidate, other: Candidate) -> bool:
+    """Tell whether a candidate is the other law of dry friction, and not much worse."""
+    both = {best.effect.name, other.effect.name}
+    return both == set(DRY) and other.gain > best.gain - LAW
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
@@ -158,7 +181,7 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
             if stage in left
         )
         doubtful = closes and best.effect.stage == "loader"
-        margin = max(RIVAL, SIMPLER * ranked[0].gain) if doubtful else RIVAL
+        margin = max(SIMPLER, SIMPLER_SHARE * ranked[0].gain) if doubtful else RIVAL
         if other.gain > ranked[0].gain - margin:
             best = other
     return best
@@ -178,10 +201,11 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
     now = case.gaps(current.rig) if current.effects else first
     limits = stage_limits(case.outputs)
     guilty = {stage for stage, gap in now.items() if gap > bar(first[stage], limits[stage])}
+    among = guilty or _strained(current)
     candidates = [
         effect
         for effect in library
-        if effect not in current.effects and guilty & set(shows_in(effect))
+        if effect not in current.effects and among & set(shows_in(effect))
     ]
     found = []
     screened = screen(case, current, candidates)
@@ -196,13 +220,36 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         bound = any(key.startswith(effect.name) for key in fitted.at_bound)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
-    return ranked_by_gain(case.outputs, current, found)
+    ranked = ranked_by_gain(case.outputs, current, found)
+    return ranked if guilty or _surely_beyond(ranked) else []
 
 
 def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
     """Tell whether a nominal number moved by no more than its setting can be trusted to."""
     slack = TOLERANCE.get(effect.name)
     return slack is not None and abs(fitted.values[f"{effect.name}.factor"] - 1.0) < slack
+
+
+def _strained(current: Fit) -> set[str]:
+    """Return the stages of which a setting stands at the end of its tolerance.
+
+    It may then keep a stage within its limit that is off by more.
+    """
+    settings = SETTINGS.values()
+    return {one.stage for one in settings if f"{one.name}.factor" in current.at_bound}
+
+
+def _surely_beyond(ranked: Sequence[Candidate]) -> bool:
+    """Tell whether the best candidate is a number off by more than its setting, and nothing else.
+
+    In a stage within its limit no other effect is claimed.
+    """
+    if not ranked or ranked[0].effect.name not in SETTINGS:
+        return False
+    best, key = ranked[0], f"{ranked[0].effect.name}.factor"
+    slack = TOLERANCE[best.effect.name]
+    beyond = best.fit.low[key] > 1.0 + slack or best.fit.high[key] < 1.0 - slack
+    return beyond and all(other.gain < best.gain - RIVAL for other in ranked[1:])
 
 
 def ranked_by_gain(

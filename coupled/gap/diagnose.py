@@ -64,7 +64,7 @@ def diagnose(
     readers = [
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]
-    outputs = _outputs(readers)
+    outputs = [output.halved(rig) for output in _outputs(readers)]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))

@@ -159,7 +159,9 @@ def _fit(
     half = _half_width(best, len(ours), np.concatenate(number)) * scale
     values = best.x * scale
     half = np.hypot(half, [MODEL * _size(p, v) for p, v in zip(frees, values, strict=True)])
-    stuck = np.isclose(best.x, low, atol=1e-4) | np.isclose(best.x, high, rtol=1e-4)
+    # A small cubic is near its bound on the scale of a large one, but known not to be there.
+    small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
+    stuck = small | np.isclose(best.x, high, rtol=1e-4)
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
 STRETCH_s = 2.5  # a stretch of the record, fitted or held out
+SHORTEST_s = 0.25  # and the shortest to which one is cut that holds much of what is left
+MUCH = 0.125  # share of the residual's power above which a stretch is cut
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
 LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
@@ -27,7 +29,8 @@ class Output:
 
     `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
     standard deviation from record to record, `smoothed` the share of it that a smoothed input has.
-    `record` numbers the record that it is of.
+    `record` numbers the record that it is of; `held` are the frames held out from fits, without
+    which they are those of every other stretch.
     """
 
     stage: str
@@ -39,6 +42,7 @@ class Output:
     record: int = 0
     spread: float = 0.0
     smoothed: float = 0.0
+    held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def residual(self, rig: Rig, part: Part = "all") -> Floats:
@@ -58,10 +62,29 @@ class Output:
 
     def rows(self, part: Part) -> NDArray[np.bool_]:
         """Return which frames are of a part: every other stretch is fitted, those between held."""
-        number = self.stretches
         if part == "all":
-            return np.ones(len(number), dtype=bool)
-        return np.asarray(number % 2 == (0 if part == "fitted" else 1))
+            return np.ones(len(self.measured), dtype=bool)
+        held = self.stretches % 2 == 1 if self.held is None else self.held
+        return np.asarray(held if part == "held" else ~held)
+
+    def halved(self, rig: Rig) -> Output:
+        """Return the output with halves that both hold of what this rig leaves.
+
+        What happens seldom, as a limit that is met once, would else be in one of them alone: a
+        stretch that holds much of the residual's power is cut where it has had its share.
+        """
+        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
+        least = max(1, round(SHORTEST_s * self.frame_rate_Hz))
+        power = np.concatenate(([0.0], np.cumsum(self.residual(rig) ** 2)))
+        most = max(MUCH, 2.0 * frames / len(self.measured)) * float(power[-1])
+        held = np.zeros(len(self.measured), dtype=bool)
+        start, odd = 0, False
+        while start < len(held):
+            full = int(np.searchsorted(power, power[start] + most))
+            end = min(max(full, start + least), start + frames)
+            held[start:end] = odd
+            start, odd = end, not odd
+        return replace(self, held=held, _known=[])
 
     @property
     def limit(self) -> float:
@@ -74,8 +97,17 @@ class Output:
 
 
 def white(signal: Floats) -> float:
-    """Return the white noise in a smooth signal, by its fourth differences (gain √70)."""
-    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    """Return the white noise in a smooth signal, by its fourth differences (gain √70).
+
+    No less than its rounding, which is not white where the signal is slow.
+    """
+    return float(max(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0), rounding(signal)))
+
+
+def rounding(signal: Floats) -> float:
+    """Return the rms error of a signal's rounding, by the least step between its values."""
+    steps = np.diff(np.unique(signal))
+    return float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
 
 
 def spread(carried: Sequence[Floats], own: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice
@@ -41,8 +42,8 @@ def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> d
     number = output.stretches[output.rows("held")]
     held = np.unique(number)
     old, new = output.residual(rig, "held") ** 2, output.residual(found, "held") ** 2
-    means = np.array([[old[number == b].mean(), new[number == b].mean()] for b in held])
-    before, after = np.sqrt(means.mean(axis=0))
+    sums = np.array([[np.sum(x[number == b]) for x in (old, new, np.ones(len(old)))] for b in held])
+    before, after = _rms(sums)
     result: dict[str, Any] = {
         "channel": output.channel,
         "before": float(before * output.floor),
@@ -52,9 +53,15 @@ def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> d
     }
     if improved and before > floor:
         picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
-        drawn = np.sqrt(means[picks].mean(axis=1))
+        drawn = np.array([_rms(sums[pick]) for pick in picks])
         closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
         result["closed"] = min(1.0, float((before - after) / (before - floor)))
         result["low"], result["high"] = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
         result["reliable"] = len(held) >= FEW
     return result
+
+
+def _rms(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return roots of mean squares, from blocks' sums of two squares and their counts."""
+    total = sums.sum(axis=0)
+    return np.asarray(np.sqrt(total[:2] / total[2]))

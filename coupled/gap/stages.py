@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.channels import SURFACES, ControlName, channel
-from coupled.gap.output import Output, Predict, spread, white
+from coupled.gap.output import Output, Predict, rounding, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
@@ -162,7 +162,8 @@ class Reader:
             def echoed(rig: Rig) -> Floats:
                 return predict(rig, pressure)
 
-            floor = max(white(gradient - made), ROUNDING * float(np.ptp(gradient)))
+            least = max(rounding(gradient), ROUNDING * float(np.ptp(gradient)))
+            floor = max(white(gradient - made), least)
             return [self._output("schedule", self._name("gradient"), gradient, echoed, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
@@ -182,12 +183,13 @@ class Reader:
         def driven(f: Floats, seen: Floats) -> Predict:
             """Return the prediction for a force and the δc at which windows start."""
             nodes = on_nodes(self.rig, f)
+            misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
             def predict(rig: Rig) -> Floats:
                 scale = rig.controls[self.control].sensing.deflection_scale
                 restart = (every, seen / scale, rate / scale)
-                told = (nodes, gradient, computed, load, second, restart)
+                told = (nodes, gradient, misread, load, second, restart)
                 return scale * drive_loader(rig, self.control, *told)[0]
 
             return predict

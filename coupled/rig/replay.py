@@ -44,7 +44,7 @@ def replay_loader(
     control: str,
     force_N: Floats,
     gradient: Floats,
-    computed: Floats,
+    misread: Floats,
     load_factor: Floats | None = None,
     second: Floats | None = None,
     restart: Restart | None = None,
@@ -52,12 +52,12 @@ def replay_loader(
     """Return δc in d and F_mod in N at each frame.
 
     `gradient` is G_T in N/d as the schedule gave it (`second` that beyond the break, where
-    there is one), `computed` the measured δc, from which a digital multiplier makes its
-    product. The loader starts at rest at neutral; with `restart`, it is put back to a measured
-    state now and then.
+    there is one), `misread` what the host read of δc beyond what it was, d: a digital multiplier
+    makes its product of both. The loader starts at rest at neutral; with `restart`, it is put
+    back to a measured state now and then.
     """
     nodes = on_nodes(rig, force_N)
-    return drive_loader(rig, control, nodes, gradient, computed, load_factor, second, restart)
+    return drive_loader(rig, control, nodes, gradient, misread, load_factor, second, restart)
 
 
 def drive_loader(
@@ -65,7 +65,7 @@ def drive_loader(
     control: str,
     nodes_N: Floats,
     gradient: Floats,
-    computed: Floats,
+    misread: Floats,
     load_factor: Floats | None = None,
     second: Floats | None = None,
     restart: Restart | None = None,
@@ -75,12 +75,12 @@ def drive_loader(
     `nodes_N` has `rig.substeps` values a frame and one more.
     """
     p, s = _one(rig, control)
-    level = np.ones_like(computed) if load_factor is None else load_factor
-    out = np.empty((2, len(computed)))
+    level = np.ones_like(misread) if load_factor is None else load_factor
+    out = np.empty((2, len(misread)))
     h = 1.0 / (rig.frame_rate * rig.substeps)
-    every, position, rate = (0, computed, computed) if restart is None else restart
+    every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
-    told = np.stack((*both, computed, level, position, rate))
+    told = np.stack((*both, misread, level, position, rate))
     _loader(p, s, nodes_N, told, every, rig.substeps, h, out)
     return out[0], out[1]
 
@@ -152,18 +152,19 @@ def _loader(
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader; `told`, shape (6, frames): G_T twice, δc, load factor, restarts."""
+    """Run the loader; `told`, shape (6, frames): G_T twice, misread δc, load factor, restarts."""
     p, s = parameters[0], states[0]
-    gradient, computed, level, position, rate = told[:2], told[2], told[3], told[4], told[5]
+    gradient, misread, level, position, rate = told[:2], told[2], told[3], told[4], told[5]
     start_delay(p.loader, s.loader, force[0])
-    frames = len(computed)
+    frames = len(misread)
     for k in range(frames):
         m = s.modification
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         if p.modification.digital:
-            product = modifying_force(m, computed[k])
+            read = p.sensing.deflection_scale * s.loader.computed + misread[k]
+            product = modifying_force(m, read)
             m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
             product = m.held
         else:

@@ -109,10 +109,10 @@ def test_schedule(case: Case) -> None:
 
 def test_loader(case: Case) -> None:
     force, computed = case["column_force_N"], case["column_computed_m"]
-    gradient = case["column_gradient_N_per_m"]
+    gradient, none = case["column_gradient_N_per_m"], np.zeros_like(computed)
 
     def stage(f: Floats) -> Floats:
-        return replay_loader(case.rig, "column", f, gradient, computed)[0]
+        return replay_loader(case.rig, "column", f, gradient, none)[0]
 
     floor = np.hypot(white(computed), carried(stage, force, white(force)))
     assert rms(computed - stage(force)) <= 1.1 * floor
