@@ -161,9 +161,12 @@ def _tell_where(
     for stage, found in stages.items():
         ours = [o for o in outputs if o.stage in shown.get(stage, (stage,))]
         if found.get("guilty") and ours:
-            widest = max(ours, key=lambda o: o.gap(choice.settled.rig))
+            # Without what its settings explain, unless at the end of their tolerance they hide it.
+            hidden = found.get("settled", np.inf) <= found.get("limit", 0.0)
+            rig = readers[0].rig if hidden else choice.settled.rig
+            widest = max(ours, key=lambda o: o.gap(rig))
             reader = readers[widest.record]
-            found["where"] = where(widest, choice.settled.rig, reader.record, reader.control)
+            found["where"] = where(widest, rig, reader.record, reader.control)
             if _left(found):
                 most = max(ours, key=lambda o: o.gap(choice.fit.rig))
                 told = readers[most.record].record

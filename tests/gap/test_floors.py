@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,11 @@ def test_the_spread_of_noise_is_what_many_records_show() -> None:
     told = np.mean([spread([carried() for _ in range(4)], own) for _ in range(20)])
     assert told == pytest.approx(np.std(rms) / np.mean(rms), rel=0.15)
     assert spread([np.zeros(1200)], own) == pytest.approx(np.sqrt(0.5 / 1200))
+
+
+def test_noise_that_has_few_values_may_leave_more_than_its_floor() -> None:
+    limits = [replace(OUTPUT, spread=s, smoothed=c).limit for s, c in ((0.01, 0.0), (0.2, 1.0))]
+    assert limits == pytest.approx([1.2, 1.75])  # 1 + 3 standard deviations + 0.15 of a smoother's
 
 
 def test_wieners_error_is_what_the_smoother_leaves_of_a_random_walk() -> None:

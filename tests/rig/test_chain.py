@@ -100,6 +100,19 @@ def test_the_loader_holds_the_two_segment_force() -> None:
         assert line.force[0] == pytest.approx(force, rel=1e-6)
 
 
+def test_a_digital_product_is_of_what_the_host_read() -> None:
+    rig = bench({"controls.column.loader.multiplier": "digital"})
+    gradient, misread = np.full(300, G_STIFF), np.zeros(300)
+    misread[100] = 1e-3
+    nodes = np.zeros(299 * rig.substeps + 1)
+    x, product = drive_loader(rig, "column", nodes, gradient, misread)
+    host = rig.controls["column"].compensation
+    added = G_STIFF / (1.0 - host.bend * G_STIFF) - rig.controls["column"].loader.basic_gradient
+    assert product[:101] == pytest.approx(added * misread[:101])
+    assert x[101] < -1e-6  # held over the frame, it moves the loader the other way
+    assert product[101] == pytest.approx(added * x[101])
+
+
 # --- the report's numbers ------------------------------------------------------------------------
 
 
