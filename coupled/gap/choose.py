@@ -9,13 +9,13 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from coupled.channels import ControlName
 from coupled.gap.case import Case, Tell
-from coupled.gap.effects import EFFECTS, SETTINGS, TOLERANCE, Effect
+from coupled.gap.effects import BY_NAME, EFFECTS, SETTINGS, TOLERANCE, Effect, apply
 from coupled.gap.fit import Fit, shows_in
 from coupled.gap.output import Output, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
@@ -28,7 +28,8 @@ MISMATCH = 0.03  # share of a gap that the physics of a right effect may leave
 # By which, or by which share of the gain, more numbers must win where fewer close the gap.
 SIMPLER, SIMPLER_SHARE = 6.0, 0.05
 FAINT, LAW = 2.0, 12.0  # a gap under which the law of dry friction has to be told by such a gain
-DRY = ("coulomb_friction", "stribeck_friction")
+DRY = COULOMB, STRIBECK = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
+SLOW = 2e-3  # d/s over which a breakaway fades, where none is known
 SPARE = 4.0  # an effect that others have made needless: it would be missed by less
 MOST = 4  # effects in one answer
 
@@ -85,7 +86,7 @@ def search(
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
-        steps.append(_step(best, ranked, _faint(case, settled, best.effect)))
+        steps.append(_step(case, settled, best, ranked))
         current = case.fit((*current.effects, best.effect), start=best.fit.values)
         needless = _needless(case, current)
         if needless is not None:
@@ -98,12 +99,6 @@ def search(
         steps = [_again(case, settled, current, step) for step in steps]
     tried = next((gains for gains in rounds if gains), {})
     return Choice(tuple(steps), current, settled, tried, tuple(rounds))
-
-
-def _faint(case: Case, settled: Fit, effect: Effect) -> bool:
-    """Tell whether no stage in which an effect shows has a clear gap."""
-    gaps = stage_gaps(case.outputs, settled.rig)
-    return all(gaps.get(stage, 0.0) < FAINT for stage in shows_in(effect))
 
 
 def _again(case: Case, settled: Fit, current: Fit, step: Step) -> Step:
@@ -120,7 +115,7 @@ def _again(case: Case, settled: Fit, current: Fit, step: Step) -> Step:
     ]
     ranked = ranked_by_gain(case.outputs, without, found)
     own = next(candidate for candidate in ranked if candidate.effect is step.effect)
-    return _step(own, ranked, _faint(case, settled, step.effect))
+    return _step(case, settled, own, ranked)
 
 
 def _needless(case: Case, current: Fit) -> Effect | None:
@@ -138,29 +133,42 @@ def _needless(case: Case, current: Fit) -> Effect | None:
     return None if spare is None else spare[1]
 
 
-def _step(best: Candidate, ranked: Sequence[Candidate], faint: bool) -> Step:
+def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]) -> Step:
     """Return a found effect with its rivals; what holds it as a special case is none.
 
-    Unless the gap is faint: no law of dry friction is exact, and there one passes for another.
+    Unless the gap is faint: there one law of dry friction passes for another.
     """
     others = [
         other
         for other in ranked
         if other is not best and len(other.effect.free) <= len(best.effect.free)
     ]
-    rivals = tuple(other for other in others if other.gain > best.gain - RIVAL)
-    if faint:
-        rivals += tuple(
-            other for other in ranked if _other_law(best, other) and other not in rivals
-        )
+    rivals = [other for other in others if other.gain > best.gain - RIVAL]
+    gaps = stage_gaps(case.outputs, settled.rig)
+    if best.effect in DRY and all(gaps.get(at, 0.0) < FAINT for at in shows_in(best.effect)):
+        rivals = [other for other in rivals if other.effect not in DRY]
+        rivals += _other_laws(case, best, ranked)
     weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
-    return Step(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
+    return Step(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
 
 
-def _other_law(best: Candidate, other: Candidate) -> bool:
-    """Tell whether a candidate is the other law of dry friction, and not much worse."""
-    both = {best.effect.name, other.effect.name}
-    return both == set(DRY) and other.gain > best.gain - LAW
+def _other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
+    """Return the other law of dry friction, if a faint gap leaves it open.
+
+    A breakaway of twice the running friction hardly shows there, and is never excluded.
+    """
+    if best.effect is STRIBECK:
+        return [one for one in ranked if one.effect is COULOMB and one.gain > best.gain - LAW]
+    friction = best.fit.values["coulomb_friction.friction_N"]
+    breakaway = 2.0 * friction + case.nominal.controls[case.control].loader.friction
+    told = {"friction_N": friction, "breakaway_N": breakaway, "stribeck_{d}_per_s": SLOW}
+    values = {f"{STRIBECK.name}.{name}": value for name, value in told.items()}
+    effects = (*(e for e in best.fit.effects if e is not COULOMB), STRIBECK)
+    known = {**best.fit.values, **values}
+    rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), known)
+    return [
+        Candidate(best.gain, STRIBECK, replace(best.fit, effects=effects, values=known, rig=rig))
+    ]
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:

@@ -112,6 +112,33 @@ def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
     assert [e["name"] for e in found["effects"]] == ["cubic_stiffness"], found
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"coulomb_friction": {"friction_N": 0.08}},
+        {
+            "stribeck_friction": {
+                "friction_N": 0.06,
+                "breakaway_N": 0.12,
+                "stribeck_{d}_per_s": 2e-3,
+            }
+        },
+    ],
+)
+def test_a_faint_gap_leaves_the_law_of_dry_friction_open(
+    tmp_path: Path, effect: dict[str, dict[str, float]]
+) -> None:
+    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column").found
+    assert 1.2 < found["stages"]["loader"]["settled"] < 2.0
+    assert found["verdict"] == "ambiguous"
+    assert [sorted(group) for group in found["rivals"]] == [
+        ["coulomb_friction", "stribeck_friction"]
+    ]
+    told = {"coulomb_friction": {"friction_N": 1.0}}
+    clear = diagnose(RIG, {"r": made(tmp_path, RIG, told, 4)}, "column").found
+    assert (clear["verdict"], clear["rivals"]) == ("effect", [])
+
+
 def test_what_remains_is_told_in_numbers_and_words(tmp_path: Path) -> None:
     record = made(tmp_path, RIG, {}, 5)
     at = record.channels.index("column_deflection_m")
