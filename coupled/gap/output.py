@@ -20,6 +20,7 @@ MUCH = 0.125  # share of the residual's power above which a stretch is cut
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
 LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
+ECHO = 12  # frames over which noise may echo
 _KEPT = 4  # predictions remembered
 
 
@@ -108,6 +109,20 @@ def rounding(signal: Floats) -> float:
     """Return the rms error of a signal's rounding, by the least step between its values."""
     steps = np.diff(np.unique(signal))
     return float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
+
+
+def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
+    """Return how much of a signal's white noise is that of what it was made from, and the rest.
+
+    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal as it should
+    be, with the noise of its source: where that comes late or filtered, it echoes over frames.
+    """
+    noise, source = np.diff(signal, 4)[ECHO:], np.diff(made, 4)
+    echo = np.column_stack([source[ECHO - k : len(source) - k] for k in range(ECHO)])
+    left = noise - echo @ np.linalg.lstsq(echo, noise, rcond=None)[0]
+    power = float(noise @ noise)
+    share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+    return share, float(max(np.sqrt(np.mean(left**2) / 70.0), rounding(signal)))
 
 
 def spread(carried: Sequence[Floats], own: float) -> float:

@@ -27,7 +27,8 @@ def screen(
 ) -> list[tuple[Effect, list[dict[str, float]]]]:
     """Return the candidates whose signature takes most of the residual, and where to start.
 
-    There is a start for each shape that an effect of several parameters begins from.
+    There is a start for each shape that an effect of several parameters begins from. One without
+    a parameter costs next to nothing to fit, and is always among them.
     """
     scores = []
     for effect in candidates:
@@ -49,7 +50,8 @@ def screen(
         if starts:
             scores.append((best, effect, starts))
     scores.sort(key=lambda item: -item[0])
-    return [(effect, starts) for _, effect, starts in scores[:SCREENED]]
+    kept = scores[:SCREENED] + [item for item in scores[SCREENED:] if not item[1].free]
+    return [(effect, starts) for _, effect, starts in kept]
 
 
 def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig:

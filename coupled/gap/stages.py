@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.channels import SURFACES, ControlName, channel
-from coupled.gap.output import Output, Predict, rounding, spread, white
+from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.record import Record
 from coupled.rig.parameters import Rig
@@ -38,7 +38,7 @@ from coupled.rig.replay import (
 )
 
 Floats = NDArray[np.float64]
-SHARED = 0.5  # of q̄'s noise in G_T, from which the host is taken to have made it of q̄ as recorded
+SHARED = 0.1  # of G_T's noise that echoes q̄'s: the host is taken to have made it of q̄ as recorded
 NEUTRAL = 8.0  # of a channel's noise: so near to neutral its side is not sure
 ROUNDING = 1e-6  # of a channel's span
 KNOWN = 1e-4  # share of its span to which a surface's map tells where it stands
@@ -156,15 +156,14 @@ class Reader:
         def predict(rig: Rig, q: Floats = calm) -> Floats:
             return replay_schedule(rig, self.control, q)
 
-        made = predict(self.rig, pressure)
-        if own > SHARED * white(made):
+        share, rest = echoed(gradient, predict(self.rig, pressure))
+        if share > SHARED:
             # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
-            def echoed(rig: Rig) -> Floats:
+            def as_read(rig: Rig) -> Floats:
                 return predict(rig, pressure)
 
-            least = max(rounding(gradient), ROUNDING * float(np.ptp(gradient)))
-            floor = max(white(gradient - made), least)
-            return [self._output("schedule", self._name("gradient"), gradient, echoed, floor)]
+            floor = max(rest, ROUNDING * float(np.ptp(gradient)))
+            return [self._output("schedule", self._name("gradient"), gradient, as_read, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, self._calmed(calm, k, level))

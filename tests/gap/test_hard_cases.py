@@ -16,8 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupled.gap.air import vertical_air
+from coupled.gap.case import Case
 from coupled.gap.diagnose import diagnose
-from coupled.gap.output import Output, STRETCH_s, white
+from coupled.gap.effects import BY_NAME, EFFECTS
+from coupled.gap.output import Output, STRETCH_s, echoed, white
+from coupled.gap.screen import screen
+from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
 from coupled.gap.words import in_words
 from coupled.record import write_record
 from coupled.rig.parameters import Rig
@@ -69,6 +74,30 @@ def test_a_coarse_log_has_the_noise_of_its_rounding() -> None:
     assert white(np.ones(100)) == 0.0
 
 
+def test_noise_that_comes_late_or_filtered_is_known_again() -> None:
+    rng = np.random.default_rng(3)
+    source, own = rng.standard_normal(6000), rng.standard_normal(6000)
+    late = np.concatenate(([0.0, 0.0], source[:-2]))
+    slow = np.zeros(6000)
+    for k in range(1, 6000):
+        slow[k] = slow[k - 1] + 0.3 * (source[k] - slow[k - 1])
+    for heard in (source, late, slow):
+        share, rest = echoed(2.0 * heard + 0.05 * own, source)
+        assert share > 0.9
+        assert rest == pytest.approx(0.05, rel=0.1)
+    assert echoed(own, source)[0] < 0.02
+    assert echoed(np.zeros(6000), source) == (0.0, 0.0)
+
+
+def test_a_lag_of_a_few_frames_is_told_by_the_noise_it_holds_back(tmp_path: Path) -> None:
+    effect = {"pressure_lag": {"lag_s": 0.02}}
+    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column").found
+    assert [e["name"] for e in found["effects"]] == ["pressure_lag"]
+    assert found["verdict"] == "effect"
+    assert found["effects"][0]["parameters"]["lag_s"]["value"] == pytest.approx(0.02, rel=0.05)
+    assert found["stages"]["schedule"]["left"] < 1.15
+
+
 def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> None:
     """Its product follows the replay: that of the measured deflection would not hold it."""
     nominal = loader(basic_gradient_N_per_m=140.0, friction_N=2.0, breakout_N=2.0)
@@ -100,6 +129,18 @@ def test_a_setting_is_no_effect_until_it_is_off_by_more(
         assert found["settings"]["damping"] == pytest.approx(factor, abs=0.003)
         assert f"by its settings, mass {100 * (found['settings']['mass'] - 1):+.1f} %" in said
         assert f"damping {100 * (found['settings']['damping'] - 1):+.1f} %: within what" in said
+
+
+def test_an_effect_without_a_number_is_always_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = made(tmp_path, RIG, {"inertia": {"factor": 1.4}}, 4)
+    case = Case(RIG, "column", Reader(RIG, record, "column", surface_points).outputs())
+    monkeypatch.setattr("coupled.gap.screen.SCREENED", 1)
+    kept = screen(case, case.fit(()), [e for e in EFFECTS if e.stage == "loader"])
+    assert len(kept) == 2
+    assert kept[0][0].free
+    assert kept[1] == (BY_NAME["digital_multiplier"], [{}])
 
 
 def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
