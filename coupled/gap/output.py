@@ -20,6 +20,7 @@ MUCH = 0.125  # share of the residual's power above which a stretch is cut
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
 LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
+LEVELS = 32  # of a signal that was rounded
 ECHO = 12  # frames over which noise may echo
 _KEPT = 4  # predictions remembered
 
@@ -102,13 +103,19 @@ def white(signal: Floats) -> float:
 
     No less than its rounding, which is not white where the signal is slow.
     """
-    return float(max(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0), rounding(signal)))
+    noise = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    return max(noise, rounding(signal, noise))
 
 
-def rounding(signal: Floats) -> float:
-    """Return the rms error of a signal's rounding, by the least step between its values."""
+def rounding(signal: Floats, noise: float) -> float:
+    """Return the rms error of a signal's rounding, by the least step between its values.
+
+    A few levels that it seldom changes between, as q̄'s of a test point, are no rounding: that
+    shows in many levels, or makes about as much of `noise`.
+    """
     steps = np.diff(np.unique(signal))
-    return float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
+    error = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
+    return error if len(steps) >= LEVELS or error < 2.0 * noise else 0.0
 
 
 def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
@@ -122,7 +129,8 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
     left = noise - echo @ np.linalg.lstsq(echo, noise, rcond=None)[0]
     power = float(noise @ noise)
     share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
-    return share, float(max(np.sqrt(np.mean(left**2) / 70.0), rounding(signal)))
+    rest = float(np.sqrt(np.mean(left**2) / 70.0))
+    return share, max(rest, rounding(signal, rest))
 
 
 def spread(carried: Sequence[Floats], own: float) -> float:

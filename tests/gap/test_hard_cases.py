@@ -72,6 +72,10 @@ def test_a_coarse_log_has_the_noise_of_its_rounding() -> None:
         assert white(np.round(slow / step) * step) == pytest.approx(np.std(left), rel=0.1)
     assert white(slow) < 1e-6
     assert white(np.ones(100)) == 0.0
+    few = np.round(20.0 + 0.01 * np.sin(np.arange(6000) / 50.0), 3)  # 20 levels, but rounded
+    assert white(few) == pytest.approx(1e-3 / np.sqrt(12.0), rel=1e-6)
+    points = np.where(np.arange(6000) % 2000 < 1000, 560.0, 2189.0)  # two levels of a schedule
+    assert white(points) < 30.0
 
 
 def test_noise_that_comes_late_or_filtered_is_known_again() -> None:
