@@ -8,7 +8,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +26,7 @@ from coupled.errors import InputError
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
 from tests.campaign.test_check import BENCH
+from tests.processes import begun, kill
 from tests.test_cli import SHORT, coupled, files
 
 BEND = "rig.controls.column.loader.bend_m_per_N"
@@ -127,39 +127,17 @@ def rows_in(path: Path) -> int:
     return max(0, path.read_bytes().count(b"\n") - 1) if path.exists() else 0
 
 
-def begun(folder: Path, workers: int) -> subprocess.Popen[bytes]:
+def begun_sweep(folder: Path, workers: int) -> subprocess.Popen[bytes]:
     """Return a sweep of 120 flights once it has a few of them."""
     many = GRID.replace("steps = 3", "steps = 20")
     many += '[[vary]]\nkey = "duration_s"\nvalues = [6.0]\n'
     (folder / "many.toml").write_text(many.replace('name = "s"', 'name = "many"'))
-    words = [sys.executable, "-m", "coupled", "sweep", "many.toml", "--folder", "o"]
-    process = subprocess.Popen(
-        [*words, "-j", str(workers)],
-        cwd=folder,
-        start_new_session=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    patience = time.monotonic() + 60.0
-    while rows_in(folder / "o" / JOURNAL) < 5:
-        assert process.poll() is None
-        assert time.monotonic() < patience
-        time.sleep(0.01)
-    return process
+    words = ("sweep", "many.toml", "--folder", "o", "-j", str(workers))
+    return begun(folder, *words, until=lambda: rows_in(folder / "o" / JOURNAL) >= 5)
 
 
 def test_a_killed_sweep_goes_on_and_repeats_no_flight(folder: Path) -> None:
-    process = begun(folder, workers=2)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    patience = time.monotonic() + 30.0
-    while True:  # its workers end with it
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            break
-        assert time.monotonic() < patience
-        time.sleep(0.05)
+    kill(begun_sweep(folder, workers=2))
     kept = rows_in(folder / "o" / JOURNAL)
     assert 5 <= kept < 120
     before = (folder / "o" / JOURNAL).read_bytes()
@@ -185,7 +163,7 @@ def test_two_sweeps_into_one_folder_are_one_line(folder: Path) -> None:
 
 
 def test_an_interrupted_sweep_says_that_it_goes_on(folder: Path) -> None:
-    process = begun(folder, workers=1)
+    process = begun_sweep(folder, workers=1)
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait(timeout=30) == 130
     kept = [json.loads(line) for line in (folder / "o" / JOURNAL).read_text().splitlines()[1:]]

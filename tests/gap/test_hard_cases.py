@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +23,7 @@ from coupled.record import write_record
 from coupled.rig.parameters import Rig
 from coupled.rig.rigwrite import rig_text
 from tests.gap.made import made, nominal_rig
+from tests.processes import begun, kill
 from tests.rigs import BENCH, bench
 
 RATE_Hz = 100.0
@@ -215,21 +211,10 @@ def test_a_killed_diagnosis_of_a_folder_leaves_no_worker(tmp_path: Path) -> None
     for name in names:
         write_record(record, tmp_path / f"{name}.csv")
     (tmp_path / "records.toml").write_text("".join(f'{name} = "mine"\n' for name in names))
-    words = [sys.executable, "-m", "coupled", "diagnose", ".", "--output", "found"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen(words, cwd=tmp_path, start_new_session=True, **quiet)
-    patience = time.monotonic() + 90.0
-    while len(list((tmp_path / "found").glob("r*.json"))) < 2:
-        assert process.poll() is None
-        assert time.monotonic() < patience
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    while True:
-        try:
-            os.killpg(process.pid, 0)
-        except ProcessLookupError:
-            break
-        assert time.monotonic() < patience
-        time.sleep(0.05)
-    assert len(list((tmp_path / "found").glob("r*.json"))) < len(names)
+
+    def made_so_far() -> int:
+        return len(list((tmp_path / "found").glob("r*.json")))
+
+    words = ("diagnose", ".", "--output", "found")
+    kill(begun(tmp_path, *words, until=lambda: made_so_far() >= 2))
+    assert made_so_far() < len(names)

@@ -1,0 +1,42 @@
+"""Commands begun in the background, to be killed while they work."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def begun(folder: Path, *words: str, until: Callable[[], bool]) -> subprocess.Popen[bytes]:
+    """Return a command in its own group of processes, once it has come so far."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "coupled", *words],
+        cwd=folder,
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    patience = time.monotonic() + 90.0
+    while not until():
+        assert process.poll() is None
+        assert time.monotonic() < patience
+        time.sleep(0.01)
+    return process
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    """Kill a command that has no time to clean up; its workers must end with it."""
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    patience = time.monotonic() + 30.0
+    while True:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return
+        assert time.monotonic() < patience
+        time.sleep(0.05)
