@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, cast
 
 # Measured: docs/diagnosis.md.
@@ -18,6 +19,14 @@ OF_SIGNAL = {
     "pitch_rate": "the pitch rate",
     "alpha": "the angle of attack",
 }
+
+
+def in_figures(name: str, value: float) -> str:
+    """Return a parameter's value in figures; of a factor as many as tell it from 1."""
+    off = abs(value - 1.0)
+    if name != "factor" or off >= 0.1 or off < 1e-12:
+        return f"{value:.4g}"
+    return f"{value:.{1 - math.floor(math.log10(off))}f}"
 
 
 def in_words(diagnosis: dict[str, Any], control: str) -> str:
@@ -130,9 +139,9 @@ def _closes(diagnosis: dict[str, Any]) -> str:
 
 def _one_in_words(effect: dict[str, Any]) -> str:
     numbers = ", ".join(
-        f"{name} {found['value']:.4g}"
+        f"{name} {in_figures(name, found['value'])}"
         + (
-            f" ({found['low']:.4g} to {found['high']:.4g})"
+            f" ({in_figures(name, found['low'])} to {in_figures(name, found['high'])})"
             if found["low"] is not None and found["high"] is not None
             else ""
         )

@@ -13,6 +13,7 @@ from coupled.gap.choose import LEAST_GAIN, RIVAL, Step
 from coupled.gap.effects import EFFECTS
 from coupled.gap.fit import shows_in
 from coupled.gap.output import stage_gaps
+from coupled.gap.words import in_figures
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, joined, plain
 
@@ -240,8 +241,10 @@ def _numbers(view: View) -> list[tuple[str, str, str]]:
         lines.append((f"{plain(effect['name'])}, p = {effect['probability']:.2f}", "", ""))
         for name, found in effect["parameters"].items():
             ends = [found["low"], found["high"]]
-            interval = "not told" if None in ends else f"{ends[0]:.4g} to {ends[1]:.4g}"
-            lines.append((f"    {name}", f"{found['value']:.4g}", interval))
+            interval = "not told"
+            if None not in ends:
+                interval = f"{in_figures(name, ends[0])} to {in_figures(name, ends[1])}"
+            lines.append((f"    {name}", in_figures(name, found["value"]), interval))
     return lines
 
 

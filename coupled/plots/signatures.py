@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from coupled.gap.effects import Effect
 from coupled.gap.fit import touched
 from coupled.gap.output import Floats, Output
+from coupled.gap.words import in_figures
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, plain, style_of, unit_shown, words
 from coupled.plots.signals import SIGNALS, Scene
@@ -122,8 +123,10 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
 def _title(view: View, effect: Effect) -> str:
     """Return the effect with its parameters."""
     found = next(e for e in view.diagnosis.found["effects"] if e["name"] == effect.name)
-    told = [f"{name} = {p['value']:.4g}" for name, p in found["parameters"].items()]
-    return ", ".join([f"{effect.stage}: {plain(effect.name)}", *told])
+    numbers = [
+        f"{name} = {in_figures(name, p['value'])}" for name, p in found["parameters"].items()
+    ]
+    return ", ".join([f"{effect.stage}: {plain(effect.name)}", *numbers])
 
 
 def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:

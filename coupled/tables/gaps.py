@@ -8,6 +8,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from coupled.gap.words import in_figures
+
 
 def print_stages(console: Console, diagnosis: dict[str, Any]) -> None:
     """Print the stages of a diagnosis: residual over floor, and what is left of it."""
@@ -50,7 +52,8 @@ def print_power(console: Console, sizes: Sequence[dict[str, Any]]) -> None:
             told = "no size that it may have"
         else:
             numbers = item["parameters"].items()
-            told = ", ".join(f"{name} {value:.4g}" for name, value in numbers) or "it would show"
+            each = (f"{name} {in_figures(name, value)}" for name, value in numbers)
+            told = ", ".join(each) or "it would show"
         table.add_row(item["name"], item["stage"], told)
     console.print()
     console.print(table)

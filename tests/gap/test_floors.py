@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output, spread
 from coupled.gap.smooth import Smoother
+from coupled.gap.words import in_figures
 
 Floats = NDArray[np.float64]
 RATE_Hz = 120.0
@@ -79,3 +80,20 @@ def test_wieners_error_is_what_the_smoother_leaves_of_a_random_walk() -> None:
         left.append(np.mean((smoother.smooth(rough) - walk) ** 2))
         told.append(np.mean(smoother.wiener_error(level, 2400, rng) ** 2))
     assert np.mean(told) == pytest.approx(np.mean(left), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "figures"),
+    [
+        ("factor", 1.0003124, "1.00031"),
+        ("factor", 0.9982, "0.9982"),
+        ("factor", 1.05, "1.050"),
+        ("factor", 1.4, "1.4"),
+        ("factor", 1.0, "1"),
+        ("play_m", 1.00031, "1"),
+    ],
+)
+def test_a_factor_has_as_many_figures_as_tell_it_from_one(
+    name: str, value: float, figures: str
+) -> None:
+    assert in_figures(name, value) == figures
