@@ -96,6 +96,7 @@ def test_a_lag_of_a_few_frames_is_told_by_the_noise_it_holds_back(tmp_path: Path
     assert found["verdict"] == "effect"
     assert found["effects"][0]["parameters"]["lag_s"]["value"] == pytest.approx(0.02, rel=0.05)
     assert found["stages"]["schedule"]["left"] < 1.15
+    assert found["stages"]["schedule"]["gap"] > 300.0  # 10 where the noise is taken for another's
 
 
 def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> None:
