@@ -20,7 +20,6 @@ MUCH = 0.125  # share of the residual's power above which a stretch is cut
 CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
 SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
 LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
-LEVELS = 32  # of a signal that was rounded
 ECHO = 12  # frames over which noise may echo
 _KEPT = 4  # predictions remembered
 
@@ -110,12 +109,12 @@ def white(signal: Floats) -> float:
 def rounding(signal: Floats, noise: float) -> float:
     """Return the rms error of a signal's rounding, by the least step between its values.
 
-    A few levels that it seldom changes between, as q̄'s of a test point, are no rounding: that
-    shows in many levels, or makes about as much of `noise`.
+    None where it would be thrice `noise`: an even ramp has even steps, a test's few levels have wide
+    ones, and neither was rounded.
     """
     steps = np.diff(np.unique(signal))
     error = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
-    return error if len(steps) >= LEVELS or error < 2.0 * noise else 0.0
+    return error if error < 3.0 * noise else 0.0
 
 
 def echoed(signal: Floats, made: Floats) -> tuple[float, float]:

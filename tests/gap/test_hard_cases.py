@@ -72,6 +72,8 @@ def test_a_coarse_log_has_the_noise_of_its_rounding() -> None:
     assert white(few) == pytest.approx(1e-3 / np.sqrt(12.0), rel=1e-6)
     points = np.where(np.arange(6000) % 2000 < 1000, 560.0, 2189.0)  # two levels of a schedule
     assert white(points) < 30.0
+    ramp = np.interp(np.arange(6000), [2000, 2360], [560.0, 1823.6])  # 361 levels, evenly apart
+    assert white(ramp) < 0.1
 
 
 def test_noise_that_comes_late_or_filtered_is_known_again() -> None:
