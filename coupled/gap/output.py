@@ -109,8 +109,8 @@ def white(signal: Floats) -> float:
 def rounding(signal: Floats, noise: float) -> float:
     """Return the rms error of a signal's rounding, by the least step between its values.
 
-    None where it would be thrice `noise`: an even ramp has even steps, a test's few levels have wide
-    ones, and neither was rounded.
+    None where it would be thrice `noise`: an even ramp has even steps, a test's few levels have
+    wide ones, and neither was rounded.
     """
     steps = np.diff(np.unique(signal))
     error = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
@@ -129,7 +129,7 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
     power = float(noise @ noise)
     share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
     rest = float(np.sqrt(np.mean(left**2) / 70.0))
-    return share, max(rest, rounding(signal, rest))
+    return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
 
 
 def spread(carried: Sequence[Floats], own: float) -> float:
