@@ -11,10 +11,10 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from coupled.channels import record_channels
 from coupled.plots.flights import draw_record
 from coupled.plots.saving import save
-from coupled.record import read_record
+from coupled.record.channels import record_channels
+from coupled.record.record import read_record
 
 ROOT = Path(__file__).parents[1]
 SHORT = """

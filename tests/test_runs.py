@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.authority import Flight, compare
+from coupled.authority.compare import Flight, compare
 from coupled.flight.scenario import read_run
 from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from coupled.channels import ControlName
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Control, Rig
 
 if TYPE_CHECKING:

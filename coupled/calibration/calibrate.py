@@ -18,8 +18,8 @@ from coupled.calibration.fit import LineFit, condition, normal_equations, ordina
 from coupled.calibration.outcome import Outcome, expected
 from coupled.calibration.readings import Readings
 from coupled.calibration.suspects import Suspect, find_suspects
-from coupled.channels import unit_of
 from coupled.errors import InputError
+from coupled.record.channels import unit_of
 from coupled.rig.parameters import Control
 
 Floats = NDArray[np.float64]

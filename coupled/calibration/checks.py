@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.calibration.sweeps import Release
-from coupled.channels import ControlName
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
 from coupled.rig.told import Told
 from coupled.units import POUND_N, DEGREE_rad

@@ -21,8 +21,8 @@ from coupled.calibration.errors_in_variables import expected_design
 from coupled.calibration.estimate import Estimate, Instruments
 from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
-from coupled.channels import ControlName, unit_of
 from coupled.errors import InputError
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.parameters import Rig
 from coupled.rig.statics import static_point
 

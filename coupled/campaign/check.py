@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from coupled.authority import Flight, compare
+from coupled.authority.compare import Flight, compare
 from coupled.campaign.verdict import UnjudgedError, Verdict, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupled.authority import Flight, held_forces
-from coupled.channels import ControlName, channel
+from coupled.authority.compare import Flight, held_forces
 from coupled.flight.expectation import RATE, Standard
+from coupled.record.channels import ControlName, channel
 from coupled.units import POUND_N, DEGREE_rad
 
 Bounds = tuple[float | None, float | None]

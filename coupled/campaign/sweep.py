@@ -18,13 +18,13 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.authority import judge
+from coupled.authority.compare import judge
 from coupled.campaign.journal import Journal, Row
 from coupled.campaign.plan import Job, Plan, Survive, jobs
 from coupled.errors import InputError
 from coupled.files import write_whole
 from coupled.flight.loop import fly
-from coupled.record import Record
+from coupled.record.record import Record
 
 Progress = Callable[[str, int, int], None]
 AS_FILED = "as filed"

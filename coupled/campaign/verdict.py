@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.authority import Flight
+from coupled.authority.compare import Flight
 from coupled.campaign.standards import judge_standard
-from coupled.channels import TIME
 from coupled.flight.expectation import Expect
+from coupled.record.channels import TIME
 
 Floats = NDArray[np.float64]
 Bounds = tuple[float | None, float | None]

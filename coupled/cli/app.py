@@ -13,8 +13,8 @@ import typer
 from typer.exceptions import TyperException
 
 from coupled import __version__
+from coupled.cli.terminal import out, say_error
 from coupled.errors import InputError
-from coupled.terminal import out, say_error
 
 app = typer.Typer(
     add_completion=False,

@@ -20,9 +20,9 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_stale,
 )
+from coupled.cli.terminal import check_json, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
-from coupled.terminal import check_json, give_json, out, progress, say
 
 if TYPE_CHECKING:
     from coupled.calibration.bench import Bench
@@ -96,7 +96,7 @@ def bench(
 
 def _repeat(made: Bench, repeat: int, seed: int, json_file: str) -> None:
     from coupled.calibration.coverage import measure_coverage
-    from coupled.tables.calibration import print_coverage
+    from coupled.cli.tables.calibration import print_coverage
 
     with progress() as advance:
         workers = min(os.cpu_count() or 1, 8, -(-repeat // 50))

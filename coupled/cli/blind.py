@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.terminal import check_json, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
-from coupled.terminal import check_json, give_json, out, progress, say
 
 blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score their diagnoses.")
 app.add_typer(blind, name="blind")
@@ -29,7 +29,7 @@ def make(
     rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the shipped ones.")] = 24,
 ) -> None:
     """Write sealed records of an independent twin, with and without effects; the key apart."""
-    from coupled.blind.make import make as make_trials
+    from coupled.blind.trials.make import make as make_trials
 
     path = key or folder.with_name(folder.name + ".key.json")
     if folder.is_file():
@@ -56,10 +56,10 @@ def score(
     ] = None,
 ) -> None:
     """Score diagnoses of sealed trials against their key, each share with its exact interval."""
-    from coupled.blind.answers import read_answers
-    from coupled.blind.key import SEAL, check_seal, read_key
-    from coupled.blind.score import score as score_answers
-    from coupled.tables.trials import print_score
+    from coupled.blind.trials.answers import read_answers
+    from coupled.blind.trials.key import SEAL, check_seal, read_key
+    from coupled.blind.trials.score import score as score_answers
+    from coupled.cli.tables.trials import print_score
 
     sealed = seal or key.with_name(key.name.removesuffix(".json").removesuffix(".key")) / SEAL
     inputs = [key, sealed, *diagnoses.glob("*.json")]

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.channels import ControlName
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import (
     DEFAULT_RIG,
@@ -19,9 +18,10 @@ from coupled.cli.rigs import (
     instruments,
     rig_and_control,
 )
+from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
-from coupled.terminal import check_json, give_json, out, say
+from coupled.record.channels import ControlName
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
@@ -93,10 +93,10 @@ def _calibrate(
     from coupled.calibration.belief import with_calibration
     from coupled.calibration.calibrate import calibrate as fit
     from coupled.calibration.readingsfile import read_readings
+    from coupled.cli.tables.calibration import print_calibration
     from coupled.rig.rigfile import rig_from_table
     from coupled.rig.rigwrite import rig_text
     from coupled.schema import loads_toml
-    from coupled.tables.calibration import print_calibration
 
     (file, data, name), (write, figure, json_file), (date, hardware) = rig, targets, noted
     found = fit(read_readings(path, name), data.controls[name], name, tools, path)
@@ -129,7 +129,7 @@ def _plan(
     targets: tuple[Path | None, str],
 ) -> None:
     from coupled.calibration.plan import fewest, form, precision, stations
-    from coupled.tables.calibration import print_plan
+    from coupled.cli.tables.calibration import print_plan
 
     (share, strongest, looks), (write, json_file) = wanted, targets
     if write is not None:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.terminal import check_json, err, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
 from coupled.resources import find, shipped_sweeps
-from coupled.terminal import check_json, err, give_json, out, progress, say
 
 if TYPE_CHECKING:
     import polars as pl
@@ -33,8 +33,8 @@ def check(
     """Fly runs and hold them against their expectations; exit code 1 if any fails."""
     from coupled.campaign.check import check_run, read_expecting
     from coupled.campaign.junit import junit_xml
+    from coupled.cli.tables.campaign import print_verdicts
     from coupled.flight.loop import input_files
-    from coupled.tables.campaign import print_verdicts
 
     found = [read_expecting(name) for name in run]
     names = [scenarios[0].run.name for scenarios in found]
@@ -85,9 +85,9 @@ def sweep(
     """Fly a run over values of its parameters, to one table; called again, it goes on."""
     from coupled.campaign.journal import JOURNAL, opened
     from coupled.campaign.plan import read_plan
-    from coupled.campaign.pool import executor
     from coupled.campaign.sensitivity import INDICES
     from coupled.campaign.sweep import TABLE, fly_sweep, write_table
+    from coupled.parallel import executor
     from coupled.plots.saving import check_format
 
     file = find(name, shipped_sweeps(), "sweep")
@@ -121,11 +121,11 @@ def _show(plan: Plan, found: pl.DataFrame, target: Path, path: Path, json_file: 
     from coupled.campaign.sensitivity import INDICES, sensitivity, write_indices
     from coupled.campaign.survival import limits
     from coupled.campaign.sweep import TABLE
+    from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
     from coupled.plots.campaign import draw_sweep
     from coupled.plots.saving import save
     from coupled.plots.sensitivity import draw_sensitivity
     from coupled.plots.survival import draw_survival
-    from coupled.tables.campaign import print_indices, print_survival, print_sweep
 
     asked, told = plan.sweep, []
     if asked.method == "sensitivity" and asked.samples is not None:

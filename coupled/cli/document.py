@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.channels import ControlName
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
+from coupled.cli.terminal import check_json, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
+from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
-from coupled.terminal import check_json, give_json, out, progress, say
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result
@@ -40,8 +40,8 @@ def document(
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks."""
     from coupled.calibration.documentation import controls_of, surface_travels
     from coupled.calibration.documentation import document as gather
+    from coupled.cli.tables.calibration import print_checks
     from coupled.rig.rigfile import read_rig
-    from coupled.tables.calibration import print_checks
 
     file = find(rig, shipped_rigs(), "rig")
     data = read_rig(file)

@@ -10,13 +10,13 @@ from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, app
 from coupled.cli.rigs import say_stale
+from coupled.cli.terminal import check_json, err, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
-from coupled.terminal import check_json, err, give_json, out, progress, say
 
 if TYPE_CHECKING:
-    from coupled.authority import Flight
+    from coupled.authority.compare import Flight
 
 
 @app.command(
@@ -32,9 +32,9 @@ def compare(
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
-    from coupled.authority import compare as compare_flights
+    from coupled.authority.compare import compare as compare_flights
+    from coupled.cli.tables.flights import print_comparison
     from coupled.flight.scenario import read_run
-    from coupled.tables.flights import print_comparison
 
     scenarios = read_run(run)
     path = figure or Path("out") / f"{scenarios[0].run.name}.png"
@@ -76,12 +76,12 @@ def fly(
     json_file: JsonOption = "",
 ) -> None:
     """Fly one run and write its record, and a manifest beside it."""
-    from coupled.authority import judge
+    from coupled.authority.compare import judge
     from coupled.errors import nearest
     from coupled.flight.loop import fly as fly_scenario
     from coupled.flight.loop import input_files
     from coupled.flight.scenario import CONFIGURATIONS, read_run
-    from coupled.record import check_suffix, manifest_path, write_record
+    from coupled.record.record import check_suffix, manifest_path, write_record
 
     scenarios = {scenario.label: scenario for scenario in read_run(run)}
     if case and case not in scenarios:
@@ -125,7 +125,7 @@ def plot(
     """Draw a record."""
     from coupled.plots.flights import draw_record
     from coupled.plots.saving import check_format, save
-    from coupled.record import check_suffix, read_record
+    from coupled.record.record import check_suffix, read_record
 
     check_suffix(record)
     path = figure or record.with_suffix(".png")

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from coupled.channels import CONTROL_NAMES, ControlName
 from coupled.cli.app import JsonOption, app
+from coupled.cli.terminal import check_json, give_json, out, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
+from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
-from coupled.terminal import check_json, give_json, out, progress, say
 
 if TYPE_CHECKING:
     from coupled.gap.diagnose import Diagnosis
-    from coupled.record import Record
+    from coupled.record.record import Record
 
 
 @app.command(
@@ -97,7 +97,7 @@ def _diagnose(
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
     from coupled.gap.report import add_report
-    from coupled.record import read_record
+    from coupled.record.record import read_record
     from coupled.rig.rigfile import read_rig
 
     nominal = read_rig(rig_file)
@@ -120,8 +120,8 @@ def _power(whole: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _print(whole: Diagnosis) -> None:
+    from coupled.cli.tables.gaps import print_closed_loop, print_power, print_stages
     from coupled.gap.words import in_words
-    from coupled.tables.gaps import print_closed_loop, print_power, print_stages
 
     out.print(in_words(whole.found, whole.control), markup=False, highlight=False)
     print_stages(out, whole.found)
@@ -164,8 +164,8 @@ def _draw(folder: Path, whole: Diagnosis, records: dict[str, Record], aloud: boo
 
 def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None:
     """Diagnose every record of a folder, each alone; print and write a summary."""
+    from coupled.cli.tables.gaps import print_summary
     from coupled.gap.batch import jobs, run_all, summary
-    from coupled.tables.gaps import print_summary
 
     if len(folders) > 1:
         raise InputError(folders[1], "", "a folder of records is diagnosed by itself")

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.terminal import check_json, give_json, out, say
 from coupled.files import check_target
 from coupled.resources import shipped_rigs
-from coupled.terminal import check_json, give_json, out, say
 
 
 @app.command(
@@ -32,10 +32,10 @@ def import_log(
     json_file: JsonOption = "",
 ) -> None:
     """Make a record of your own log, and tell whether each channel can be true."""
-    from coupled.logs.importing import import_log as import_file
-    from coupled.record import check_suffix, manifest_path, write_record
+    from coupled.cli.tables.logs import print_account
+    from coupled.record.importing.convert import import_log as import_file
+    from coupled.record.record import check_suffix, manifest_path, write_record
     from coupled.resources import find
-    from coupled.tables.logs import print_account
 
     path = output or Path("out") / f"{log.stem}.csv"
     check_suffix(path)

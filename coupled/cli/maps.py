@@ -9,10 +9,10 @@ import typer
 
 from coupled.cli.app import app
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.cli.terminal import progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.resources import find, shipped_rigs
-from coupled.terminal import progress, say
 
 
 @app.command(
@@ -32,12 +32,12 @@ def draw_map(
     ] = None,
 ) -> None:
     """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
-    from coupled.maps import envelope, feel, loss_maps, shipped_flights
+    from coupled.authority.maps import envelope, feel, loss_maps, shipped_flights
+    from coupled.cli.tables.maps import write_feel, write_losses
     from coupled.plots.maps import draw_feel, draw_losses
     from coupled.plots.saving import check_format, save
-    from coupled.record import check_suffix, read_record
+    from coupled.record.record import check_suffix, read_record
     from coupled.rig.rigfile import read_rig
-    from coupled.tables.maps import write_feel, write_losses
 
     file = find(rig, shipped_rigs(), "rig")
     data = read_rig(file)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coupled.channels import CONTROL_NAMES, ControlName
+from coupled.cli.terminal import err
 from coupled.errors import InputError, nearest
+from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
-from coupled.terminal import err
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments

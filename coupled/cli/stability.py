@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from coupled.channels import unit_of
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.cli.terminal import check_json, give_json, out, progress, say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target
+from coupled.record.channels import unit_of
 from coupled.resources import find, shipped_rigs
-from coupled.terminal import check_json, give_json, out, progress, say
 
 
 @app.command(
@@ -37,13 +37,13 @@ def stability(
 
     Against the host's K̂, the frame of a digital product, the hand's stiffness and the servo.
     """
+    from coupled.authority.stability.aircraft import bob_weight
+    from coupled.authority.stability.limits import disagreement, tell
+    from coupled.authority.stability.planes import KINDS, plane
+    from coupled.cli.tables.stability import print_limits, write_planes
     from coupled.plots.saving import check_format, save
     from coupled.plots.stability import draw_stability
     from coupled.rig.rigfile import read_rig
-    from coupled.stability.aircraft import bob_weight
-    from coupled.stability.limits import disagreement, tell
-    from coupled.stability.planes import KINDS, plane
-    from coupled.tables.stability import print_limits, write_planes
 
     file = find(rig, shipped_rigs(), "rig")
     data = read_rig(file)

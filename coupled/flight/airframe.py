@@ -21,7 +21,6 @@ import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import LONGITUDINAL, SURFACES, motion_channels
 from coupled.errors import InputError, nearest
 from coupled.flight.altered import altered
 from coupled.flight.everyframe import (
@@ -34,6 +33,7 @@ from coupled.flight.everyframe import (
 from coupled.flight.gusts import dryden, gusty
 from coupled.flight.loading import load
 from coupled.flight.newton import newton_trim
+from coupled.record.channels import LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupled.channels import LONGITUDINAL
+from coupled.record.channels import LONGITUDINAL
 from coupled.rig.parameters import Flight
 
 if TYPE_CHECKING:

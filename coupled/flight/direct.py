@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 
-from coupled.channels import SURFACES, motion_channels
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.record.channels import SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from coupled.channels import SURFACES, ControlName
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe
+from coupled.record.channels import SURFACES, ControlName
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.schema import Section, named, quantity
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from coupled.channels import LATERAL, LONGITUDINAL
+from coupled.record.channels import LATERAL, LONGITUDINAL
 from coupled.units import FOOT_m, PSF_Pa
 
 # JSBSim's property behind each motion channel, in the channels' order.

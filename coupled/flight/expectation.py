@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from coupled.channels import CONTROL_NAMES, ControlName, channel
 from coupled.errors import InputError, nearest
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel
 from coupled.schema import Section, named, quantity
 
 Figure = Literal[

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import TIME, ControlName, control_channels, record_channels
 from coupled.errors import InputError
 from coupled.files import sha256
 from coupled.flight.airframe import ALTITUDE, JSBSimAirframe
@@ -27,7 +26,8 @@ from coupled.flight.conditions import meet
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.pilot import Action, Table
 from coupled.flight.scenario import Scenario
-from coupled.record import Record
+from coupled.record.channels import TIME, ControlName, control_channels, record_channels
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
 from coupled.rig.frame import step_frame_there, whereabouts

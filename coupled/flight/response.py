@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import LONGITUDINAL, ControlName
 from coupled.flight.airframe import ALTITUDE, SPEED, JSBSimAirframe
+from coupled.record.channels import LONGITUDINAL, ControlName
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 

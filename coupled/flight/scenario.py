@@ -13,11 +13,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from coupled.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.errors import InputError, nearest
 from coupled.flight.conditions import Conditions, build_conditions
 from coupled.flight.expectation import Expect, check_expectations
 from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, Track, read_force_table
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.resources import find, shipped_rigs, shipped_runs
 from coupled.rig.parameters import PLAIN_NAME, Rig
 from coupled.rig.rigfile import change, read_rig

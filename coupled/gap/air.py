@@ -23,7 +23,7 @@ from scipy.linalg import solveh_banded
 
 from coupled.gap.output import white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
-from coupled.record import Record
+from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
 NEEDS = ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")

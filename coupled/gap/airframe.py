@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import motion_channels
 from coupled.flight.airframe import SPEED, JSBSimAirframe
 from coupled.gap.air import Air, vertical_air
 from coupled.gap.output import Output, spread, white
 from coupled.gap.surfaces import commands, surface_channel
-from coupled.record import Record
+from coupled.record.channels import motion_channels
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight, Rig
 

@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import coupled
-from coupled.campaign.pool import executor
 from coupled.errors import InputError, nearest
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
 from coupled.gap.report import add_report
-from coupled.record import read_record
+from coupled.parallel import executor
+from coupled.record.record import read_record
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from coupled.channels import ControlName
 from coupled.gap.effects import SETTINGS, Effect
 from coupled.gap.fit import Fit, fit
 from coupled.gap.output import Output, Part, stage_gaps
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
 
 SETTLE = 1.05  # gap from which a stage's settings are worth fitting

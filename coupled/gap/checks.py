@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupled.channels import ControlName, channel
 from coupled.errors import InputError
-from coupled.logs import plausible
-from coupled.record import Record
+from coupled.record.channels import ControlName, channel
+from coupled.record.importing import plausible
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 
 ANOTHER = 2.0  # factor on the gradient beyond which a rig file is another rig's

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from coupled.channels import ControlName
 from coupled.gap.case import Case, Tell
 from coupled.gap.effects import BY_NAME, EFFECTS, SETTINGS, TOLERANCE, Effect, apply
 from coupled.gap.fit import Fit, shows_in
 from coupled.gap.output import Output, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
 
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from coupled.channels import ControlName
 from coupled.errors import InputError
 from coupled.gap.air import can_tell_air, spread_of_air
 from coupled.gap.airframe import airframe_outputs, needs, trim_speed
@@ -27,7 +26,8 @@ from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
 from coupled.gap.surfaces import surface_points
 from coupled.gap.where import remains, where
-from coupled.record import Record
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 
 # What the search is sure of is right in so many of 100 blind trials; where structure is left, an

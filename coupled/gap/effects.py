@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from coupled.channels import ControlName, unit_of
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.parameters import Rig
 
 Mode = Literal["value", "factor", "added", "switch"]

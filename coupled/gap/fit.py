@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from coupled.channels import ControlName
 from coupled.gap.effects import Effect, Parameter, apply
 from coupled.gap.output import Output, Part, memory
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]

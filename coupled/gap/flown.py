@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName, channel
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.pilot import Action, Pilot
@@ -17,7 +16,8 @@ from coupled.flight.scenario import Bench, RunFile, Scenario
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
-from coupled.record import Record
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
 from coupled.rig.parameters import Control, Rig
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName, channel, noisy_channels
 from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.case import Case
@@ -24,7 +23,8 @@ from coupled.gap.flown import fly_force
 from coupled.gap.output import Output, white
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
-from coupled.record import Record
+from coupled.record.channels import ControlName, channel, noisy_channels
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]

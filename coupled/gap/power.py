@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName
 from coupled.gap.effects import (
     EFFECTS,
     SETTINGS,
@@ -27,6 +26,7 @@ from coupled.gap.effects import (
 )
 from coupled.gap.fit import touched
 from coupled.gap.output import Output
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]

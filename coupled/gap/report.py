@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.flown import closed_loop
 from coupled.gap.next_test import in_one_line, next_test
-from coupled.record import Record
+from coupled.record.record import Record
 
 
 def add_report(whole: Diagnosis, records: Mapping[str, Record]) -> None:

@@ -22,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import SURFACES, ControlName, channel
 from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
-from coupled.record import Record
+from coupled.record.channels import SURFACES, ControlName, channel
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
     drive_linkage,

@@ -13,12 +13,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import SURFACES, ControlName, channel, motion_channels
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.output import white
 from coupled.gap.smooth import Smoother, smoothed
-from coupled.record import Record
+from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight, Rig
 from coupled.rig.replay import replay_surface

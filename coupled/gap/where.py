@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, welch
 
-from coupled.channels import ControlName, channel, unit_of
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
-from coupled.record import Record
+from coupled.record.channels import ControlName, channel, unit_of
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
-from coupled.channels import ControlName
 from coupled.files import write_whole
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.pages import (
@@ -26,6 +25,7 @@ from coupled.plots.pages import (
 )
 from coupled.plots.readings import draw_readings
 from coupled.plots.saving import save
+from coupled.record.channels import ControlName
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:

@@ -11,15 +11,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.campaign.words import parameter
-from coupled.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.errors import InputError
-from coupled.record import Record
+from coupled.record.channels import CONTROL_NAMES, channel, control_channels, unit_of
+from coupled.record.record import Record
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.statics import specified_force
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
-    from coupled.authority import Flight
+    from coupled.authority.compare import Flight
 
 _STYLE = {
     "rigid": ("black", (0, (1, 1)), 2.2),

@@ -11,7 +11,7 @@ from coupled.plots.chain import draw_stages
 from coupled.plots.gapview import View
 from coupled.plots.ladder import draw_ladder
 from coupled.plots.signatures import draw_signature
-from coupled.record import Record
+from coupled.record.record import Record
 
 FIGURES = {
     "ladder.png": draw_ladder,

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from coupled.channels import CONTROL_NAMES, channel
 from coupled.gap.choose import bar
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.effects import SETTINGS, Effect, apply
@@ -16,7 +15,8 @@ from coupled.gap.fit import shows_in
 from coupled.gap.output import CLEAR, Floats, Output, white
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
-from coupled.record import Record
+from coupled.record.channels import CONTROL_NAMES, channel
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import replay_compensation
 from coupled.units import DEGREE_rad

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from coupled.channels import ControlName
 from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, panels, scale, with_legend
+from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
 
 if TYPE_CHECKING:
-    from coupled.maps import Feel, Floats, LossMap
+    from coupled.authority.maps import Feel, Floats, LossMap
 
 _STYLES = {
     "rigid": ("specified", GRAY, "solid", 4.5),

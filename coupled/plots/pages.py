@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from coupled.channels import unit_of
+from coupled.record.channels import unit_of
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:

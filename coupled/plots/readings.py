@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.channels import unit_of
 from coupled.plots.pages import plain, scale
+from coupled.record.channels import unit_of
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupled.channels import channel, unit_of
 from coupled.gap.air import vertical_air
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import command_of, surface_channel, surface_points
+from coupled.record.channels import channel, unit_of
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Loader, Rig
 from coupled.rig.replay import replay_product, replay_surface

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from coupled.channels import ControlName
+from coupled.authority.stability.limits import gradient_range
+from coupled.authority.stability.planes import Kind, Plane
 from coupled.plots.pages import panels
+from coupled.record.channels import ControlName
 from coupled.rig.parameters import Rig
-from coupled.stability.limits import gradient_range
-from coupled.stability.planes import Kind, Plane
 from coupled.units import MILLISECOND_s
 
 _FASTEST = 100.0  # 1/s, the ends of the colours

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from coupled.channels import unit_of
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, plain, residual_shown, unit_shown, words
+from coupled.record.channels import unit_of
 
 _BINS = 24
 _DOTS = 2500

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from coupled.channels import ControlName
+from coupled.record.channels import ControlName
 from coupled.schema import Section, quantity
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.

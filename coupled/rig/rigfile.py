@@ -13,8 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from coupled.channels import CONTROL_NAMES, SURFACES, noisy_channels, unit_of
 from coupled.errors import InputError, nearest
+from coupled.record.channels import CONTROL_NAMES, SURFACES, noisy_channels, unit_of
 from coupled.rig.loader import DELAY_SLOTS
 from coupled.rig.parameters import Control, Flight, Rig
 from coupled.rig.schedule import MAX_ROWS

@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from coupled.channels import unit_of
+from coupled.record.channels import unit_of
 from coupled.rig.parameters import Rig
 from coupled.schema import Section, file_keys
 

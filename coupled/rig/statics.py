@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from coupled.channels import ControlName
+from coupled.record.channels import ControlName
 from coupled.rig.compensation import estimate
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients

@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName
+from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.loader import move_loader, set_external, start_delay

@@ -13,7 +13,7 @@ from coupled.calibration.calibrate import calibrate
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
-from tests.calibration.made import report_rig
+from tests.support.readings import report_rig
 
 USUAL = usual_instruments("column")
 

@@ -14,9 +14,9 @@ import pytest
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.report import add_report
-from coupled.record import write_record
+from coupled.record.record import write_record
 from coupled.rig.rigwrite import rig_text
-from tests.gap import made
+from tests.support import gaps
 
 PEAK = """
 import resource, sys
@@ -40,9 +40,9 @@ finally:
 def test_a_60_s_record_is_diagnosed_in_under_10_s(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, values: dict[str, float]
 ) -> None:
-    monkeypatch.setattr(made, "LONG_s", 60.0)
-    nominal = made.nominal_rig(True)
-    record = made.made(tmp_path, nominal, {name: values}, 21)
+    monkeypatch.setattr(gaps, "LONG_s", 60.0)
+    nominal = gaps.nominal_rig(True)
+    record = gaps.made(tmp_path, nominal, {name: values}, 21)
     assert record.time_s[-1] > 59.0
     diagnose(nominal, {"r": record.between(0.0, 12.0)}, "column")
     start = time.perf_counter()
@@ -55,9 +55,9 @@ def test_a_60_s_record_is_diagnosed_in_under_10_s(
 
 
 def test_memory_of_a_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(made, "LONG_s", 60.0)
-    nominal = made.nominal_rig(True)
-    record = made.made(tmp_path, nominal, {"inertia": {"factor": 1.4}}, 21)
+    monkeypatch.setattr(gaps, "LONG_s", 60.0)
+    nominal = gaps.nominal_rig(True)
+    record = gaps.made(tmp_path, nominal, {"inertia": {"factor": 1.4}}, 21)
     write_record(record, tmp_path / "r.csv")
     (tmp_path / "rig.toml").write_text(rig_text(nominal, "a rig"))
     done = subprocess.run(
@@ -73,8 +73,8 @@ def test_false_alarms_on_records_without_an_effect(tmp_path: Path) -> None:
     alarms = 0
     for seed in range(100, 110):
         for flown in (False, True):
-            nominal = made.nominal_rig(flown)
-            record = made.made(tmp_path, nominal, {}, seed)
+            nominal = gaps.nominal_rig(flown)
+            record = gaps.made(tmp_path, nominal, {}, seed)
             found = diagnose(nominal, {"r": record}, "column").found
             alarms += found["verdict"] != "no_gap"
     print(f"\nfalse alarms: {alarms} of 20")

@@ -74,7 +74,7 @@ import resource, sys
 from pathlib import Path
 from tests.benchmarks.test_frame_cost import of
 from coupled.flight.loop import fly
-from coupled.record import write_record
+from coupled.record.record import write_record
 fly(of("three-controls", 3, 10))
 write_record(fly(of("three-controls", 3, 10)), Path({str(tmp_path)!r}) / "a.csv")
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.blind.effects import EFFECTS
-from coupled.blind.key import check_seal, read_key
-from coupled.blind.make import make
-from coupled.blind.measure import stage_gaps
-from coupled.blind.trial import SHARES, plans
+from coupled.blind.trials.key import check_seal, read_key
+from coupled.blind.trials.make import make
+from coupled.blind.trials.measure import stage_gaps
+from coupled.blind.trials.trial import SHARES, plans
+from coupled.blind.twin.effects import EFFECTS
 from coupled.errors import InputError
-from coupled.record import read_record
+from coupled.record.record import read_record
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 from tests.test_cli import coupled, files

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from coupled.blind.answers import read_answers
-from coupled.blind.key import key_text, seal_text
-from coupled.blind.score import score, share
+from coupled.blind.trials.answers import read_answers
+from coupled.blind.trials.key import key_text, seal_text
+from coupled.blind.trials.score import score, share
 from coupled.errors import InputError
 from tests.test_cli import coupled, files
 

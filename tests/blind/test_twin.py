@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.blind.effects import EFFECTS, dryden
-from coupled.blind.excitation import SHAPES, pilot_force, pilot_shape
-from coupled.blind.kernel import NODES
-from coupled.blind.kinds import Clean, Draw
-from coupled.blind.measure import stage_gaps
-from coupled.blind.outsiders import OUTSIDERS
-from coupled.blind.rigs import random_rig, shipped_pool
-from coupled.blind.setting import NOISE, draw_setting, fly_clean
-from coupled.blind.twin import Twin, airframe, fly_twin, nominal_twin
+from coupled.blind.trials.measure import stage_gaps
+from coupled.blind.trials.rigs import random_rig, shipped_pool
+from coupled.blind.twin.effects import EFFECTS, dryden
+from coupled.blind.twin.excitation import SHAPES, pilot_force, pilot_shape
+from coupled.blind.twin.kernel import NODES
+from coupled.blind.twin.kinds import Clean, Draw
+from coupled.blind.twin.outsiders import OUTSIDERS
+from coupled.blind.twin.setting import NOISE, draw_setting, fly_clean
+from coupled.blind.twin.twin import Twin, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
 from coupled.flight.pilot import Table
 from coupled.flight.scenario import Bench, RunFile, Scenario
 from coupled.gap.effects import BY_NAME
-from coupled.record import Record
+from coupled.record.record import Record
 from coupled.rig.parameters import Rig
 from coupled.schema import build
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.authority import compare
+from coupled.authority.compare import compare
 from coupled.calibration.belief import Scales, real_scales, with_calibration
 from coupled.calibration.bench import Bench, _meters_rig, _null, take_readings
 from coupled.calibration.calibrate import calibrate
@@ -17,19 +17,19 @@ from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
 from coupled.calibration.outcome import deflection_off, felt_off
 from coupled.calibration.plan import stations
-from coupled.channels import ControlName
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
+from coupled.record.channels import ControlName
 from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.rig.statics import static_line
 from coupled.rig.told import run_told, under_supply
-from tests.calibration.made import report_rig
-from tests.rigs import G_STIFF, K_REPORT
-from tests.rigs import bench as bench_rig
+from tests.support.readings import report_rig
+from tests.support.rigs import G_STIFF, K_REPORT
+from tests.support.rigs import bench as bench_rig
 
 CHANGES: dict[str, Any] = {
     "controls.column.loader.breakout_N": 8.0,

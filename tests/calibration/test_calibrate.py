@@ -18,7 +18,7 @@ from coupled.errors import InputError
 from coupled.rig.parameters import Control
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.calibration.made import S1, K, column, csv_file, grid, readings, report_rig, with_errors
+from tests.support.readings import S1, K, column, csv_file, grid, readings, report_rig, with_errors
 
 USUAL = usual_instruments("column")
 

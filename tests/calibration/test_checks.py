@@ -22,7 +22,7 @@ from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
 from coupled.flight.scenario import configure
 from coupled.rig.parameters import Rig
 from coupled.rig.statics import bend_loss, uncompensated_loss
-from tests.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def oscillator(omega: float, zeta: float, start: float = 0.1) -> Release:

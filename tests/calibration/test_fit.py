@@ -18,7 +18,7 @@ from coupled.calibration.estimate import (
 )
 from coupled.calibration.fit import condition, normal_equations, ordinary
 from coupled.calibration.sandwich import sandwich
-from tests.calibration.made import S1, S3, K, grid, readings, with_errors
+from tests.support.readings import S1, S3, K, grid, readings, with_errors
 
 USUAL = usual_instruments("column")
 COARSE = Instruments(2.5e-3, 3.0, 0.3, 0.0, 0.0, 0.0, 0.0)

@@ -10,8 +10,8 @@ from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Estimate, usual_instruments
 from coupled.calibration.outcome import deflection_off, expected, felt_off
 from coupled.rig.statics import static_line
-from tests.calibration.made import S1, S2, S3, K, column, grid, with_errors
-from tests.rigs import G_STIFF, K_REPORT, bench
+from tests.support.readings import S1, S2, S3, K, column, grid, with_errors
+from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def test_closed_forms_are_the_rigs_statics() -> None:

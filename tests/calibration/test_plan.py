@@ -11,8 +11,8 @@ from coupled.calibration.plan import fewest, form, gradient_sets, precision, sta
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
-from tests.calibration.made import K, report_rig, with_errors
-from tests.rigs import bench as bench_rig
+from tests.support.readings import K, report_rig, with_errors
+from tests.support.rigs import bench as bench_rig
 
 USUAL = usual_instruments("column")
 

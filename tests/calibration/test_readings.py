@@ -13,7 +13,7 @@ from coupled.calibration.plan import stations
 from coupled.calibration.readingsfile import read_readings, write_readings
 from coupled.errors import InputError
 from coupled.units import POUND_N, DEGREE_rad, INCH_m
-from tests.calibration.made import CSV, csv_file, report_rig
+from tests.support.readings import CSV, csv_file, report_rig
 
 
 def test_inches_and_pounds_become_si(tmp_path: Path) -> None:

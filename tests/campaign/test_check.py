@@ -12,14 +12,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from coupled.authority import Flight, Outcome
+from coupled.authority.compare import Flight, Outcome
 from coupled.campaign.check import check_run, read_expecting
 from coupled.campaign.standards import judge_standard
 from coupled.campaign.verdict import UnjudgedError, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect, Figure
 from coupled.flight.scenario import read_run
-from coupled.record import Record
+from coupled.record.record import Record
 from coupled.resources import shipped_runs
 from coupled.schema import build
 from tests.test_cli import coupled, files

@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from coupled.campaign.journal import opened
 from coupled.campaign.plan import jobs, read_plan
-from coupled.campaign.pool import Here
 from coupled.campaign.sensitivity import Floats, design, sensitivity, sobol
 from coupled.campaign.sweep import fly_sweep
 from coupled.cli import app
 from coupled.errors import InputError
+from coupled.parallel import Here
 from coupled.resources import shipped_sweeps
 from tests.campaign.test_check import BENCH
 

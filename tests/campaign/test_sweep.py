@@ -19,14 +19,14 @@ import pytest
 
 from coupled.campaign.journal import JOURNAL, opened
 from coupled.campaign.plan import Plan, jobs, read_plan
-from coupled.campaign.pool import Here, executor
 from coupled.campaign.sweep import fly_job, fly_sweep, write_table
 from coupled.campaign.words import parameter
 from coupled.errors import InputError
+from coupled.parallel import Here, executor
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
 from tests.campaign.test_check import BENCH
-from tests.processes import begun, kill
+from tests.support.processes import begun, kill
 from tests.test_cli import SHORT, coupled, files
 
 BEND = "rig.controls.column.loader.bend_m_per_N"
@@ -347,7 +347,7 @@ def test_a_cluster_of_two_workers_makes_the_same_table(folder: Path) -> None:
 def test_a_cluster_that_does_not_answer_is_one_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coupled.campaign.pool._PATIENCE_s", 0.5)
+    monkeypatch.setattr("coupled.parallel._PATIENCE_s", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with (
             pytest.raises(InputError, match=r"--cluster: .* does not answer"),

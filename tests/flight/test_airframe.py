@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from coupled.channels import LONGITUDINAL
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.direct import check_direct_controls
+from coupled.record.channels import LONGITUDINAL
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from coupled.channels import LONGITUDINAL, motion_channels
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.direct import check_direct_controls
+from coupled.record.channels import LONGITUDINAL, motion_channels
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.units import KNOT_m_per_s
-from tests.flight.awjsra import CLEAN, HOME, RIG, script, validation
+from tests.support.awjsra import CLEAN, HOME, RIG, script, validation
 
 FRAME = 1 / 120
 CONTROLS = ["column", "wheel", "pedals"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.flight.awjsra import CLEAN, HOME, LEVERS, fly, place, trimmed
+from tests.support.awjsra import CLEAN, HOME, LEVERS, fly, place, trimmed
 
 CONTROLS = ("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm")
 

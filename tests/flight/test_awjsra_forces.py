@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.flight.awjsra import LEVERS, place, trimmed
+from tests.support.awjsra import LEVERS, place, trimmed
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly, make_airframe
 from coupled.flight.scenario import Scenario, read_run
-from coupled.record import Record
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.units import POUND_N, FOOT_m
 

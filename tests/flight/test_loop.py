@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.channels import record_channels
 from coupled.flight import loop
 from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
-from coupled.record import manifest_path, read_record, write_record
+from coupled.record.channels import record_channels
+from coupled.record.record import manifest_path, read_record, write_record
 
 RUN = """
 name = "test"

@@ -21,7 +21,7 @@ from coupled.flight.pilot.crossover import (
 from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import elevator_response
 from coupled.flight.scenario import Scenario, read_run
-from coupled.record import Record
+from coupled.record.record import Record
 
 RUN = """
 name = "test"

@@ -11,7 +11,7 @@ from coupled.errors import InputError
 from coupled.flight.pilot import edges, read_force_table
 from coupled.flight.scenario import CONFIGURATIONS, configure, read_run
 from coupled.resources import shipped_runs
-from tests.rigs import K_REPORT, bench
+from tests.support.rigs import K_REPORT, bench
 
 RUN = """
 name = "test"

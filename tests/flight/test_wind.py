@@ -11,7 +11,7 @@ import pytest
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
-from coupled.record import Record
+from coupled.record.record import Record
 
 RUN = """
 name = "windy"

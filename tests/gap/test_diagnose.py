@@ -16,10 +16,10 @@ from coupled.gap.effects import BY_NAME, EFFECTS, apply
 from coupled.gap.output import white
 from coupled.gap.smooth import smoothed
 from coupled.gap.words import in_words
-from coupled.record import Record, read_record, write_record
+from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
-from tests.gap.made import made, nominal_rig
 from tests.reference.test_records import FOUNDERS, OWN, RECORDS, available
+from tests.support.gaps import made, nominal_rig
 from tests.test_cli import ROOT, coupled
 
 SINGLES: list[tuple[bool, str, dict[str, float]]] = [

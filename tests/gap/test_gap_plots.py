@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coupled.channels import unit_of
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.choose import Candidate, Choice, Step
 from coupled.gap.diagnose import Diagnosis, diagnose
@@ -26,9 +25,10 @@ from coupled.plots.gapview import View, unit_shown, words
 from coupled.plots.saving import save
 from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import SIGNATURES, draw_signature
-from coupled.record import Record, write_record
+from coupled.record.channels import unit_of
+from coupled.record.record import Record, write_record
 from coupled.rig.parameters import Rig
-from tests.gap.made import made, nominal_rig
+from tests.support.gaps import made, nominal_rig
 from tests.test_cli import coupled
 
 Case = tuple[Rig, Record, tuple[Output, ...]]

@@ -19,12 +19,12 @@ from coupled.gap.screen import screen
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.gap.words import in_words
-from coupled.record import write_record
+from coupled.record.record import write_record
 from coupled.rig.parameters import Rig
 from coupled.rig.rigwrite import rig_text
-from tests.gap.made import made, nominal_rig
-from tests.processes import begun, kill
-from tests.rigs import BENCH, bench
+from tests.support.gaps import made, nominal_rig
+from tests.support.processes import begun, kill
+from tests.support.rigs import BENCH, bench
 
 RATE_Hz = 100.0
 RIG = nominal_rig(False)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.channels import ControlName, noisy_channels
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects import BY_NAME, apply
 from coupled.gap.flown import closed_loop, fly_force
 from coupled.gap.surfaces import surface_points
-from coupled.record import Record
+from coupled.record.channels import ControlName, noisy_channels
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig

@@ -14,11 +14,11 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.power import power
 from coupled.gap.report import add_report
 from coupled.gap.words import in_words
-from coupled.record import Record, read_record, write_record
+from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.gap.made import made, nominal_rig
 from tests.reference.test_records import FOUNDERS
+from tests.support.gaps import made, nominal_rig
 from tests.test_cli import coupled
 
 REAL = FOUNDERS.parent / "real"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.scenario import read_run
-from coupled.record import Record, read_record
+from coupled.record.record import Record, read_record
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
     replay_compensation,

@@ -16,7 +16,7 @@ from coupled.rig.packing import pack
 from coupled.rig.parameters import Rig
 from coupled.rig.replay import drive_loader, replay_linkage, replay_schedule, replay_surface
 from coupled.rig.statics import bend_loss, static_line, static_point, uncompensated_loss
-from tests.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 SCHEDULE = "controls.column.schedule"
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from coupled.flight.loop import fly
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, RunFile, Scenario, configure
-from coupled.record import Record
+from coupled.record.record import Record
 from coupled.schema import build
-from tests.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def run(

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupled.rig.replay import drive_loader
-from tests.rigs import bench, push
+from tests.support.rigs import bench, push
 
 M, C, K = 4.0, 75.0, 560.0
 PLAIN = {"bend_m_per_N": 0.0, "controls.column.compensation.bend_m_per_N": 0.0}

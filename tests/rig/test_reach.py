@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.channels import ControlName, channel, unit_of
 from coupled.flight.loop import fly
 from coupled.flight.pilot import PILOTS
 from coupled.flight.scenario import Bench, Configuration, RunFile, Scenario, configure
-from coupled.record import Record
+from coupled.record.channels import ControlName, channel, unit_of
+from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.parameters import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.schema import build
-from tests.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 REACH = 0.12  # m
 SHARE = K_REPORT * G_STIFF

@@ -12,7 +12,7 @@ from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import change, read_rig, rig_from_table
 from coupled.rig.rigwrite import rig_text
-from tests.rigs import BENCH, bench
+from tests.support.rigs import BENCH, bench
 
 LOADER = "controls.column.loader"
 SCHEDULE = "controls.column.schedule"

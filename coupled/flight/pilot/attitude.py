@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from coupled.channels import LONGITUDINAL
 from coupled.flight.pilot.base import STRONGEST, Action, Pilot, edges
+from coupled.record.channels import LONGITUDINAL
 from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
 from coupled.schema import quantity

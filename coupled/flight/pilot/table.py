@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from coupled.channels import TIME, channel
-from coupled.csvfile import read_columns
 from coupled.errors import InputError, nearest
 from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot
+from coupled.record.channels import TIME, channel
+from coupled.record.csvfile import read_columns
 from coupled.rig.parameters import Control
 from coupled.schema import quantity
 

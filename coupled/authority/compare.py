@@ -1,0 +1,199 @@
+"""Authority: what the bend takes away in flight terms, and what each correction gives back.
+
+One scenario is flown in the five configurations; an `Outcome` holds the figures of one
+flight. Loss and feel are read while the control stands still, held at half or more of its
+greatest deflection, beside the closed form of the rig's statics there (which leaves friction
+out). Breakout and bob weight are taken off the force before it is compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.flight.loop import fly
+from coupled.flight.scenario import Configuration, Scenario
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Rig
+from coupled.rig.statics import specified_force, static_point
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+_RATE = {"column": "pitch_rate", "wheel": "roll_rate", "pedals": "yaw_rate"}
+_ATTITUDE = {"column": "pitch_rad", "wheel": "roll_rad", "pedals": "heading_rad"}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The figures of one flight; SI, shares without unit, None where there is none."""
+
+    case: str
+    configuration: str
+    control: str
+    asked_norm: float  # surface command that the held deflection asks for, of ±1
+    reached_norm: float  # surface command reached
+    loss: float  # share of the asked command that is lost
+    loss_closed_form: float  # the same by the rig's statics
+    felt_ratio: float  # force felt over force specified, breakout apart
+    felt_ratio_closed_form: float
+    force_N: float  # greatest force of the pilot
+    force_step_N: float  # greatest jump of the modifying force from frame to frame
+    peak_rate_rad_per_s: float | None  # of pitch, roll or yaw, to the pilot's side
+    peak_load_factor: float | None
+    time_to_attitude_s: float | None  # from the pilot's start
+    ended_early: str  # why, or empty
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures by name, as JSON takes them (no NaN)."""
+        items = asdict(self).items()
+        return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in items}
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight of a comparison."""
+
+    scenario: Scenario
+    configuration: Configuration
+    record: Record
+    outcome: Outcome
+
+
+def compare(scenarios: list[Scenario], progress: Progress | None = None) -> list[Flight]:
+    """Fly every case in every configuration that its run asks for.
+
+    `progress` is called with what is flown, frames done and frames in all.
+    """
+    flights = []
+    total = sum(s.frames * len(s.run.configurations) for s in scenarios)
+    before = 0
+    for scenario in scenarios:
+        for configuration in scenario.run.configurations:
+            configured = scenario.configured(configuration)
+            label = f"{scenario.label}, {configuration}"
+
+            def report(done: int, _: int, label: str = label, before: int = before) -> None:
+                if progress is not None:
+                    progress(label, before + done, total)
+
+            record = fly(configured, report)
+            before += scenario.frames
+            outcome = judge(configured, configuration, record)
+            flights.append(Flight(configured, configuration, record, outcome))
+            if record.manifest["ended_early"] and outcome.ended_early.startswith("interrupted"):
+                return flights
+    return flights
+
+
+def judge(scenario: Scenario, configuration: str, record: Record) -> Outcome:
+    """Return the figures of a flight's record."""
+    control, rig = scenario.control, scenario.rig
+    ended = record.manifest["ended_early"]
+    why = f"{ended['reason']} at {ended['time_s']:.2f} s" if ended else ""
+    nan = float("nan")
+    if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
+        return Outcome(scenario.label, configuration, control, *(nan,) * 8, None, None, None, why)
+    deflection = record[channel(control, "deflection")]
+    force = record[channel(control, "force")]
+    held = _where_held(record.time_s, deflection)
+    side = float(np.sign(np.mean(deflection[held])))
+    asked, reached = _asked_and_reached(rig, control, record, held)
+    felt, specified = _felt_and_specified(rig, control, record, held)
+    pressure = float(np.mean(record["dynamic_pressure_Pa"][held]))
+    point = static_point(rig, control, pressure, float(np.mean(deflection[held])))
+    breakout = side * rig.controls[control].loader.breakout
+    return Outcome(
+        scenario.label,
+        configuration,
+        control,
+        asked,
+        reached,
+        1.0 - reached / asked,
+        1.0 - float(point.estimate[0] / point.deflection[0]),
+        felt / specified if specified else nan,
+        float((point.force[0] - breakout) / (point.specified[0] - breakout)) if specified else nan,
+        float(np.max(np.abs(force))),
+        float(np.max(np.abs(record[channel(control, "force_step")]))),
+        *_motion_figures(scenario, control, record, side),
+        why,
+    )
+
+
+def held_forces(scenario: Scenario, control: ControlName, record: Record) -> tuple[float, float]:
+    """Return the mean force felt and specified where a control is held, N; NaN if it never moves.
+
+    Breakout and bob weight are taken off both.
+    """
+    deflection = record[channel(control, "deflection")]
+    if len(record) < 2 or not np.any(deflection):
+        return float("nan"), float("nan")
+    held = _where_held(record.time_s, deflection)
+    return _felt_and_specified(scenario.rig, control, record, held)
+
+
+def _where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
+    """Return the rows at which the control is held: far out on the peak's side, and still.
+
+    Still is a speed under 5 % of the peak a second, over ±0.1 s, so that a noisy transducer
+    counts as still too. Where it never is, the rows within 2 % of the peak.
+    """
+    peak = deflection[np.argmax(np.abs(deflection))]
+    share = deflection / peak
+    reach = max(1, round(0.1 / (time_s[1] - time_s[0])))
+    rate = np.full_like(share, np.inf)
+    if len(share) > 2 * reach:
+        span = time_s[2 * reach :] - time_s[: -2 * reach]
+        rate[reach:-reach] = (share[2 * reach :] - share[: -2 * reach]) / span
+    held = (share >= 0.5) & (np.abs(rate) <= 0.05)
+    return np.asarray(held if held.sum() >= reach else share >= 0.98)
+
+
+def _asked_and_reached(
+    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
+) -> tuple[float, float]:
+    data = rig.controls[control]
+    gain = COMMAND_SIGN[data.surface] / data.travel
+    deflection = record[channel(control, "deflection")]
+    asked = np.clip(gain * deflection, -1.0, 1.0)
+    reached = record[channel(control, "surface_norm")]
+    return float(np.mean(asked[held])), float(np.mean(reached[held]))
+
+
+def _felt_and_specified(
+    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Return the mean force felt and specified, breakout and bob weight taken off, N."""
+    deflection = record[channel(control, "deflection")][held]
+    pressure = record["dynamic_pressure_Pa"][held]
+    loader = rig.controls[control].loader
+    preload = np.sign(deflection) * loader.breakout
+    flown = rig.flight is not None
+    weight = loader.bob_weight * (record["load_factor"][held] - 1.0) if flown else 0.0
+    specified = specified_force(rig, control, pressure, deflection)
+    felt = record[channel(control, "force")][held]
+    return float(np.mean(felt - preload - weight)), float(np.mean(specified - preload))
+
+
+def _motion_figures(
+    scenario: Scenario, control: ControlName, record: Record, side: float
+) -> tuple[float | None, float | None, float | None]:
+    """Return peak rate in rad/s, peak load factor, and the time to the attitude in s."""
+    if scenario.rig.flight is None:
+        return None, None, None
+    start = scenario.pilots[control].start if control in scenario.pilots else 0.0
+    rate = side * record[f"{_RATE[control]}_rad_per_s"]
+    load = record["load_factor"]
+    far = load[np.argmax(np.abs(load - load[0]))] if control == "column" else load.max()
+    attitude = np.unwrap(record[_ATTITUDE[control]])
+    there = side * (attitude - attitude[0]) >= scenario.run.measure.attitude_change
+    there &= record.time_s >= start
+    reached = float(record.time_s[np.argmax(there)]) - start if there.any() else None
+    return float(rate.max()), float(far), reached

@@ -1,0 +1,217 @@
+"""Authority maps: what is lost against q̄ and deflection, and stick force per g and per knot.
+
+The loss is the closed form of the rig's statics. Force per g and per knot join them to the
+aircraft: how much elevator a g and a knot take is found by flying it at speeds over the
+schedule, each trimmed in level flight at the rig's altitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.flight.airframe import ELEVATOR, JSBSimAirframe
+from coupled.flight.loop import fly
+from coupled.flight.scenario import CONFIGURATIONS, Configuration, configure, read_run
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder, shipped_runs
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Control, Rig
+from coupled.rig.statics import static_line
+from coupled.schema import load_toml
+from coupled.units import KNOT_m_per_s
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+FELT: tuple[Configuration, ...] = ("rigid", "uncompensated", "compensated")
+_SEA_LEVEL_kg_per_m3 = 1.225
+_LEAST_PRESSURE_Pa = 200.0
+_PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
+_STEP, _PULL_s = 0.01, 3.0  # of the elevator command, and for how long: linear
+_APART_kt = 8.0  # between the two trims whose force is compared
+
+
+@dataclass(frozen=True)
+class LossMap:
+    """Share of the asked deflection that is lost, for one control and configuration.
+
+    `loss` has shape (pressures, deflections); `deflection` in d, all above zero.
+    """
+
+    control: ControlName
+    configuration: Configuration
+    pressure_Pa: Floats
+    deflection: Floats
+    loss: Floats
+
+
+@dataclass(frozen=True)
+class Feel:
+    """Stick forces at the speeds of level trim, shape (speeds,), for each of `FELT`.
+
+    Per g: that of 1 g, by the greatest load factor within 3 s of a small step. Per knot: of level
+    trims 4 kt to either side, pull positive per knot slower. Both are past the breakout.
+    """
+
+    calibrated_airspeed_m_per_s: Floats
+    pressure_Pa: Floats
+    per_g_N: dict[Configuration, Floats]
+    per_knot_N: dict[Configuration, Floats]
+
+
+def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
+    """Return the maps of one control in all configurations but the rigid one."""
+    data = rig.controls[control]
+    pressures = np.linspace(0.0, max(data.schedule.dynamic_pressure), _PRESSURES)
+    deflections = data.travel * np.linspace(0.002, 1.0, _DEFLECTIONS)
+    made = []
+    for name in CONFIGURATIONS[1:]:
+        changed = configure(rig, name)
+        rows = [_loss(changed, control, float(q), deflections) for q in pressures]
+        made.append(LossMap(control, name, pressures, deflections, np.array(rows)))
+    return made
+
+
+def _computed(control: Control) -> Floats:
+    """Return δc finely enough that straight lines between do not show."""
+    return control.travel * np.linspace(1e-6, 1.0, 401)
+
+
+def _loss(rig: Rig, control: ControlName, pressure_Pa: float, deflections: Floats) -> Floats:
+    line = static_line(rig, control, pressure_Pa, _computed(rig.controls[control]))
+    # Beneath the first point the loader rests in its breakout and the surface does not move.
+    believed = np.interp(deflections, line.deflection, line.estimate, left=np.nan)
+    return np.asarray(1.0 - believed / deflections)
+
+
+def envelope(records: Sequence[Record], control: ControlName) -> Floats:
+    """Return the dynamic pressures in Pa and deflections in d flown, shape (2, points)."""
+    flown = [
+        np.stack((r["dynamic_pressure_Pa"], np.abs(r[channel(control, "deflection")])))
+        for r in records
+        if channel(control, "deflection") in r
+    ]
+    return np.concatenate(flown, axis=1) if flown else np.empty((2, 0))
+
+
+def shipped_flights(rig: Rig, progress: Progress) -> list[Record]:
+    """Return records of all cases of the shipped runs that fly this rig."""
+    named = [n for n, path in shipped_runs().items() if load_toml(path)["rig"] == rig.name]
+    scenarios = [case for name in named for case in read_run(name)]
+    records = []
+    for i, scenario in enumerate(scenarios):
+        progress(scenario.run.name, i, len(scenarios))
+        records.append(fly(scenario))
+    return records
+
+
+def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
+    """Return the stick forces; None on a bench, without a column, or where nothing trims."""
+    if rig.flight is None or "column" not in rig.controls:
+        return None
+    table = rig.controls["column"].schedule
+    ends = [max(min(table.dynamic_pressure), _LEAST_PRESSURE_Pa), max(table.dynamic_pressure)]
+    slowest, fastest = (math.sqrt(2.0 * q / _SEA_LEVEL_kg_per_m3) for q in ends)
+    speeds = np.linspace(slowest, fastest, _SPEEDS)
+    found = []
+    for i, speed in enumerate(speeds.tolist()):
+        progress(f"{speed / KNOT_m_per_s:.0f} kt", i, _SPEEDS)
+        try:
+            found.append((speed, *_elevator_per(rig, file, speed)))
+        except InputError:
+            continue  # beyond what the aircraft flies level
+    if not found:
+        return None
+    speed, pressure, per_g, per_knot = np.array(found).T
+    rigs = {name: configure(rig, name) for name in FELT}
+    pull = {
+        name: _forces(changed, pressure, per_g) + _bob_weight(changed, pressure)
+        for name, changed in rigs.items()
+    }
+    slower = {
+        name: _forces(changed, pressure, _APART_kt * per_knot) / _APART_kt
+        for name, changed in rigs.items()
+    }
+    return Feel(speed, pressure, pull, slower)
+
+
+def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
+    """Return the forces past the breakout, N, that so much elevator takes, by the statics.
+
+    `commands` are shares of the travel, pull positive; the force of a command beyond the
+    travel is that of the whole travel, in proportion. NaN where the bend alone moves the
+    surface so far, the loader still resting in its breakout.
+    """
+    control = rig.controls["column"]
+    out = []
+    for q, command in zip(pressure.tolist(), commands.tolist(), strict=True):
+        line = static_line(rig, "column", q, _computed(control))
+        wanted = min(abs(command) * control.travel, line.estimate[-1])
+        force = np.interp(wanted, line.estimate, line.force, left=np.nan)
+        past = (force - control.loader.breakout) * command * control.travel
+        out.append(past / wanted if wanted > 0.0 else 0.0)
+    return np.array(out)
+
+
+def _bob_weight(rig: Rig, pressure: Floats) -> Floats:
+    """Return what the bob weight adds to the force of 1 g, N.
+
+    It bends the structure too; where the host corrects the deflection by K̂·F, that lifts
+    the elevator by K̂·b and spares G_T·K̂·b.
+    """
+    control = rig.controls["column"]
+    table, host = control.schedule, control.compensation
+    gradient = np.interp(pressure, table.dynamic_pressure, table.total_gradient)
+    spared = host.bend * gradient if host.deflection else 0.0 * gradient
+    return np.asarray(control.loader.bob_weight * (1.0 - spared))
+
+
+def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, float]:
+    """Return q̄ in Pa of a level trim, and the elevator command that a g and a knot take.
+
+    Both as shares of the travel in the column's sense, pull positive.
+    """
+    sign = COMMAND_SIGN["elevator"]
+    middle = _trimmed(rig, file, speed)
+    pressure = middle.motion()[0]
+    up, down = (
+        _load_factors(_trimmed(rig, file, speed), sign * s, rig.frame_rate) for s in (_STEP, -_STEP)
+    )
+    change = 0.5 * (up - down)
+    peak = float(change[np.argmax(np.abs(change))])
+    commands, positions = middle.surface_map()
+    if positions[-1] < positions[0]:
+        commands, positions = commands[::-1], positions[::-1]
+    apart = 0.5 * _APART_kt * KNOT_m_per_s
+    slow, fast = (
+        np.interp(_trimmed(rig, file, v).motion()[ELEVATOR], positions, commands)
+        for v in (speed - apart, speed + apart)
+    )
+    return pressure, _STEP / peak, sign * float(slow - fast) / _APART_kt
+
+
+def _trimmed(rig: Rig, file: Path, speed: float) -> JSBSimAirframe:
+    assert rig.flight is not None
+    still = {"calibrated_airspeed": speed, "flight_path": 0.0, "gust_rms": 0.0}
+    flight = rig.flight.model_copy(update=still)
+    return JSBSimAirframe(
+        flight, 1.0 / rig.frame_rate, list(rig.controls), [aircraft_folder()], file
+    )
+
+
+def _load_factors(airframe: JSBSimAirframe, command: float, rate: float) -> Floats:
+    """Return the load factor, frame by frame, while the elevator is held."""
+    frames = round(_PULL_s * rate)
+    out = np.empty(frames)
+    for k in range(frames):
+        out[k] = airframe.motion()[1]
+        airframe.step((command, 0.0, 0.0))
+    return out

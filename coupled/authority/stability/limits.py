@@ -1,0 +1,125 @@
+"""The limits of a rig at its stiffest gradient, and how its motion dies as it is filed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from coupled.authority.stability.linear import growth as linear_growth
+from coupled.authority.stability.planes import (
+    KINDS,
+    Crossing,
+    Kind,
+    Plane,
+    axis,
+    crossings,
+    linear_rig,
+    simulated_along,
+)
+from coupled.record.channels import ControlName
+from coupled.rig.growth import growth as simulated_growth
+from coupled.rig.packing import Hand
+from coupled.rig.parameters import Control, Rig
+
+_POINTS = 41
+_SIMULATED_s = 8.0
+_CLAMP_rad_per_s = 6.0
+# From which end of its values a question is asked: where a rig is at its most stable.
+_FROM_ABOVE: tuple[Kind, ...] = ("servo",)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where one quantity, at the stiffest gradient, first makes a control unstable.
+
+    `stable` says on which side it is stable: `below` or `above` the limit; or `everywhere`
+    or `nowhere` within the values tried, from `least` to `greatest`, and there is none.
+    """
+
+    kind: Kind
+    stable: str
+    simulated: float | None
+    theory: float | None
+    least: float
+    greatest: float
+
+
+@dataclass(frozen=True)
+class Filed:
+    """Growth in 1/s of the motion of a control as filed, at its stiffest gradient."""
+
+    hand: str
+    simulated: float
+    theory: float
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of a control: its greatest K·G_T, its limits, and how its motion dies."""
+
+    control: ControlName
+    gradient: float
+    share: float
+    limits: tuple[Limit, ...]
+    filed: tuple[Filed, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON takes it."""
+        return asdict(self)
+
+
+def tell(rig: Rig, name: ControlName) -> Told:
+    """Return a control's limits; its structure must bend."""
+    control = rig.controls[name]
+    stiffest = gradient_range(control)[1]
+    limits = tuple(_limit(rig, name, kind, stiffest) for kind in KINDS)
+    return Told(name, stiffest, stiffest * control.loader.bend, limits, _filed(rig, name, stiffest))
+
+
+def gradient_range(control: Control) -> tuple[float, float]:
+    """Return the softest and stiffest gradient of a schedule, N/d."""
+    table = control.schedule
+    every = [
+        g[0] + table.slope * (value - g[0])
+        for g in (table.total_gradient, table.second_gradient or table.total_gradient)
+        for value in g
+    ]
+    return min(every), max(every)
+
+
+def disagreement(planes: Iterable[Plane]) -> tuple[float, float]:
+    """Return how far simulated limits lie from linear ones, as shares: 95 % of them, and all."""
+    apart = [c.apart for told in planes for c in told.crossings] or [0.0]
+    return float(np.quantile(apart, 0.95)), max(apart)
+
+
+def _limit(rig: Rig, name: ControlName, kind: Kind, gradient: float) -> Limit:
+    values = axis(kind, _POINTS)
+    found = simulated_along(rig, name, kind, gradient, values)
+    ends = float(values[0]), float(values[-1])
+    places = crossings(rig, name, kind, gradient, values, found)
+    above = kind in _FROM_ABOVE
+    if not places:
+        return Limit(kind, "nowhere" if found[0] > 0.0 else "everywhere", None, None, *ends)
+    if found[-1 if above else 0] > 0.0:
+        return Limit(kind, "nowhere", None, None, *ends)
+    first: Crossing = places[-1 if above else 0]
+    return Limit(kind, "above" if above else "below", first.simulated, first.theory, *ends)
+
+
+def _filed(rig: Rig, name: ControlName, gradient: float) -> tuple[Filed, ...]:
+    loader, w = rig.controls[name].loader, _CLAMP_rad_per_s
+    hands = {
+        "free": Hand(),
+        "clamp": Hand(w * loader.damping, w * loader.mass, w * gradient),
+    }
+    linear = linear_rig(rig, name, gradient)
+    found = []
+    for word, hand in hands.items():
+        simulated = simulated_growth(linear, hand, _SIMULATED_s)
+        found.append(Filed(word, simulated, linear_growth(linear, hand)))
+    return tuple(f for f in found if math.isfinite(f.simulated) and np.isfinite(f.theory))

@@ -1,0 +1,1 @@
+"""Sealed trials: drawn, made, sized, answered and scored."""

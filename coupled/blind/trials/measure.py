@@ -1,0 +1,47 @@
+"""How wide a trial's gap is under its nominal rig, measured as a diagnosis measures it."""
+
+from __future__ import annotations
+
+from coupled.gap.airframe import airframe_outputs
+from coupled.gap.effects import BY_NAME
+from coupled.gap.fit import fit
+from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
+from coupled.record.record import Record
+from coupled.rig.parameters import Rig
+
+
+def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, float]:
+    """Return each stage's rms residual over its floor under the nominal rig.
+
+    The loader's is the larger of its motion's and its multiplier's, and sensing, which has no
+    output of its own, stands at the widest of those that a wrong scale shows in. `airframe`
+    says whether to fly for the airframe's, which takes longest.
+    """
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    if airframe:
+        outputs += airframe_outputs(rig, record)
+    gaps: dict[str, float] = {}
+    for output in outputs:
+        stage = "loader" if output.stage == "multiplier" else output.stage
+        gaps[stage] = max(output.gap(rig), gaps.get(stage, 0.0))
+    shown = [gaps[stage] for stage in ("loader", "linkage") if stage in gaps]
+    return gaps | ({"sensing": max(shown)} if shown else {})
+
+
+# Two effects that are one law wherever the gradient rises in proportion to q̄.
+TWINS = {"pressure_scale": "schedule_slope", "schedule_slope": "pressure_scale"}
+ALIKE = 0.02  # floors: what a twin may leave more than the true effect
+
+
+def alike(rig: Rig, record: Record, effect: str) -> list[str]:
+    """Return the effect that no record of this rig at these pressures could tell from `effect`."""
+    if effect not in TWINS:
+        return []
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    ours = [output for output in outputs if output.stage == "schedule"]
+    left = {}
+    for name in (effect, TWINS[effect]):
+        found = fit(rig, "column", ours, [BY_NAME[name]])
+        left[name] = max(output.gap(found.rig) for output in ours)
+    return [TWINS[effect]] if left[TWINS[effect]] - left[effect] < ALIKE else []

@@ -1,0 +1,1 @@
+"""The independent twin: another program's loader and effects, none of the rig's stages."""

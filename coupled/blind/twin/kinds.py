@@ -1,0 +1,105 @@
+"""What a trial may put into a real rig: an entry, and what its size is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupled.blind.twin.twin import Twin
+from coupled.record.channels import LONGITUDINAL
+from coupled.record.record import Record
+from coupled.rig.parameters import Loader, Rig
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What is drawn once for a kind, whatever its size: a side, three shares, a seed."""
+
+    side: float
+    u: tuple[float, float, float]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Clean:
+    """The record of the same rig, pilot and noise without anything, to size a kind by."""
+
+    rig: Rig
+    record: Record
+    bristle_J: float
+
+    @property
+    def loader(self) -> Loader:
+        """The nominal loader."""
+        return self.rig.controls["column"].loader
+
+    @property
+    def seconds(self) -> float:
+        """Length of the record."""
+        return len(self.record) / self.rig.frame_rate
+
+    def peak(self, name: str) -> float:
+        """Return the 99th percentile of a channel's size."""
+        return float(np.percentile(np.abs(self.record[name]), 99.0))
+
+    def speed(self, name: str) -> float:
+        """Return the 99th percentile of a channel's rate, taken over 0.1 s."""
+        step = max(1, round(0.1 * self.rig.frame_rate))
+        moved = self.record[name][step:] - self.record[name][:-step]
+        return float(np.percentile(np.abs(moved), 99.0)) / (step / self.rig.frame_rate)
+
+    def mean(self, name: str) -> float:
+        """Return a channel's mean."""
+        return float(np.mean(self.record[name]))
+
+    def spread(self, name: str) -> float:
+        """Return the span of the inner 96 % of a channel."""
+        low, high = np.percentile(self.record[name], [2.0, 98.0])
+        return float(high - low)
+
+
+# Puts a kind of some size into the twin, and returns its parameters by the names of a diagnosis.
+Install = Callable[[Twin, Clean, float, Draw], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """An effect or an outsider: its stage, its sizes, and how it enters the twin.
+
+    `least` and `most` bound the size, which the residual grows with; equal for a switch.
+    """
+
+    name: str
+    stage: str
+    least: float
+    most: float
+    install: Install
+    flown: bool = False
+
+    def suits(self, rig: Rig) -> bool:
+        """Tell whether the rig can have it."""
+        column = rig.controls["column"]
+        if self.flown and rig.flight is None:
+            return False
+        if self.name == "arc_geometry":  # in flight the deflections are too small to show it
+            return column.length > 0.0 and rig.flight is None
+        if self.stage == "schedule" and rig.flight is not None:
+            return _sloped(rig)
+        return True
+
+
+def _sloped(rig: Rig) -> bool:
+    """Tell whether the schedule changes with q̄ where the aircraft flies."""
+    assert rig.flight is not None
+    table = rig.controls["column"].schedule
+    q = 0.5 * 1.225 * rig.flight.calibrated_airspeed**2
+    around = np.interp([0.9 * q, q, 1.1 * q], table.dynamic_pressure, table.total_gradient)
+    return bool(np.ptp(around) > 0.0)
+
+
+ALPHA, SPEED, RATE = (
+    LONGITUDINAL.index(name)
+    for name in ("alpha_rad", "true_airspeed_m_per_s", "pitch_rate_rad_per_s")
+)

@@ -1,0 +1,202 @@
+"""The twin flown: a rig's numbers as the kernel has them, and the frame loop round it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.blind.twin.kernel import twin_frame
+from coupled.blind.twin.numbers import KNOTS, TWIN_PARAMETERS, TWIN_STATE
+from coupled.flight.airframe import ALTITUDE, ELEVATOR, JSBSimAirframe
+from coupled.record.channels import BENCH_MOTION, LONGITUDINAL
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.compiled import bound
+from coupled.rig.parameters import Flight, Rig
+
+Floats = NDArray[np.float64]
+RIG_CHANNELS = (
+    "column_force_N",
+    "column_computed_m",
+    "column_deflection_m",
+    "column_estimate_m",
+    "column_gradient_N_per_m",
+    "column_modifying_force_N",
+    "dynamic_pressure_Pa",
+)
+LOAD, RATE, ALPHA = (
+    LONGITUDINAL.index(name) for name in ("load_factor", "pitch_rate_rad_per_s", "alpha_rad")
+)
+SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
+
+
+@dataclass
+class Air:
+    """What the air and the airframe do beyond the model.
+
+    `gust` is the air's upward speed, m/s a frame; `moment` makes a command, added at the
+    airframe but not seen at the surface, from time in s and the change of motion since trim.
+    """
+
+    effectiveness: float = 1.0
+    damping: float = 1.0
+    gust: Floats | None = None
+    moment: Callable[[float, Sequence[float]], float] | None = None
+
+
+@dataclass
+class Twin:
+    """A real rig: the kernel's numbers, shape (1,), and its air."""
+
+    numbers: NDArray[np.void]
+    air: Air = field(default_factory=Air)
+
+    def set(self, **values: float) -> None:
+        """Set numbers by their names."""
+        for name, value in values.items():
+            self.numbers[name] = value
+
+    def get(self, name: str) -> float:
+        """Return a number."""
+        return float(self.numbers[name][0])
+
+
+def first_order(lag_s: float, step_s: float) -> float:
+    """Return the share of its way that a lag goes in a step."""
+    return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0
+
+
+def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
+    """Return a twin of the rig's column without any effect; K̂, G_B and F_BO are believed right.
+
+    `bristle_J` is friction times the bristles' length: what a reversal gives back, J.
+    """
+    column = rig.controls["column"]
+    loader, table, host = column.loader, column.schedule, column.compensation
+    frame_s = 1.0 / rig.frame_rate
+    twin = Twin(np.zeros(1, TWIN_PARAMETERS))
+    rows = len(table.dynamic_pressure)
+    assert rows <= KNOTS
+    numbers = twin.numbers[0]
+    numbers["knots"] = rows
+    numbers["pressures"][:rows] = table.dynamic_pressure
+    numbers["first"][:rows] = table.total_gradient
+    numbers["second"][:rows] = table.second_gradient or table.total_gradient
+    believed = host.basic_gradient, host.breakout
+    twin.set(frame_s=frame_s, pressure_scale=table.pressure_scale, slope=table.slope)
+    twin.set(pressure_gain=first_order(table.pressure_lag, frame_s), tent_width=1.0)
+    twin.set(
+        believed_gradient=loader.basic_gradient if believed[0] is None else believed[0],
+        believed_breakout=loader.breakout if believed[1] is None else believed[1],
+        gradient_bend=host.bend if host.gradient else 0.0,
+        exact=float(host.breakout_term == "exact"),
+        break_deflection=table.break_deflection,
+        estimate_bend=host.bend if host.deflection else 0.0,
+        digital=loader.multiplier == "digital",
+        deflection_scale=column.sensing.deflection_scale,
+        loop_yield=1.0,
+    )
+    twin.set(mass=loader.mass, damping=loader.damping, basic_gradient=loader.basic_gradient)
+    twin.set(cubic=loader.cubic, breakout=loader.breakout, bob_weight=loader.bob_weight)
+    twin.set(offset=loader.offset, delay=loader.delay, travel=column.travel, cog_pitch=1.0)
+    set_friction(twin, loader.friction, loader.breakaway, loader.stribeck_rate, bristle_J)
+    twin.set(servo_rate=2.0 * math.pi * loader.servo_frequency, play=loader.play)
+    twin.set(servo_ratio=loader.servo_damping_ratio, servo_limit=loader.servo_rate_limit)
+    twin.set(bend=loader.bend, bend_limit=loader.bend_limit)
+    twin.set(arc=column.length if loader.arc_geometry else 0.0)
+    rigging = column.rigging
+    twin.set(command_gain=-1.0 / column.travel, stretch=rigging.stretch_loss)
+    twin.set(lag_gain=first_order(rigging.lag, frame_s), rate_step=rigging.rate_limit * frame_s)
+    twin.set(surface_play=rigging.play, surface_offset=rigging.offset)
+    return twin
+
+
+def set_friction(
+    twin: Twin, running_N: float, breakaway_N: float, rate_m_per_s: float, bristle_J: float
+) -> None:
+    """Set the twin's friction, and bristles short enough to give back `bristle_J` a reversal."""
+    level = max(running_N, breakaway_N)
+    stiffness = level**2 / bristle_J
+    twin.set(running=running_N, breakaway=level, stribeck_rate=rate_m_per_s, bristle=stiffness)
+    twin.set(bristle_damping=0.3 * math.sqrt(stiffness * twin.get("mass")))
+
+
+class LostError(RuntimeError):
+    """The aircraft left the envelope in which a trial means something."""
+
+
+def fly_twin(
+    rig: Rig, twin: Twin, nodes: Floats, frames: int, told: Floats | None, noise: Floats
+) -> Record:
+    """Return the record of a twin, SI, one row a frame.
+
+    rig     the nominal rig: its aircraft and frame rate
+    nodes   the pilot's force, shape (frames·NODES + 1,), N
+    told    q̄ of a bench, shape (frames,), Pa; None where the rig flies
+    noise   shape (frames, channels without time), standard deviations applied
+    Raises LostError where the aircraft leaves the envelope.
+    """
+    rows = noise[:, :7].copy()
+    state = np.zeros(1, TWIN_STATE)
+    time = np.arange(frames) / rig.frame_rate
+    kernel = bound(twin_frame, twin.numbers, state, nodes, rows[0], 0, 1.0, 1.0)
+    if told is not None:
+        for k in range(frames):
+            kernel(twin.numbers, state, nodes, rows[k], k, float(told[k]), 1.0)
+        return Record(("time_s", *RIG_CHANNELS), np.column_stack((time, rows)))
+    assert rig.flight is not None
+    motions = _fly(rig, twin, nodes, rows, kernel, state)
+    motions[:, 1:] += noise[:, 7:]
+    data = np.column_stack((time, rows, motions[:, 1:]))
+    assert BENCH_MOTION[0] == RIG_CHANNELS[-1]
+    return Record(("time_s", *RIG_CHANNELS, *LONGITUDINAL[1:]), data)
+
+
+def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
+    """Return the aircraft, trimmed, its column alone."""
+    return JSBSimAirframe(flight, frame_s, ["column"], [aircraft_folder()])
+
+
+def _fly(
+    rig: Rig,
+    twin: Twin,
+    nodes: Floats,
+    rows: Floats,
+    kernel: Callable[..., float],
+    state: NDArray[np.void],
+) -> Floats:
+    """Fly the twin's aircraft; fill the rig's rows and return the motion, one row a frame."""
+    assert rig.flight is not None
+    factors = {
+        "elevator_effectiveness": rig.flight.elevator_effectiveness * twin.air.effectiveness,
+        "pitch_damping": rig.flight.pitch_damping * twin.air.damping,
+    }
+    frame_s = 1.0 / rig.frame_rate
+    craft = airframe(rig.flight.model_copy(update=factors), frame_s)
+    moment, gust = twin.air.moment, twin.air.gust
+    motions, commands = [], np.zeros(len(rows))
+    start = craft.motion()
+    for k in range(len(rows)):
+        motion = craft.motion()
+        if abs(motion[LOAD] - 1.0) > 2.0 or not motion[ALTITUDE] > craft.safe_altitude_m:
+            raise LostError
+        if abs(motion[ALPHA] - start[ALPHA]) > 0.22 or motion[SPEED] < 0.7 * start[SPEED]:
+            raise LostError
+        motions.append(motion)
+        command = kernel(twin.numbers, state, nodes, rows[k], k, motion[0], motion[LOAD])
+        commands[k] = command
+        if moment is not None:
+            change = [now - then for now, then in zip(motion, start, strict=True)]
+            command += moment(k * frame_s, change)
+        if gust is not None:
+            craft.set_gust(float(gust[k]))
+        craft.step((command, 0.0, 0.0))
+    flown = np.array(motions)
+    if moment is not None:  # the surface stands where the rig put it
+        asked, positions = airframe(rig.flight, frame_s).surface_map()
+        flown[1:, ELEVATOR] = np.interp(commands[:-1], asked, positions)
+    return flown

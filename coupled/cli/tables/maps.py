@@ -1,0 +1,43 @@
+"""Authority maps as tables, for CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import polars as pl
+
+from coupled.authority.maps import FELT, Feel, LossMap
+from coupled.files import write_whole
+from coupled.record.channels import unit_of
+
+
+def write_losses(maps: Iterable[LossMap], path: Path) -> None:
+    """Write the loss maps, a row a point; a deflection is in the unit beside it."""
+    rows = [
+        {
+            "control": told.control,
+            "configuration": told.configuration,
+            "dynamic_pressure_Pa": float(q),
+            "deflection": float(d),
+            "deflection_unit": unit_of(told.control),
+            "loss": float(told.loss[i, j]),
+        }
+        for told in maps
+        for i, q in enumerate(told.pressure_Pa)
+        for j, d in enumerate(told.deflection)
+    ]
+    write_whole(path, pl.DataFrame(rows).fill_nan(None).write_csv)
+
+
+def write_feel(feel: Feel, path: Path) -> None:
+    """Write the stick forces, a row a speed."""
+    columns = {
+        "calibrated_airspeed_m_per_s": feel.calibrated_airspeed_m_per_s,
+        "dynamic_pressure_Pa": feel.pressure_Pa,
+    }
+    for name in FELT:
+        word = "specified" if name == "rigid" else name
+        columns[f"{word}_force_per_g_N"] = feel.per_g_N[name]
+        columns[f"{word}_pull_per_knot_N"] = feel.per_knot_N[name]
+    write_whole(path, pl.DataFrame(columns).fill_nan(None).write_csv)

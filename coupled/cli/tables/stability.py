@@ -1,0 +1,83 @@
+"""A rig's stability as tables: limits on a terminal, cells for CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import polars as pl
+from rich.console import Console
+from rich.table import Table
+
+from coupled.authority.stability.aircraft import BobWeight
+from coupled.authority.stability.limits import Limit, Told
+from coupled.authority.stability.planes import Kind, Plane
+from coupled.files import write_whole
+from coupled.record.channels import unit_of
+from coupled.rig.parameters import Rig
+from coupled.units import MILLISECOND_s
+
+_QUANTITIES: dict[Kind, str] = {
+    "belief": "believed_over_real_bend",
+    "frame": "frame_s",
+    "hand": "hand_stiffness_times_bend",
+    "servo": "servo_frequency_Hz",
+}
+_WORDS: dict[Kind, tuple[str, float]] = {
+    "belief": ("K̂/K, free hand", 1.0),
+    "frame": ("frame of a digital product, ms", 1.0 / MILLISECOND_s),
+    "hand": ("hand's stiffness, K·k", 1.0),
+    "servo": ("servo with the grip held fast, Hz", 1.0),
+}
+
+
+def print_limits(console: Console, told: Sequence[Told], bob: BobWeight | None) -> None:
+    """Print the limits of each control at its stiffest gradient, simulated and by theory."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for head in ("", "stable", "simulated", "theory"):
+        table.add_column(head, justify="left" if head in ("", "stable") else "right")
+    for control in told:
+        unit = unit_of(control.control)
+        head = f"{control.control}, {control.gradient:.4g} N/{unit}, K·G_T = {control.share:.3g}"
+        table.add_row(f"[bold]{head}[/]")
+        for limit in control.limits:
+            table.add_row(*_row(limit))
+        for filed in control.filed:
+            word = f" as filed, {filed.hand}: growth, 1/s"
+            side = "yes" if filed.simulated < 0.0 else "[red]no[/]"
+            table.add_row(word, side, f"{filed.simulated:.2f}", f"{filed.theory:.2f}")
+    if bob is not None:
+        table.add_row(f"[bold]column through the aircraft, {bob.rate_rad_per_s:.3g} rad/s[/]")
+        flown = "–" if bob.simulated_N_per_g is None else f"{bob.simulated_N_per_g:.4g}"
+        word = f" bob weight, free hand, N/g (filed: {bob.filed_N_per_g:.3g})"
+        table.add_row(word, "below", flown, f"{bob.theory_N_per_g:.4g}")
+    console.print(table, highlight=False)
+
+
+def _row(limit: Limit) -> tuple[str, ...]:
+    word, factor = _WORDS[limit.kind]
+    if limit.simulated is None:
+        ends = f"{factor * limit.least:.3g} to {factor * limit.greatest:.3g}"
+        return f" {word}", limit.stable, f"({ends})", ""
+    theory = "–" if limit.theory is None else f"{factor * limit.theory:.4g}"
+    return f" {word}", limit.stable, f"{factor * limit.simulated:.4g}", theory
+
+
+def write_planes(rig: Rig, planes: Iterable[Plane], path: Path) -> None:
+    """Write the planes, a row a simulated cell."""
+    rows = [
+        {
+            "control": told.control,
+            "quantity": _QUANTITIES[told.kind],
+            "value": float(value),
+            "bend_times_gradient": float(share),
+            "gradient": float(share) / rig.controls[told.control].loader.bend,
+            "gradient_unit": f"N/{unit_of(told.control)}",
+            "simulated_growth_per_s": float(told.simulated[i, j]),
+            "theory_growth_per_s": float(told.theory[i, j]),
+        }
+        for told in planes
+        for i, share in enumerate(told.shares)
+        for j, value in enumerate(told.values)
+    ]
+    write_whole(path, pl.DataFrame(rows).write_csv)

@@ -1,0 +1,216 @@
+"""A log's clock, and the even grid of a record's frames laid over it.
+
+Rows whose stamps are even but for their rounding (or 2 % of a frame) are taken as they are,
+unchanged. Others are interpolated by PCHIP: it passes through every sample and overshoots
+none, where a cubic spline would ring at a step or a stop, and a straight line would cut corners.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from coupled.errors import InputError
+from coupled.record.importing.mapping import Clock, LogMap, known_unit
+from coupled.record.importing.reading import Log
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+EVEN_frames = 0.02  # stamps that stray less than this stand on the grid
+MARGIN_rows = 3.0  # kept beyond the cut, for the interpolation
+MOST_UPSAMPLED = 10.0  # more frames a row than this would be invention
+MOST_FRAMES = 20_000_000
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The record's frames over a log's rows.
+
+    `kept` are the rows used; `time_s` is when each was taken, from frame 0 on, shape
+    (rows kept,); `frame` is the frame on which each stands where `even`, else nothing counts.
+    """
+
+    kept: slice
+    time_s: Floats
+    frame: Rows
+    even: bool
+    frame_rate_Hz: float
+    frames: int
+    report: dict[str, Any]
+
+    @property
+    def frame_time_s(self) -> Floats:
+        """When each frame of the record is, shape (frames,)."""
+        times: Floats = np.arange(self.frames) / self.frame_rate_Hz
+        return times
+
+    def inside(self) -> NDArray[np.bool_]:
+        """Tell which of the kept rows lie within the record."""
+        end_s = (self.frames - 1) / self.frame_rate_Hz
+        slack = 0.5 / self.frame_rate_Hz
+        chosen: NDArray[np.bool_] = (self.time_s > -slack) & (self.time_s < end_s + slack)
+        return chosen
+
+
+def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | None) -> Grid:
+    """Return the frames of the record, at the map's rate, or else `frame_rate_Hz`, or the log's."""
+    clock = log_map.clock
+    stamps_s = _stamps(log, clock, map_file)
+    delay_s = max(channel.delay for channel in log_map.channels.values())
+    kept = _cut(log, stamps_s, clock, delay_s)
+    time_s = stamps_s[kept]
+    _check_steps(log, time_s, kept.start, clock)
+    first = int(np.searchsorted(time_s, clock.start - 1e-9))
+    if first == time_s.size:
+        raise InputError(map_file, "clock.start_s", f"the log ends at {time_s[-1]:.6g} s")
+    start_s = float(time_s[first])
+    rounding_s = _rounding(time_s)
+    rate, median_s = (time_s.size - 1) / float(np.ptp(time_s)), float(np.median(np.diff(time_s)))
+    wished = clock.frame_rate or frame_rate_Hz
+    even = _stands(time_s - start_s, wished, rounding_s) if wished else None
+    if wished is None:
+        wished, even = _own_rate(log, time_s - start_s, (rate, 1.0 / median_s), rounding_s)
+    if wished * median_s > MOST_UPSAMPLED:
+        problem = f"{wished:g} Hz from rows at {1.0 / median_s:.4g} Hz would be invented"
+        raise InputError(map_file, "clock.frame_rate_Hz", problem)
+    on_grid = time_s - start_s if even is None else even / wished
+    last_s = on_grid[-1] - delay_s
+    if clock.end is not None:
+        last_s = min(last_s, clock.end - start_s)
+    frames = int(np.floor(last_s * wished + 1e-6)) + 1
+    if not 2 <= frames <= MOST_FRAMES:
+        raise InputError(log.file, "", f"would make a record of {max(frames, 0)} frames")
+    steps_s = np.diff(time_s)
+    bridged = np.maximum(np.rint(steps_s / median_s) - 1.0, 0.0)
+    report = {
+        "log_rows": len(stamps_s),
+        "rows_used": int(time_s.size),
+        "log_rate_Hz": 1.0 / median_s if bridged.any() else rate,
+        "least_step_s": float(steps_s.min()),
+        "greatest_step_s": float(steps_s.max()),
+        "stamp_rounding_s": rounding_s,
+        "start_s": start_s,
+        "frame_rate_Hz": wished,
+        "frames": frames,
+        "method": "rows as they are" if even is not None else "pchip",
+        "missing_rows": int(bridged.sum()),
+    }
+    frame = np.zeros(time_s.size, dtype=np.int64) if even is None else even
+    return Grid(kept, on_grid, frame, even is not None, wished, frames, report)
+
+
+def _stamps(log: Log, clock: Clock, map_file: Path) -> Floats:
+    """Return the time of every row from the first one on, in s."""
+    if clock.rate is not None:
+        rows = len(next(iter(log.columns.values())))
+        return np.arange(rows) / clock.rate
+    values, in_seconds = log.time(clock.source, map_file, "clock.from")
+    if values.size < 2:
+        raise InputError(log.file, clock.source, "has fewer than two rows")
+    if np.isnan(values).any():
+        row = int(np.argmax(np.isnan(values)))
+        raise InputError(log.file, clock.source, f"row {log.line(row)} has no time")
+    return values if in_seconds else values * known_unit(clock.unit, map_file, "clock.unit").factor
+
+
+def _cut(log: Log, stamps_s: Floats, clock: Clock, delay_s: float) -> slice:
+    if stamps_s.size < 2:
+        raise InputError(log.file, "", "has fewer than two rows")
+    margin_s = MARGIN_rows * float(np.median(np.abs(np.diff(stamps_s))))
+    wanted = stamps_s >= clock.start - margin_s
+    if clock.end is not None:
+        wanted &= stamps_s <= clock.end + delay_s + margin_s
+    rows = np.flatnonzero(wanted)
+    if rows.size < 2:
+        problem = (
+            f"has no rows between the map's start_s and end_s; it ends at {stamps_s[-1]:.6g} s"
+        )
+        raise InputError(log.file, clock.source, problem)
+    return slice(int(rows[0]), int(rows[-1]) + 1)
+
+
+def _check_steps(log: Log, time_s: Floats, first: int, clock: Clock) -> None:
+    steps_s = np.diff(time_s)
+    if (steps_s <= 0.0).any():
+        row = int(np.argmax(steps_s <= 0.0))
+        where = f"row {log.line(first + row + 1)}"
+        if steps_s[row] == 0.0:
+            again = (
+                f"{where} repeats the time of the row before, {time_s[row]:.6f} s from the start"
+            )
+            problem = f"{again}; where rows are even all the same, give clock.rate_Hz, no from"
+        else:
+            problem = f"{where}: time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
+        raise InputError(log.file, clock.source, problem)
+    median_s = float(np.median(steps_s))
+    gaps = np.flatnonzero(steps_s > (clock.longest_gap + 1.5) * median_s)
+    if gaps.size:
+        row = int(gaps[0])
+        lost = round(steps_s[row] / median_s) - 1
+        raise InputError(
+            log.file,
+            clock.source,
+            f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
+            f" longest_gap_rows = {clock.longest_gap} allows no more; cut by start_s or end_s",
+        )
+
+
+def _rounding(time_s: Floats) -> float:
+    """Return the decimal place to which all stamps are rounded, in s, or 0."""
+    for place_s in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        counts = time_s / place_s
+        if np.all(np.abs(counts - np.rint(counts)) < 1e-4):
+            return place_s
+    return 0.0
+
+
+def _stands(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
+    """Return the frame on which each row stands at a rate, or None where they stray from it."""
+    frame = np.rint(time_s * rate)
+    stray_s = float(np.ptp(time_s - frame / rate))
+    if np.any(np.diff(frame) < 1.0) or stray_s > max(EVEN_frames / rate, 1.01 * rounding_s):
+        return None
+    return frame.astype(np.int64)
+
+
+def _own_rate(
+    log: Log, time_s: Floats, guesses: tuple[float, ...], rounding_s: float
+) -> tuple[float, Rows]:
+    """Return the log's own rate, the roundest that its stamps allow, and the rows' frames."""
+    for guess in guesses:
+        for digits in (0, 1, 2, 3, 9):
+            rate = round(guess, digits)
+            frame = _stands(time_s, rate, rounding_s) if rate > 0.0 else None
+            # A row a frame, but for those missing: a multiple of the rate would stand as well.
+            if frame is not None and np.median(np.diff(frame)) == 1.0:
+                return rate, frame
+    steps_ms = 1e3 * np.diff(time_s)
+    problem = f"its rows come unevenly, {steps_ms.min():.4g} to {steps_ms.max():.4g} ms apart"
+    near = f"; say what the record is to have, as clock.frame_rate_Hz = {guesses[0]:.4g}"
+    raise InputError(log.file, "", problem + near)
+
+
+def on_frames(grid: Grid, values: Floats, delay_s: float, held: bool = False) -> Floats:
+    """Return a channel on the record's frames, shape (frames,).
+
+    `values` are those of the kept rows, NaN where a cell is empty. A `held` channel keeps a
+    value to the next row instead of leading over to it.
+    """
+    valid = np.isfinite(values)
+    asked_s = grid.frame_time_s + delay_s
+    time_s, given = grid.time_s[valid], values[valid]
+    if held:
+        place = np.searchsorted(time_s, asked_s + 1e-9, side="right") - 1
+        return np.asarray(given[np.maximum(place, 0)], dtype=np.float64)
+    inside_s = np.clip(asked_s, time_s[0], time_s[-1])
+    result = np.asarray(PchipInterpolator(time_s, given)(inside_s), dtype=np.float64)
+    if grid.even and delay_s == 0.0:
+        # What was measured stays as it was, to the last bit.
+        there = valid & (grid.frame >= 0) & (grid.frame < grid.frames)
+        result[grid.frame[there]] = values[there]
+    return result

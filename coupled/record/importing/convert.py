@@ -1,0 +1,177 @@
+"""A log made a record: read by its map, laid on even frames, judged, and accounted for."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.files import sha256
+from coupled.record.channels import TIME
+from coupled.record.importing.clock import Grid, lay_grid, on_frames
+from coupled.record.importing.judging import judge
+from coupled.record.importing.mapping import (
+    CHANNELS,
+    Channel,
+    LogMap,
+    as_table,
+    factor_of,
+    read_map,
+)
+from coupled.record.importing.reading import Log, read_log
+from coupled.record.record import Record
+from coupled.rig.parameters import Rig
+from coupled.schema import LARGEST
+from coupled.units import parse_unit
+
+Floats = NDArray[np.float64]
+TURNING = ("roll_rad", "heading_rad")  # angles that jump by a turn
+
+
+def import_log(
+    log_file: Path, map_file: Path, rig: Rig | None = None
+) -> tuple[Record, dict[str, Any]]:
+    """Return the record of a log, and the account of how it came to be.
+
+    The account has `clock`, `channels` (figures and doubts by channel), `unmapped` (columns
+    that the map leaves out) and `warnings`; the record's manifest holds it too.
+    """
+    log_map = read_map(map_file)
+    log = read_log(log_file, log_map.log)
+    rate = rig.frame_rate if rig is not None else None
+    asked = log_map.clock.frame_rate
+    if rate is not None and asked is not None and abs(asked / rate - 1.0) > 1e-3:
+        problem = f"is {asked:g}, the rig's {rate:g}; leave it out to take the rig's"
+        raise InputError(map_file, "clock.frame_rate_Hz", problem)
+    grid = lay_grid(log, log_map, map_file, rate)
+    warnings = _clock_warnings(grid)
+    names = [name for name in CHANNELS if name in log_map.channels]
+    record, logged, filled = {}, {}, {}
+    for name in names:
+        channel = log_map.channels[name]
+        values = _in_si(log, name, channel, map_file, warnings)
+        if len(values) < grid.kept.stop:
+            problem = f"has {len(values)} rows, the clock {grid.kept.stop}"
+            raise InputError(log.file, channel.source, problem)
+        kept = values[grid.kept]
+        filled[name] = _check_gaps(log, log_map, name, grid, kept)
+        record[name] = _on_frames(name, grid, kept, channel.delay)
+        logged[name] = kept[np.isfinite(kept) & grid.inside()]
+        if logged[name].size < 2:
+            raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
+    judged = judge(record, logged, rig, log_file)
+    account = {
+        "clock": grid.report,
+        "channels": {
+            name: {
+                "from": log_map.channels[name].source,
+                **asdict(judged[name]),
+                "doubts": list(judged[name].doubts),
+                "filled_cells": filled[name],
+            }
+            for name in names
+        },
+        "unmapped": _unmapped(log, log_map),
+        "warnings": warnings,
+    }
+    manifest = {
+        "imported_from": log_file.name,
+        "inputs_sha256": {path.name: sha256(path) for path in (log_file, map_file)},
+        "map": as_table(log_map),
+        "channels": [TIME, *names],
+        "rows": grid.frames,
+        "rig": rig.model_dump() if rig is not None else None,
+        "import": account,
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("coupled", "numpy", "scipy", "polars")},
+        },
+    }
+    data = np.column_stack([grid.frame_time_s, *record.values()])
+    return Record((TIME, *names), data, manifest), account
+
+
+def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list[str]) -> Floats:
+    """Return a channel at the log's rows, in the unit that it ends in."""
+    key = f"channels.{name}"
+    values = log.values(channel.source, map_file, f"{key}.from")
+    told = log.units.get(channel.source, "")
+    if not channel.unit and not told:
+        raise InputError(map_file, f"{key}.unit", "is missing; the log's units_row gives none")
+    factor = factor_of(name, channel.unit or told, map_file)
+    if channel.unit and told and parse_unit(told) not in (None, parse_unit(channel.unit)):
+        warnings.append(f"{name}: the map says {channel.unit}, the log's own units row {told}")
+    si = channel.sign * factor * (channel.scale * values + channel.offset)
+    huge = np.abs(si) > LARGEST
+    if huge.any():
+        row = int(np.argmax(huge))
+        problem = f"row {log.line(row)} makes {si[row]:.3g}, larger than any real one"
+        raise InputError(log.file, channel.source, problem)
+    return np.asarray(si + 0.0)  # a sign on an exact zero makes −0
+
+
+def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats) -> int:
+    """Return how many empty cells were led over; refuse those at an end, or too many in a row."""
+    channel = log_map.channels[name]
+    most = log_map.clock.longest_gap if channel.longest_gap is None else channel.longest_gap
+    empty = ~np.isfinite(values)
+    if not empty.any():
+        return 0
+    if empty.all():
+        raise InputError(log.file, channel.source, "is empty")
+    valid = np.flatnonzero(~empty)
+    end_s = (grid.frames - 1) / grid.frame_rate_Hz + channel.delay
+    slack_s = 0.5 / grid.frame_rate_Hz
+    if grid.time_s[valid[0]] > channel.delay + slack_s or grid.time_s[valid[-1]] < end_s - slack_s:
+        from_s, to_s = (grid.time_s[valid[i]] + grid.report["start_s"] for i in (0, -1))
+        where = f"has numbers only from {from_s:.3f} to {to_s:.3f} s"
+        raise InputError(log.file, channel.source, f"{where}; cut by clock.start_s and end_s")
+    holes = np.diff(valid) - 1
+    if holes.max() > most:
+        row = int(valid[int(np.argmax(holes > most))]) + 1
+        length = int(holes[holes > most][0])
+        where = f"row {log.line(grid.kept.start + row)}: {length} empty cells"
+        problem = f"{where}; longest_gap_rows = {most} allows no more in a row"
+        raise InputError(log.file, channel.source, problem)
+    return int(np.count_nonzero(empty & grid.inside()))
+
+
+def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
+    if name not in TURNING:
+        return on_frames(grid, values, delay_s, held=name.endswith("_stop"))
+    # Between 359° and 1° lies 0°, not 180°.
+    turn = 2.0 * np.pi
+    valid = np.isfinite(values)
+    smooth = values.copy()
+    smooth[valid] = np.unwrap(values[valid])
+    if np.array_equal(smooth[valid], values[valid]):
+        return on_frames(grid, values, delay_s)
+    base = 0.0 if np.min(values[valid]) >= 0.0 else -np.pi
+    result = on_frames(grid, smooth, delay_s)
+    return np.asarray(np.mod(result - base, turn) + base)
+
+
+def _clock_warnings(grid: Grid) -> list[str]:
+    report = grid.report
+    warnings = []
+    ratio = grid.frame_rate_Hz / report["log_rate_Hz"]
+    if ratio > 1.1:
+        share = f"{ratio:.3g} frames a row of the log"
+        warnings.append(f"{share}: nothing faster is in it, and its noise is no longer white")
+    elif ratio < 0.9:
+        half = f"{0.5 * grid.frame_rate_Hz:g} Hz"
+        warnings.append(f"{1 / ratio:.3g} rows a frame: what the log has above {half} folds down")
+    if report["missing_rows"]:
+        warnings.append(f"{report['missing_rows']} missing rows were led over")
+    return warnings
+
+
+def _unmapped(log: Log, log_map: LogMap) -> list[str]:
+    used = {channel.source for channel in log_map.channels.values()} | {log_map.clock.source}
+    return [name for name in log.columns if name not in used]

@@ -1,0 +1,136 @@
+"""Each channel of an imported log held against itself, the others, and the rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.record.channels import CONTROL_NAMES, channel
+from coupled.record.importing import plausible
+from coupled.rig.parameters import Control, Rig
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A channel's figures, in its own unit, and what speaks against it."""
+
+    least: float
+    greatest: float
+    rms: float
+    noise: float
+    doubts: tuple[str, ...]
+
+
+def judge(
+    record: Mapping[str, Floats], logged: Mapping[str, Floats], rig: Rig | None, file: object
+) -> dict[str, Judged]:
+    """Return {channel: figures and doubts}.
+
+    `record` are the channels on its frames, shape (frames,); `logged` the same as the log has
+    them, before any interpolation, which would blur a copy or a quantisation. Raises InputError
+    for what cannot be on this rig at all.
+    """
+    pairs = _between(record, rig, file)
+    found = {}
+    for name, values in record.items():
+        raw = logged[name]
+        doubts = [] if plausible.is_constant(raw) else _alone(name, raw)
+        if plausible.is_constant(raw):
+            doubts.append("constant")
+        twin = plausible.copy_of(name, logged)
+        doubts += [f"copy of {twin}"] if twin else []
+        size = plausible.size_doubt(name, values)
+        doubts += [size] if size else []
+        doubts += pairs.get(name, [])
+        rms = float(np.sqrt(np.mean(np.square(values))))
+        extremes = float(values.min()), float(values.max())
+        found[name] = Judged(*extremes, rms, plausible.noise_level(raw), tuple(doubts))
+    return found
+
+
+def _alone(name: str, values: Floats) -> list[str]:
+    doubts = []
+    clip = plausible.clipped_at(values)
+    if clip is not None:
+        doubts.append(f"clipped at {clip:.4g}")
+    step = None if name.endswith("_stop") else plausible.quantised_step(values)
+    if step is not None:
+        doubts.append(f"quantised, step {step:.3g}")
+    single = [] if name.endswith(("_stop", "_force_step_N")) else plausible.spikes(values)
+    if single:
+        doubts.append(f"{len(single)} spike{'s' if len(single) > 1 else ''}")
+    return doubts
+
+
+def _between(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dict[str, list[str]]:
+    """Return the doubts that take two channels, or a channel and the rig, to see."""
+    doubts: dict[str, list[str]] = {}
+    for control in CONTROL_NAMES:
+        data = rig.controls.get(control) if rig is not None else None
+        own = [name for name in record if name.startswith(f"{control}_")]
+        if rig is not None and data is None and own:
+            raise InputError(file, own[0], f"the rig has no {control}")
+        moved = [channel(control, q) for q in ("computed", "deflection")]
+        moved = [name for name in moved if name in record]
+        for name in moved:
+            if data is not None:
+                _add(doubts, name, _travel(name, record[name], data, file))
+        if moved:
+            force = channel(control, "force")
+            if force in record and plausible.against(record[force], record[moved[0]]):
+                _add(doubts, force, "moves against the deflection: sign?")
+            _add(doubts, force, _force(record, control, moved[0], data))
+    pulled = next((n for n in ("column_computed_m", "column_deflection_m") if n in record), None)
+    elevator = record.get("elevator_rad")
+    if pulled and elevator is not None and plausible.against(-elevator, record[pulled]):
+        _add(doubts, "elevator_rad", "positive nose up: sign?")
+    air = ("dynamic_pressure_Pa", "true_airspeed_m_per_s", "altitude_m")
+    if all(name in record for name in air):
+        pressure, airspeed, altitude = (record[name] for name in air)
+        _add(doubts, air[0], plausible.pressure_doubt(pressure, airspeed, altitude))
+    return doubts
+
+
+def _add(doubts: dict[str, list[str]], name: str, doubt: str | None) -> None:
+    if doubt:
+        doubts.setdefault(name, []).append(doubt)
+
+
+def _travel(name: str, values: Floats, data: Control, file: object) -> str | None:
+    ratio = plausible.beyond_travel(values, data.travel)
+    if ratio is None:
+        return None
+    if ratio > plausible.FAR_BEYOND:
+        most = float(np.max(np.abs(values)))
+        problem = f"reaches {most:.3g} on a rig that stops at {data.travel:g}: is its unit right?"
+        raise InputError(file, name, problem)
+    return f"{ratio:.2f} of the rig's travel"
+
+
+def _force(
+    record: Mapping[str, Floats], control: str, moved: str, data: Control | None
+) -> str | None:
+    """Hold a force against the gradient, as recorded or as the rig's table has it."""
+    force, gradient = (channel(control, q) for q in ("force", "gradient"))
+    if force not in record:
+        return None
+    if gradient in record:
+        total = record[gradient]
+    elif data is not None and "dynamic_pressure_Pa" in record:
+        table = data.schedule
+        pressure = record["dynamic_pressure_Pa"]
+        total = np.interp(pressure, table.dynamic_pressure, table.total_gradient)
+    else:
+        return None
+    ratio = plausible.force_ratio(record[force], record[moved], total)
+    if ratio is None:
+        return None
+    if plausible.in_pounds(abs(ratio)):
+        return "looks like pounds"
+    return "was N already, not lbf?" if plausible.from_newtons(abs(ratio)) else None

@@ -1,0 +1,193 @@
+"""Whether a channel can be what its name says: each rule once, on arrays in SI.
+
+A rule returns what it found, as a few words or a number, or nothing. Doubts are for a
+person to weigh: a bench record has a q̄ that never changes, and is none the worse for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.record.channels import CONTROL_NAMES
+from coupled.units import POUND_N, PSF_Pa
+
+Floats = NDArray[np.float64]
+FAR_BEYOND = 3.0  # times the travel: no rig does that, so its unit is another
+_D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
+
+# Beyond these no channel of a rig or a transport aircraft in normal flight goes.
+_BOUNDS: dict[str, tuple[float, float]] = {
+    "force_N": (-2500.0, 2500.0),
+    "modifying_force_N": (-2500.0, 2500.0),
+    "dynamic_pressure_Pa": (-50.0, 1e5),
+    "true_airspeed_m_per_s": (-1.0, 1000.0),
+    "altitude_m": (-500.0, 30_000.0),
+    "gradient_N_per_m": (0.0, 1e6),
+    "gradient_N_per_rad": (0.0, 1e6),
+}
+_ANGLES = {"roll_rad": 2.0 * np.pi, "heading_rad": 4.0 * np.pi}
+_SMALL_ANGLE_rad = np.pi / 2.0
+_FASTEST_rad_per_s = 6.0
+_LONGEST_m = 1.0
+
+
+def noise_level(values: Floats) -> float:
+    """Return the standard deviation of a channel's white noise, by its fourth differences.
+
+    The median makes it blind to steps and to single bad values.
+    """
+    if values.size < 5:
+        return 0.0
+    return float(np.median(np.abs(np.diff(values, 4))) / (0.6745 * _D4))
+
+
+def is_constant(values: Floats) -> bool:
+    """Tell whether a channel never changes."""
+    return bool(np.ptp(values) == 0.0)
+
+
+def copy_of(name: str, channels: Mapping[str, Floats]) -> str | None:
+    """Return the first channel before `name` that has the same numbers, all of them.
+
+    An estimate is the computed deflection where nothing is corrected; constants match idly.
+    """
+    values = channels[name]
+    if is_constant(values):
+        return None
+    for other, theirs in channels.items():
+        if other == name:
+            return None
+        same = {name.partition("_")[2], other.partition("_")[2]}
+        if same in ({"computed_m", "estimate_m"}, {"computed_rad", "estimate_rad"}):
+            continue
+        if np.array_equal(values, theirs):
+            return other
+    return None
+
+
+def clipped_at(values: Floats) -> float | None:
+    """Return the extreme at which a noisy channel stays, exactly, for five rows or more."""
+    if noise_level(values) == 0.0:
+        return None
+    still = np.diff(values) == 0.0
+    for extreme in (float(values.max()), float(values.min())):
+        at = values == extreme
+        if _longest(at) >= max(5, 4 * (1 + _longest(still & ~at[1:]))):
+            return extreme
+    return None
+
+
+def _longest(true: NDArray[np.bool_]) -> int:
+    """Return the length of the longest run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], true, [False])).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def quantised_step(values: Floats) -> float | None:
+    """Return the step of a channel so coarsely quantised that the step hides its noise."""
+    levels = np.unique(values)
+    if levels.size < 3:
+        return None
+    steps = np.diff(levels)
+    whole = steps[steps > 1e-6 * np.ptp(values)]
+    step = float(whole.min())
+    counts = whole / step
+    regular = whole.size == steps.size and np.all(np.abs(counts - np.rint(counts)) < 0.02)
+    coarse = step > 1.5 * noise_level(values) and step > 1e-3 * np.ptp(values)
+    # Few rows always lie on some levels: each must have been met more than once, on average.
+    return step if regular and coarse and 2 * levels.size < values.size else None
+
+
+def spikes(values: Floats) -> list[int]:
+    """Return the rows that stand out alone between neighbours that agree."""
+    if values.size < 5:
+        return []
+    away = values[1:-1] - 0.5 * (values[2:] + values[:-2])
+    apart = np.abs(values[2:] - values[:-2])
+    least = max(12.0 * noise_level(values), 0.02 * float(np.ptp(values)))
+    alone = (np.abs(away) > least) & (3.0 * apart < np.abs(away))
+    return [int(row) + 1 for row in np.flatnonzero(alone)]
+
+
+def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float | None:
+    """Return the force over what gradient times deflection say, by least squares."""
+    expected = gradient * deflection
+    power = float(expected @ expected)
+    return float(force_N @ expected) / power if power > 0.0 else None
+
+
+def in_pounds(ratio: float) -> bool:
+    """Tell whether a force ratio is that of a force in lbf that passes for one in N."""
+    return abs(ratio * POUND_N - 1.0) < 0.25
+
+
+def from_newtons(ratio: float) -> bool:
+    """Tell whether a force ratio is that of a force in N that was taken for lbf."""
+    return abs(ratio / POUND_N - 1.0) < 0.25
+
+
+def against(first: Floats, second: Floats) -> bool:
+    """Tell whether two channels that ought to move together move against each other."""
+    a, b = first - np.median(first), second - np.median(second)
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    return scale > 0.0 and float(a @ b) / scale < -0.3
+
+
+def beyond_travel(deflection: Floats, travel: float) -> float | None:
+    """Return the greatest deflection over the travel, where it exceeds it by more than noise."""
+    most = float(np.max(np.abs(deflection)))
+    return most / travel if most > 1.05 * travel + 5.0 * noise_level(deflection) else None
+
+
+def size_doubt(name: str, values: Floats) -> str | None:
+    """Say what a channel's size tells against its unit: degrees, millimetres, g less one."""
+    low, high = float(values.min()), float(values.max())
+    most = max(-low, high)
+    control, _, rest = name.partition("_")
+    plain = rest if control in CONTROL_NAMES else name
+    if name == "load_factor":
+        return _level_doubt(float(np.median(values)))
+    angle, size = _largest(name)
+    if most > size:
+        return "looks like degrees" if angle else "looks like mm, cm or in"
+    least, greatest = _BOUNDS.get(plain, (-np.inf, np.inf))
+    return f"beyond {least:g} to {greatest:g}" if low < least or high > greatest else None
+
+
+def _largest(name: str) -> tuple[bool, float]:
+    """Tell whether a channel is an angle or its rate, and the most that it can be."""
+    if name.endswith("_rad_per_s"):
+        return True, _FASTEST_rad_per_s
+    if name.endswith("_rad") and "_N_per_" not in name:
+        turns = 2.0 * np.pi if name.startswith("wheel_") else _SMALL_ANGLE_rad
+        return True, _ANGLES.get(name, turns)
+    length = name.endswith("_m") and "_N_per_" not in name and name != "altitude_m"
+    return False, _LONGEST_m if length else np.inf
+
+
+def _level_doubt(median: float) -> str | None:
+    """Say that a load factor is not +1 for most of the time, as in level flight it is."""
+    if abs(median) < 0.3:
+        return "is 0 in level flight: offset 1?"
+    if median < -0.5:
+        return "is -1 in level flight: sign?"
+    return f"is {median:.3g} in level flight" if median > 5.0 else None
+
+
+def pressure_doubt(pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Floats) -> str | None:
+    """Say that q̄ does not fit airspeed and altitude in the standard air, ½·ρ·V²."""
+    kelvin = np.maximum(288.15 - 0.0065 * np.clip(altitude_m, -500.0, 11_000.0), 216.65)
+    density = 1.225 * (kelvin / 288.15) ** 4.2559
+    density *= np.exp(-np.maximum(altitude_m - 11_000.0, 0.0) / 6341.6)
+    expected = 0.5 * density * airspeed_m_per_s**2
+    if not np.median(expected) > 50.0:  # at rest there is nothing to compare
+        return None
+    ratio = float(np.median(pressure_Pa) / np.median(expected))
+    if 0.7 < ratio < 1.4:
+        return None
+    if 0.7 < ratio * PSF_Pa < 1.4:
+        return "looks like psf"
+    return f"is {ratio:.3g} of what airspeed and altitude say"

@@ -1,0 +1,185 @@
+"""The columns of a log, by name, from CSV, Parquet or MATLAB; a fault names the line.
+
+A log may hold columns that are no numbers: only what the map asks for is read as such.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.errors import InputError, nearest
+from coupled.record.csvfile import numbers
+from coupled.record.importing.apart import read_apart
+from coupled.record.importing.mapping import Layout
+
+Floats = NDArray[np.float64]
+Lines = NDArray[np.int64]
+FORMATS = {
+    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log"), "csv"),
+    **{".parquet": "parquet", ".mat": "mat"},
+}
+LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a record
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log's columns, as they stand in it. `lines` tells the line of each row of a CSV."""
+
+    file: Path
+    columns: Mapping[str, pl.Series]
+    units: Mapping[str, str] = field(default_factory=dict)
+    doubled: frozenset[str] = frozenset()
+    lines: Lines | None = None
+
+    def line(self, row: int) -> int:
+        """Return where a row, counted from 0, stands in the file, counted from 1."""
+        return row + 1 if self.lines is None else int(self.lines[row])
+
+    def find(self, name: str, map_file: Path, key: str) -> pl.Series:
+        """Return the column of a name that a map gives under `key`."""
+        if name in self.doubled:
+            raise InputError(self.file, name, "stands there twice; which is meant?")
+        if name not in self.columns:
+            hint = nearest(name, self.columns)
+            if len(self.columns) == 1:
+                hint = f"its only column is {next(iter(self.columns))!r}: another log.delimiter?"
+            raise InputError(map_file, key, f"{self.file.name} has no {name!r}; {hint}")
+        return self.columns[name]
+
+    def values(self, name: str, map_file: Path, key: str) -> Floats:
+        """Return a column as doubles, NaN where a cell is empty, shape (rows,)."""
+        column = self.find(name, map_file, key)
+        self._check_kind(name, column)
+        return numbers(self.file, name, column, gaps=True, line=self.line)
+
+    def time(self, name: str, map_file: Path, key: str) -> tuple[Floats, bool]:
+        """Return a clock's column from its first row on, and whether it is in seconds already.
+
+        Taken from the first row before it becomes a double: a clock in ns since 1970 keeps
+        all its digits.
+        """
+        column = self.find(name, map_file, key)
+        dated = column.dtype.is_temporal()
+        if dated:
+            count = column.to_physical()
+            steps = count - count.drop_nulls().head(1).max() if count.len() else count
+            unit = getattr(column.dtype, "time_unit", None)
+            per_s = {"ms": 1e3, "us": 1e6, "ns": 1e9, None: 1e9}[unit]
+            if column.dtype == pl.Date:
+                raise InputError(self.file, name, "holds days, without a time of day")
+            return steps.cast(pl.Float64).to_numpy().astype(np.float64) / per_s, True
+        self._check_kind(name, column)
+        values = numbers(self.file, name, column, True, self.line, LATEST_ns)
+        if column.dtype.is_integer() and column.len() and column[0] is not None:
+            wide = column.cast(pl.Int64, strict=False) - int(column[0])
+            return wide.cast(pl.Float64).to_numpy().astype(np.float64), False
+        return (values - values[0] if values.size else values), False
+
+    def _check_kind(self, name: str, column: pl.Series) -> None:
+        kind = column.dtype
+        if not (kind.is_numeric() or kind in (pl.String, pl.Boolean, pl.Null)):
+            raise InputError(self.file, name, f"holds {kind}, no numbers")
+
+
+def read_log(path: Path, layout: Layout) -> Log:
+    """Return the columns of a log in the format of the map, or of the file's extension."""
+    kind = layout.format or FORMATS.get(path.suffix.lower())
+    if kind is None:
+        known = ", ".join(FORMATS)
+        raise InputError(path, "", f"its format is not known; {known}, or log.format in the map")
+    if not path.is_file():
+        missing = "there is no such file" if not path.exists() else "is no file"
+        raise InputError(path, "", missing)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    if kind == "csv":
+        return _read_csv(path, content, layout)
+    return Log(path, read_apart(path, content, kind, layout))
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
+    text = _text(path, content, layout.encoding)
+    kept, lines = _rows(text, layout)
+    if not kept:
+        raise InputError(path, "", "is empty")
+    delimiter = layout.delimiter
+    if path.suffix.lower() == ".tsv" and delimiter == ",":
+        delimiter = "\t"
+    if delimiter == " ":  # columns set apart by any white space
+        kept = ["\t".join(line.split()) for line in kept]
+        delimiter = "\t"
+    try:
+        table = pl.read_csv(
+            io.BytesIO("\n".join(kept).encode()),
+            has_header=False,
+            infer_schema=False,
+            separator=delimiter,
+        )
+    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
+        raise InputError(path, "", f"is not a table: {_first_line(error)}") from None
+    heads = 1 if layout.header else 0
+    under = heads + (1 if layout.units_row else 0)
+    if table.height <= under:
+        raise InputError(path, "", "has a header and no row of numbers")
+    names = [str(i + 1) for i in range(table.width)]
+    if layout.header:
+        names = [(cell or "").strip() for cell in table.row(0)]
+    units = dict(zip(names, table.row(heads), strict=True)) if layout.units_row else {}
+    columns = {}
+    for name, column in zip(names, table.slice(under).get_columns(), strict=True):
+        columns[name] = _cells(column, layout)
+    found = np.array(lines[under:], dtype=np.int64)
+    whole = found if len(found) == table.height - under else None  # else a cell held a line's end
+    return Log(
+        path,
+        columns,
+        {name: unit for name, unit in units.items() if unit},
+        frozenset(name for name in names if names.count(name) > 1),
+        whole,
+    )
+
+
+def _text(path: Path, content: bytes, encoding: str) -> str:
+    try:
+        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except UnicodeError:
+        known = "utf-8, latin-1 or utf-16"
+        problem = f"is not text in {encoding.upper()}; set log.encoding to {known}"
+        raise InputError(path, "", problem) from None
+    if "\0" in text:
+        raise InputError(path, "", "holds bytes that are no text: another format?")
+    return text
+
+
+def _rows(text: str, layout: Layout) -> tuple[list[str], list[int]]:
+    """Return the lines that are rows, and where they stand in the file."""
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    kept, where = [], []
+    for number, line in enumerate(lines[layout.skip_rows :], layout.skip_rows + 1):
+        if not line.strip() or (layout.comment and line.lstrip().startswith(layout.comment)):
+            continue
+        kept.append(line)
+        where.append(number)
+    return kept, where
+
+
+def _cells(column: pl.Series, layout: Layout) -> pl.Series:
+    cells = column.str.strip_chars()
+    if layout.missing:
+        cells = cells.set(cells.is_in(layout.missing).fill_null(False), None)
+    if layout.decimal == ",":
+        cells = cells.str.replace(",", ".", literal=True)
+    return cells

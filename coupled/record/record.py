@@ -1,0 +1,100 @@
+"""A record: the time history of a flight or of a rig, its channels named with their units.
+
+CSV by default, Parquet by extension. A manifest beside it, in JSON, says what made
+it: versions, the hashes of what went in, the seed, and what happened on the way.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.errors import InputError, nearest
+from coupled.files import write_text, write_whole
+from coupled.record.channels import TIME
+from coupled.record.csvfile import read_columns
+
+Floats = NDArray[np.float64]
+SUFFIXES = (".csv", ".parquet")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Channels over time: `data` has shape (rows, channels), SI, one row a frame."""
+
+    channels: tuple[str, ...]
+    data: Floats
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, channel: str) -> Floats:
+        if channel not in self.channels:
+            raise KeyError(f"no channel {channel}; {nearest(channel, self.channels)}")
+        return self.data[:, self.channels.index(channel)]
+
+    def __contains__(self, channel: str) -> bool:
+        return channel in self.channels
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    @property
+    def time_s(self) -> Floats:
+        """Time of each row."""
+        return self[TIME]
+
+    def between(self, start_s: float, end_s: float) -> Record:
+        """Return the rows with start ≤ t < end."""
+        rows = (self.time_s >= start_s) & (self.time_s < end_s)
+        return Record(self.channels, self.data[rows], self.manifest)
+
+
+def manifest_path(path: Path) -> Path:
+    """Return where the manifest of a record lies."""
+    return path.with_suffix(".manifest.json")
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a record's path whose extension names no format."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(path, "", f"a record ends in {' or '.join(SUFFIXES)}")
+
+
+def write_record(record: Record, path: Path) -> None:
+    """Write a record, and its manifest beside it, each whole."""
+    check_suffix(path)
+    frame = pl.DataFrame(record.data, schema=list(record.channels), orient="row")
+    if path.suffix.lower() == ".csv":
+        write_whole(path, frame.write_csv)
+    else:
+        write_whole(path, frame.write_parquet)
+    text = json.dumps(record.manifest, indent=2, ensure_ascii=False, sort_keys=True)
+    write_text(manifest_path(path), text + "\n")
+
+
+def read_record(path: Path) -> Record:
+    """Return the record of a file, with its manifest where there is one."""
+    check_suffix(path)
+    columns = read_columns(path, gaps=True)
+    if TIME not in columns:
+        raise InputError(path, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
+    if len(columns) < 2 or len(columns[TIME]) < 2:
+        raise InputError(path, "", "holds no channel over time")
+    if not np.all(np.diff(columns[TIME]) > 0.0):
+        raise InputError(path, TIME, "must rise from row to row, without a gap")
+    data = np.column_stack(list(columns.values()))
+    return Record(tuple(columns), data, _read_manifest(manifest_path(path)))
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return manifest if isinstance(manifest, dict) else {}

@@ -1,0 +1,67 @@
+"""Records with a known effect, made by flying a rig that has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.flight.loop import fly
+from coupled.flight.pilot import Table
+from coupled.flight.scenario import Bench, RunFile, Scenario, read_run
+from coupled.gap.effects import BY_NAME, apply
+from coupled.record.record import Record
+from coupled.rig.parameters import Rig
+from coupled.schema import build
+from tests.reference.test_records import NOISE
+from tests.support.rigs import BENCH, bench
+
+LONG_s = 40.0
+
+
+def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a pilot's force: holds of random size and length, with a sweep on top."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(LONG_s * 120) + 1) / 120
+    force = 0.2 * amplitude_N * np.sin(2 * np.pi * (0.1 + 0.0125 * t) * t) * (t < LONG_s - 3)
+    at = 1.0
+    while at < LONG_s - 4:
+        length, size = rng.uniform(0.4, 3.0), rng.uniform(-1, 1) * amplitude_N
+        for start, sign in ((at, 1.0), (at + length, -1.0)):
+            share = np.clip((t - start) / 0.25, 0.0, 1.0)
+            force += sign * size * 0.5 * (1.0 - np.cos(np.pi * share))
+        at += length + rng.uniform(0.0, 0.6)
+    return t, force
+
+
+def nominal_rig(flown: bool) -> Rig:
+    """Return the rig that a diagnosis is held against."""
+    if flown:
+        return read_run("worst-case-t37")[0].rig
+    table = {**BENCH, "frame_rate_Hz": 120.0}
+    return bench({"controls.column.schedule.pressure_scale": 1.0}, table)
+
+
+def made(
+    folder: Path, nominal: Rig, values: Mapping[str, Mapping[str, float]], seed: int
+) -> Record:
+    """Return the noisy record of a rig that has the effects of `values`."""
+    effects = [BY_NAME[name] for name in values]
+    flat = {f"{name}.{key}": v for name, found in values.items() for key, v in found.items()}
+    real = apply(nominal, "column", effects, flat)
+    flown = nominal.flight is not None
+    told = ("column", "dynamic")
+    noise = {name: level for name, level in NOISE.items() if flown or name.startswith(told)}
+    real = real.model_copy(update={"noise": noise})
+    t, force = pushes(seed)
+    rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
+    (folder / "force.csv").write_text("time_s,column_force_N\n" + rows)
+    pilot = build(Table, {"kind": "table", "file": "force.csv"}, "t", "pilot.column")
+    pressures = [300.0, 300.0, 1200.0, 1200.0, 2000.0, 2000.0, 2900.0]
+    times = [0.0, 9.0, 10.0, 19.0, 20.0, 29.0, 30.0]
+    told_q = None if flown else Bench(time=times, dynamic_pressure=pressures)
+    run = RunFile(name="t", card="t", rig="t", duration=LONG_s, seed=seed, bench=told_q)
+    here = folder / "force.csv"
+    return fly(Scenario(run, here, real, here, {"column": pilot}, "t"))
