@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -139,6 +139,57 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
         return section(**values)
     except ValidationError as error:
         raise _first_fault(error, keys, file, path) from None
+
+
+def grouped(changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return changes by the first part of their dotted keys; the key of a whole part is empty."""
+    found: dict[str, dict[str, Any]] = {}
+    for key, value in changes.items():
+        first, _, rest = key.partition(".")
+        found.setdefault(first, {})[rest] = value
+    return found
+
+
+def changed(
+    section: S, changes: Mapping[str, Any], file: object, path: str = "", d: str = "m"
+) -> S:
+    """Return a section with some values replaced, {dotted key of a file: value}, and checked.
+
+    A value may be a whole section, or the table of one. Faults are those of a file's table.
+    """
+    keys = file_keys(type(section), d)
+    groups = grouped(changes)
+    known_keys(dict(groups), keys, file, path)
+    fields = type(section).model_fields
+    values = {name: getattr(section, name) for name in fields}
+    for key, inner in groups.items():
+        dotted = f"{path}.{key}" if path else key
+        before = values[keys[key]]
+        if "" in inner:
+            value = inner[""]
+            kind = _section_of(fields[keys[key]].annotation)
+            if kind is not None and isinstance(value, Mapping):
+                value = build(kind, dict(value), file, dotted, d)
+            _refuse_huge(value, file, dotted)
+        elif isinstance(before, Section):
+            value = changed(before, inner, file, dotted, d)
+        elif isinstance(before, dict):
+            value = {**before, **inner}
+        else:
+            raise InputError(
+                file, f"{dotted}.{next(iter(inner))}", "leads through a value, not a table"
+            )
+        values[keys[key]] = value
+    try:
+        return type(section)(**values)
+    except ValidationError as error:
+        raise _first_fault(error, keys, file, path) from None
+
+
+def _section_of(annotation: Any) -> type[Section] | None:
+    """Return the section that a field holds, alone or optionally, if any."""
+    kinds = () if get_origin(annotation) is dict else get_args(annotation) or (annotation,)
+    return next((k for k in kinds if isinstance(k, type) and issubclass(k, Section)), None)
 
 
 def _refuse_huge(value: Any, file: object, key: str) -> None:

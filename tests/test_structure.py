@@ -18,6 +18,7 @@ from coupled.flight.wind import Wind
 from coupled.record import channels
 from coupled.record.importing.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
+from coupled.rig.rig import Rig
 from coupled.schema import Section, file_keys
 
 PACKAGE = Path(__file__).parents[1] / "coupled"
@@ -87,7 +88,7 @@ def test_nothing_silences_a_warning_or_a_type() -> None:
 
 def test_every_key_of_the_files_is_documented() -> None:
     text = (PACKAGE.parent / "docs" / "files.md").read_text(encoding="utf-8")
-    sections: list[type[Section]] = [parameters.Rig, parameters.Flight, parameters.Control]
+    sections: list[type[Section]] = [Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
     sections += [RunFile, Bench, Wind, Gust, Turbulence, Event, Measure, Expect]
@@ -112,7 +113,7 @@ def test_every_key_of_the_files_is_documented() -> None:
 
 
 # What the twin may take from the rig: its data, and how functions are compiled. No stage.
-SHARED = ("coupled.rig.parameters", "coupled.rig.compiled")
+SHARED = ("coupled.rig.rig", "coupled.rig.parameters", "coupled.rig.compiled")
 
 
 def test_the_twin_shares_no_stage_with_the_rig() -> None:

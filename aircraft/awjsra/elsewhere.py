@@ -15,7 +15,7 @@ import jsbsim
 import numpy as np
 from validate import RIG, trimmed
 
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.units import KNOT_m_per_s
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals
 
 from coupled.flight.newton import newton_trim
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.units import FOOT_m, KNOT_m_per_s, POUND_PER_INCH_N_per_m, PSF_Pa
 

@@ -21,7 +21,7 @@ from coupled.flight.scenario import Configuration, Scenario
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.statics import specified_force, static_point
 
 Floats = NDArray[np.float64]

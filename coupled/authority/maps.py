@@ -23,7 +23,8 @@ from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.rig.statics import static_line
 from coupled.schema import load_toml
 from coupled.units import KNOT_m_per_s

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result

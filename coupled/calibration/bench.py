@@ -29,7 +29,7 @@ from coupled.calibration.estimate import Instruments
 from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
 from coupled.calibration.readings import Readings, readings_of
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.told import nodes_of, run_told, smooth, under_supply
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from coupled.calibration.sweeps import Release
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.told import Told
 from coupled.units import POUND_N, DEGREE_rad
 

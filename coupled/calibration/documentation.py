@@ -12,7 +12,7 @@ from coupled.flight.direct import check_direct_controls
 from coupled.flight.scenario import configure
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import aircraft_folder
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.told import Told
 
 Progress = Callable[[str, int, int], None]

@@ -23,7 +23,7 @@ from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from coupled.calibration.plan import gradient_sets
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.statics import static_line, static_point
 from coupled.rig.told import Told, nodes_of, run_told
 

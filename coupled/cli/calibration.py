@@ -25,7 +25,7 @@ from coupled.record.channels import ControlName
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
-    from coupled.rig.parameters import Rig
+    from coupled.rig.rig import Rig
 
 
 @app.command(

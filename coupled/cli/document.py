@@ -17,7 +17,7 @@ from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
     from coupled.calibration.calibrate import Result
-    from coupled.rig.parameters import Rig
+    from coupled.rig.rig import Rig
 
 
 @app.command(

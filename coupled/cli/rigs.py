@@ -18,7 +18,7 @@ from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
-    from coupled.rig.parameters import Rig
+    from coupled.rig.rig import Rig
 
 DEFAULT_RIG = "report-column"
 RigOption = Annotated[str, typer.Option(help="A rig file, or the name of a shipped one.")]

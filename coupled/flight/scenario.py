@@ -19,7 +19,8 @@ from coupled.flight.expectation import Expect, check_expectations
 from coupled.flight.pilot import PILOTS, Pilot, Sweep, Table, Track, read_force_table
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel, record_channels, unit_of
 from coupled.resources import find, shipped_rigs, shipped_runs
-from coupled.rig.parameters import PLAIN_NAME, Rig
+from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, read_rig
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
 

@@ -21,7 +21,8 @@ from coupled.gap.surfaces import commands, surface_channel
 from coupled.record.channels import motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
-from coupled.rig.parameters import Flight, Rig
+from coupled.rig.parameters import Flight
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 RATE = "pitch_rate_rad_per_s"

@@ -9,7 +9,7 @@ from coupled.gap.effects import SETTINGS, Effect
 from coupled.gap.fit import Fit, fit
 from coupled.gap.output import Output, Part, stage_gaps
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 SETTLE = 1.05  # gap from which a stage's settings are worth fitting
 Tell = Callable[[str, int, int], None]

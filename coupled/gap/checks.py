@@ -8,7 +8,7 @@ from coupled.errors import InputError
 from coupled.record.channels import ControlName, channel
 from coupled.record.importing import plausible
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 ANOTHER = 2.0  # factor on the gradient beyond which a rig file is another rig's
 OFF_SPEED = 0.03  # relative error of the trimmed airspeed, likewise

@@ -19,7 +19,7 @@ from coupled.gap.fit import Fit, shows_in
 from coupled.gap.output import Output, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
 RIVAL = 4.0  # and by which the best must beat another to be the only answer

@@ -28,7 +28,7 @@ from coupled.gap.surfaces import surface_points
 from coupled.gap.where import remains, where
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 # What the search is sure of is right in so many of 100 blind trials; where structure is left, an
 # effect found may only imitate what is there.

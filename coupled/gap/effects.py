@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Mode = Literal["value", "factor", "added", "switch"]
 

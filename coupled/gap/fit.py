@@ -19,7 +19,7 @@ from scipy.stats import t as student
 from coupled.gap.effects import Effect, Parameter, apply
 from coupled.gap.output import Output, Part, memory
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 CHANGE = 0.3  # floors by which a difference should move the residual

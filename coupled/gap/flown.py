@@ -18,7 +18,8 @@ from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:

@@ -25,7 +25,7 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 LENGTH_s = 15.0

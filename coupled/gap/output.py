@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]

@@ -27,7 +27,7 @@ from coupled.gap.effects import (
 from coupled.gap.fit import touched
 from coupled.gap.output import Output
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 DECADE, DECADES = 10.0, 3  # sizes are sought over three decades to either side of a fit's start

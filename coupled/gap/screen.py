@@ -14,7 +14,7 @@ import numpy as np
 from coupled.gap.case import Case
 from coupled.gap.effects import Effect, apply
 from coupled.gap.fit import Fit, touched
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 SCREENED = 6
 SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts

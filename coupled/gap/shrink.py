@@ -11,7 +11,7 @@ from coupled.gap.case import Case
 from coupled.gap.choose import Choice
 from coupled.gap.fit import touched
 from coupled.gap.output import Output
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 BOOTSTRAPS = 400
 FEW = 8  # blocks under which a bootstrap interval is not to be relied on

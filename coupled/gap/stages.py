@@ -26,7 +26,6 @@ from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -36,6 +35,7 @@ from coupled.rig.replay import (
     replay_schedule,
     replay_surface,
 )
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 SHARED = 0.1  # of G_T's noise that echoes q̄'s: the host is taken to have made it of q̄ as recorded

@@ -20,8 +20,9 @@ from coupled.gap.smooth import Smoother, smoothed
 from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
-from coupled.rig.parameters import Flight, Rig
+from coupled.rig.parameters import Flight
 from coupled.rig.replay import replay_surface
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]

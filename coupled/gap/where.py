@@ -19,7 +19,7 @@ from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 WINDOW_s = 0.5

@@ -17,8 +17,8 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.channels import CONTROL_NAMES, channel
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
 from coupled.rig.replay import replay_compensation
+from coupled.rig.rig import Rig
 from coupled.units import DEGREE_rad
 
 # Okabe and Ito's colours, as in the other figures: what is wrong is vermilion, what is right green.

@@ -19,8 +19,9 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import command_of, surface_channel, surface_points
 from coupled.record.channels import channel, unit_of
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import Loader, Rig
+from coupled.rig.parameters import Loader
 from coupled.rig.replay import replay_product, replay_surface
+from coupled.rig.rig import Rig
 from coupled.units import DEGREE_rad
 
 LITTLE = 10.0  # % of the surface's travel under which a ratio of commands says nothing

@@ -17,7 +17,7 @@ from coupled.plots import gapview as look
 from coupled.plots.gapview import View, plain, style_of, unit_shown, words
 from coupled.plots.signals import SIGNALS, Scene
 from coupled.plots.structure import draw_structure
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Kind = Literal["law", "loop", "time"]
 _EDGE = 12  # frames at a record's ends that a derivative spoils

@@ -14,7 +14,7 @@ from coupled.authority.stability.limits import gradient_range
 from coupled.authority.stability.planes import Kind, Plane
 from coupled.plots.pages import panels
 from coupled.record.channels import ControlName
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
 _FASTEST = 100.0  # 1/s, the ends of the colours

@@ -17,7 +17,7 @@ from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame
 from coupled.rig.hand import grip_force
 from coupled.rig.loader import start_delay
 from coupled.rig.packing import Hand, pack
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 _LEAST_FRAMES = 96

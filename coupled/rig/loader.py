@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.friction import FrictionParameters, running_friction
 from coupled.rig.modification import ModificationState, slope, smooth_force
+from coupled.rig.parameters import DELAY_SLOTS
 
-DELAY_SLOTS = 1024  # force history, in substeps; a power of two
 MAX_EVENTS = 16  # events in one substep before the control is taken to be at rest
 NOTHING, REST, STOP, NEUTRAL = 0, 1, 2, 3  # what may end a smooth stretch
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from coupled.rig.control import CONTROL, ControlArray
 from coupled.rig.linkage import servo_weights
-from coupled.rig.parameters import Control, Loader, Rig
+from coupled.rig.parameters import Control, Loader
+from coupled.rig.rig import Rig
 
 
 @dataclass(frozen=True)

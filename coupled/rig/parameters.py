@@ -1,4 +1,4 @@
-"""What a control-loading rig is: the data of a rig file, checked and frozen.
+"""The sections of a control-loading rig: the data of a rig file, checked and frozen.
 
 Each section below is a table of the file; a field's key there is its name and its
 unit, d being m for column and pedals and rad for a wheel (`schema`). A neutral value
@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from coupled.record.channels import ControlName
 from coupled.schema import Section, quantity
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+MAX_ROWS = 32  # of a schedule's table
+DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
 
 
 class Loader(Section):
@@ -150,23 +151,3 @@ class Flight(Section):
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}
-
-
-class Rig(Section):
-    """A control-loading rig, and the aircraft that it is coupled to.
-
-    Without `flight` it is a bench: q̄ is told, and there is no aircraft. `noise` gives
-    the standard deviation of a channel's white noise by the channel's name.
-    """
-
-    name: str = quantity("", pattern=PLAIN_NAME)
-    frame_rate: float = quantity("Hz", ge=1, le=2000)
-    loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
-    controls: dict[ControlName, Control]
-    flight: Flight | None = None
-    noise: dict[str, float] = {}
-
-    @property
-    def substeps(self) -> int:
-        """Loader steps in a frame: enough for the loader's rate."""
-        return max(1, -int(-self.loader_rate // self.frame_rate))

@@ -19,7 +19,7 @@ from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import pack
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted
 from coupled.rig.surface import command_surface

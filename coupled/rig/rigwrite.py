@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coupled.record.channels import unit_of
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.schema import Section, file_keys
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import layout, stage
+from coupled.rig.parameters import MAX_ROWS
 
-MAX_ROWS = 32
 Table = NDArray[np.float64]
 
 

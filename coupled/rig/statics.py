@@ -22,7 +22,7 @@ from coupled.rig.compensation import estimate
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import pack
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 
 Floats = NDArray[np.float64]

@@ -9,17 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.packing import pack
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 
@@ -42,12 +41,6 @@ class Told:
     surface: Floats
 
 
-def alone(rig: Rig, control: str) -> Rig:
-    """Return the rig with one control only, no aircraft and no noise."""
-    one = {cast(ControlName, control): rig.controls[cast(ControlName, control)]}
-    return rig.model_copy(update={"controls": one, "flight": None, "noise": {}})
-
-
 def nodes_of(rig: Rig, frames: int) -> Floats:
     """Return the times of the loader's nodes over so many frames, s."""
     return np.arange(frames * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
@@ -59,7 +52,7 @@ def run_told(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> To
     `nodes_N` has `rig.substeps` values a frame and one more, straight between; `pressure_Pa`
     one a frame. No noise: what is read is what is so, but for scales and converters.
     """
-    rig = alone(rig, control)
+    rig = rig.only(control)
     controls = pack(rig)
     script = np.zeros((1, 2, len(nodes_N)))
     script[0, 0] = nodes_N
@@ -84,7 +77,7 @@ def under_supply(
     with the pilot's: it is turned to the first over `rise_s`, to the second over as long, and
     left for `rest_s`. The control starts at rest at neutral, with no hand on it (v₃ = 0).
     """
-    packed = pack(alone(rig, control))
+    packed = pack(rig.only(control))
     packed["parameters"]["loader"]["digital"] = 1  # F_mod is what is held, not a product
     h = 1.0 / (rig.frame_rate * rig.substeps)
     up, on = _turned(rise_s, rest_s, h)

@@ -23,7 +23,7 @@ from coupled.flight.pilot import Table
 from coupled.flight.scenario import Bench, RunFile, Scenario
 from coupled.gap.effects import BY_NAME
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.schema import build
 
 Floats = NDArray[np.float64]

@@ -22,7 +22,7 @@ from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
 from coupled.record.channels import ControlName
 from coupled.resources import shipped_rigs
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.rig.statics import static_line

@@ -27,7 +27,7 @@ from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import SIGNATURES, draw_signature
 from coupled.record.channels import unit_of
 from coupled.record.record import Record, write_record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.test_cli import coupled
 

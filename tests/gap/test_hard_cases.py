@@ -20,7 +20,7 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.gap.words import in_words
 from coupled.record.record import write_record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
 from tests.support.gaps import made, nominal_rig
 from tests.support.processes import begun, kill

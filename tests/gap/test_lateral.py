@@ -13,7 +13,7 @@ from coupled.gap.surfaces import surface_points
 from coupled.record.channels import ControlName, noisy_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 
 PUSH_N = {"column": 40.0, "wheel": 25.0, "pedals": 80.0}

@@ -21,7 +21,6 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.scenario import read_run
 from coupled.record.record import Record, read_record
-from coupled.rig.parameters import Rig
 from coupled.rig.replay import (
     replay_compensation,
     replay_linkage,
@@ -29,6 +28,7 @@ from coupled.rig.replay import (
     replay_schedule,
     replay_surface,
 )
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 
 Floats = NDArray[np.float64]

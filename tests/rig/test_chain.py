@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from coupled.flight.scenario import configure
 from coupled.rig import linkage, modification, sensing
 from coupled.rig.packing import pack
-from coupled.rig.parameters import Rig
 from coupled.rig.replay import drive_loader, replay_linkage, replay_schedule, replay_surface
+from coupled.rig.rig import Rig
 from coupled.rig.statics import bend_loss, static_line, static_point, uncompensated_loss
 from tests.support.rigs import G_STIFF, K_REPORT, bench
 

@@ -14,7 +14,7 @@ from coupled.flight.scenario import Bench, Configuration, RunFile, Scenario, con
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.schema import build
 from tests.support.rigs import G_STIFF, K_REPORT, bench

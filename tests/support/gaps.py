@@ -13,7 +13,7 @@ from coupled.flight.pilot import Table
 from coupled.flight.scenario import Bench, RunFile, Scenario, read_run
 from coupled.gap.effects import BY_NAME, apply
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.schema import build
 from tests.reference.test_records import NOISE
 from tests.support.rigs import BENCH, bench

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.readings import Readings, readings_of
 from coupled.resources import shipped_rigs
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.units import INCH_PER_POUND_m_per_N
 

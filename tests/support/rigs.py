@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig.parameters import Rig
 from coupled.rig.replay import drive_loader
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, rig_from_table
 
 # The report's case: 12.5 lb/in in SI, K = 0.016 in/lb in SI.

@@ -30,7 +30,7 @@ from coupled.flight.loop import fly
 from coupled.flight.response import Response, elevator_response
 from coupled.flight.scenario import Scenario, scenarios_from_table
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 _RATES_rad_per_s = np.geomspace(1.0, 30.0, 12)

@@ -23,7 +23,8 @@ from coupled.authority.stability.planes import (
 from coupled.record.channels import ControlName
 from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 _POINTS = 41
 _SIMULATED_s = 8.0

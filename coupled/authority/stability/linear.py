@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 _COMPUTED, _RATE, _POSITION, _SPEED = range(4)

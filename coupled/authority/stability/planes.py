@@ -27,7 +27,7 @@ from coupled.authority.stability.linear import growth as linear_growth
 from coupled.record.channels import ControlName
 from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Kind = Literal["belief", "frame", "hand", "servo"]

@@ -16,7 +16,7 @@ from coupled.blind.trials.trial import Plan, draw_trial, plans
 from coupled.blind.twin.setting import csv_text
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
 
 Progress = Callable[[str, int, int], None]

@@ -8,7 +8,7 @@ from coupled.gap.fit import fit
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 
 def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, float]:

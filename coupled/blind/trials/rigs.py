@@ -13,7 +13,8 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig, rig_from_table
 from coupled.rig.rigwrite import rig_text
 

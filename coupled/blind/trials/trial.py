@@ -17,7 +17,7 @@ from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.setting import Setting, draw_setting, fly_clean
 from coupled.blind.twin.twin import LostError
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Rng = np.random.Generator
 KINDS = {kind.name: kind for kind in (*EFFECTS, *OUTSIDERS)}

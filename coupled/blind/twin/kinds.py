@@ -10,7 +10,8 @@ import numpy as np
 from coupled.blind.twin.twin import Twin
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
-from coupled.rig.parameters import Loader, Rig
+from coupled.rig.parameters import Loader
+from coupled.rig.rig import Rig
 
 
 @dataclass(frozen=True)

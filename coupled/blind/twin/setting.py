@@ -14,7 +14,7 @@ from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from coupled.record.channels import BENCH_MOTION, LONGITUDINAL
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
-from coupled.rig.parameters import Flight, Rig
+from coupled.rig.parameters import Flight
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 RIG_CHANNELS = (

@@ -14,7 +14,7 @@ from coupled.authority.stability.limits import Limit, Told
 from coupled.authority.stability.planes import Kind, Plane
 from coupled.files import write_whole
 from coupled.record.channels import unit_of
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
 _QUANTITIES: dict[Kind, str] = {

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.schema import Section, quantity
 
 Floats = NDArray[np.float64]

@@ -36,7 +36,8 @@ from coupled.flight.pilot.crossover import (
 from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import PITCH, Response, elevator_response, path_angle
 from coupled.rig.packing import COMMAND_SIGN, Hand
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.schema import named, quantity
 
 What = Literal["pitch", "flight_path", "airspeed"]

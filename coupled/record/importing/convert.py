@@ -26,7 +26,7 @@ from coupled.record.importing.mapping import (
 )
 from coupled.record.importing.reading import Log, read_log
 from coupled.record.record import Record
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.schema import LARGEST
 from coupled.units import parse_unit
 

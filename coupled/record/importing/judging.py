@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, channel
 from coupled.record.importing import plausible
-from coupled.rig.parameters import Control, Rig
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 

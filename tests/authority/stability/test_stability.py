@@ -26,7 +26,7 @@ from coupled.flight.scenario import Scenario, scenarios_from_table
 from coupled.resources import shipped_rigs
 from coupled.rig.growth import growth as simulated
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Rig
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from tests.support.rigs import BENCH, G_STIFF, K_REPORT, bench

@@ -1,0 +1,205 @@
+"""A control-loading rig, whole: its data, what the physics refuses of them, and changes to them.
+
+Beyond each value's own bounds a rig is refused for what the physics cannot give: a gradient
+stiffer than the structure (K·G_T ≥ 1, where eq. (12) is singular), a table that does
+not rise, a converter that the signal would overflow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+from coupled.errors import InputError, nearest
+from coupled.record.channels import (
+    CONTROL_NAMES,
+    SURFACES,
+    ControlName,
+    noisy_channels,
+    unit_of,
+)
+from coupled.rig.parameters import DELAY_SLOTS, MAX_ROWS, PLAIN_NAME, Control, Flight
+from coupled.schema import Section, build, changed, grouped, known_keys, quantity
+
+
+class Rig(Section):
+    """A control-loading rig, and the aircraft that it is coupled to.
+
+    Without `flight` it is a bench: q̄ is told, and there is no aircraft. `noise` gives
+    the standard deviation of a channel's white noise by the channel's name.
+    """
+
+    name: str = quantity("", pattern=PLAIN_NAME)
+    frame_rate: float = quantity("Hz", ge=1, le=2000)
+    loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
+    controls: dict[ControlName, Control]
+    flight: Flight | None = None
+    noise: dict[str, float] = {}
+
+    @property
+    def substeps(self) -> int:
+        """Loader steps in a frame: enough for the loader's rate."""
+        return max(1, -int(-self.loader_rate // self.frame_rate))
+
+    def changed(self, changes: Mapping[str, Any]) -> Rig:
+        """Return the rig with some values replaced: {dotted key of a rig file: value}.
+
+        A key is spelled as in a rig file, its unit at its end, as
+        `controls.column.loader.play_m`. A value may also be a whole table, a section of another
+        rig, or None for an aircraft that is left out. Raises InputError, as a rig file would,
+        naming this rig and the key.
+        """
+        plain = dict(changes)
+        controls = {key: plain.pop(key) for key in changes if key.split(".")[0] == "controls"}
+        whole = changed(self, plain, self.name)
+        if controls:
+            given = _changed_controls(self, controls)
+            whole = changed(whole, {"controls": given}, self.name)
+        return checked(whole, self.name)
+
+    def only(self, control: str) -> Rig:
+        """Return the rig with one control only, no aircraft and no noise.
+
+        Raises InputError where the rig has no such control.
+        """
+        if control not in self.controls:
+            problem = f"the rig has no {control}; {nearest(control, self.controls)}"
+            raise InputError(self.name, "controls", problem)
+        kept = {name: data for name, data in self.controls.items() if name == control}
+        return changed(self, {"controls": kept, "flight": None, "noise": {}}, self.name)
+
+
+def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control]:
+    """Return the rig's controls with some of their values replaced, by dotted keys."""
+    if "controls" in changes:
+        given = known_keys(changes["controls"], dict.fromkeys(CONTROL_NAMES), rig.name, "controls")
+        return {name: _control(rig, name, given[name]) for name in CONTROL_NAMES if name in given}
+    controls: dict[str, Control] = {str(name): control for name, control in rig.controls.items()}
+    inner = {key.partition(".")[2]: value for key, value in changes.items()}
+    for name, values in grouped(inner).items():
+        if name not in rig.controls:
+            problem = f"the rig has no {name}; {nearest(name, rig.controls)}"
+            raise InputError(rig.name, f"controls.{name}", problem)
+        if "" in values:
+            controls[name] = _control(rig, name, values[""])
+        else:
+            path = f"controls.{name}"
+            controls[name] = changed(controls[name], values, rig.name, path, unit_of(name))
+    return controls
+
+
+def _control(rig: Rig, name: str, given: Any) -> Control:
+    """Return a control given as a section, or as the table of one."""
+    if isinstance(given, Control):
+        return given
+    return build(Control, given, rig.name, f"controls.{name}", unit_of(name))
+
+
+def checked(rig: Rig, file: object) -> Rig:
+    """Return the rig; raise InputError for what the physics cannot give, naming `file`."""
+    for name, control in rig.controls.items():
+        _check_control(rig, name, control, file)
+    _check_noise(rig, file)
+    return rig
+
+
+def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
+    path = f"controls.{name}"
+    d = unit_of(name)
+    if control.surface != SURFACES[name]:
+        raise InputError(
+            file, f"{path}.surface", f"a {name} moves the {SURFACES[name]}, not {control.surface}"
+        )
+    loader = control.loader
+    if 0 < loader.breakaway < loader.friction:
+        raise InputError(
+            file,
+            f"{path}.loader.breakaway_N",
+            f"{loader.breakaway} is below friction_N = {loader.friction}; give at least that"
+            " (or 0 for plain Coulomb friction)",
+        )
+    if loader.delay * rig.frame_rate * rig.substeps > DELAY_SLOTS - 2:
+        raise InputError(
+            file, f"{path}.loader.delay_s", "is too long for this loader_rate_Hz; lower either"
+        )
+    if loader.arc_geometry and d == "rad":
+        raise InputError(
+            file, f"{path}.loader.arc_geometry", "a wheel's deflection is an angle already"
+        )
+    if loader.arc_geometry and control.length <= 2.0 * control.travel / math.pi:
+        raise InputError(
+            file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
+        )
+    _check_schedule(control, file, path, d)
+    _check_converters(control, file, path, d)
+
+
+def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
+    schedule, key = control.schedule, f"{path}.schedule"
+    pressures = schedule.dynamic_pressure
+    if len(pressures) > MAX_ROWS:
+        raise InputError(file, f"{key}.dynamic_pressure_Pa", f"has more than {MAX_ROWS} rows")
+    if any(b <= a for a, b in pairwise(pressures)):
+        raise InputError(file, f"{key}.dynamic_pressure_Pa", "must rise from value to value")
+    tables = {f"total_gradient_N_per_{d}": schedule.total_gradient}
+    if schedule.second_gradient is not None:
+        tables[f"second_gradient_N_per_{d}"] = schedule.second_gradient
+    if (schedule.second_gradient is None) != (schedule.break_deflection == 0.0):
+        raise InputError(
+            file,
+            f"{key}.break_deflection_{d}",
+            f"a second segment needs both break_deflection_{d} and second_gradient_N_per_{d}",
+        )
+    bends = {
+        f"{path}.loader.bend_{d}_per_N": control.loader.bend,
+        f"{path}.compensation.bend_{d}_per_N": control.compensation.bend,
+    }
+    for table_key, gradient in tables.items():
+        if len(gradient) != len(pressures):
+            raise InputError(
+                file,
+                f"{key}.{table_key}",
+                f"has {len(gradient)} values, dynamic_pressure_Pa {len(pressures)}; give as many",
+            )
+        sloped = [gradient[0] + schedule.slope * (g - gradient[0]) for g in gradient]
+        if min(sloped) < 0.0:
+            raise InputError(file, f"{key}.{table_key}", "a gradient cannot be negative")
+        for bend_key, bend in bends.items():
+            if bend * max(sloped) >= 1.0:
+                where = pressures[sloped.index(max(sloped))]
+                raise InputError(
+                    file,
+                    bend_key,
+                    f"K·G_T = {bend * max(sloped):.3g} at {where:g} Pa: no gradient stiffer than"
+                    f" the structure can be given; K must stay below {1.0 / max(sloped):.3g}"
+                    f" {d}/N, or {table_key} below {1.0 / bend:.4g}",
+                )
+
+
+def _check_converters(control: Control, file: object, path: str, d: str) -> None:
+    sensing, key = control.sensing, f"{path}.sensing"
+    if sensing.word_length == 0:
+        return
+    scales = {f"s1_V_per_{d}": sensing.s1, "s2_V_per_N": sensing.s2, "s3_V_per_N": sensing.s3}
+    for name, scale in scales.items():
+        if scale <= 0.0:
+            raise InputError(file, f"{key}.{name}", "must be given where word_length_bits is")
+    if sensing.s1 * control.travel * sensing.deflection_scale > sensing.full_scale:
+        raise InputError(
+            file,
+            f"{key}.s1_V_per_{d}",
+            f"full travel is {sensing.s1 * control.travel:.4g} V, beyond the converter's"
+            f" {sensing.full_scale:g} V; give at most {sensing.full_scale / control.travel:.4g}",
+        )
+
+
+def _check_noise(rig: Rig, file: object) -> None:
+    channels = noisy_channels(list(rig.controls), rig.flight is not None)
+    for channel, level in rig.noise.items():
+        if channel not in channels:
+            hint = nearest(channel, channels)
+            raise InputError(file, f"noise.{channel}", f"no such channel; {hint}")
+        if level < 0.0:
+            raise InputError(file, f"noise.{channel}", "a standard deviation cannot be negative")
