@@ -1,6 +1,6 @@
 """How often the intervals of 1000 benches hold the truth, and what a fit takes.
 
-Run alone, with its figures printed:  pytest tests/benchmarks/test_calibration.py -s
+Run alone, with its figures printed:  pytest -m bench -s
 """
 
 from __future__ import annotations
@@ -8,12 +8,16 @@ from __future__ import annotations
 import os
 import time
 
+import pytest
+
 from coupled.calibration.bench import Bench, take_readings
 from coupled.calibration.calibrate import calibrate
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
 from tests.support.readings import report_rig
+
+pytestmark = pytest.mark.bench
 
 USUAL = usual_instruments("column")
 

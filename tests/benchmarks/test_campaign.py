@@ -2,7 +2,7 @@
 
 Run alone, with its figures printed, on an idle machine:
 
-    COUPLED_FLIGHTS=10000 pytest tests/benchmarks/test_campaign.py -s
+    COUPLED_FLIGHTS=10000 pytest -m bench tests/benchmarks/test_campaign.py -s
 
 Each flight is 20 s of the report's column on a T-37. Bare JSBSim loads and trims the same model
 for each flight and takes the same steps, in as many processes. Rates are counted from the first
@@ -23,11 +23,14 @@ from itertools import repeat
 from pathlib import Path
 
 import polars as pl
+import pytest
 
 from coupled.campaign.journal import JOURNAL
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
+
+pytestmark = pytest.mark.bench
 
 FLIGHTS = int(os.environ.get("COUPLED_FLIGHTS", "16"))
 MANY = 100  # flights from which one worker and bare JSBSim are measured beside

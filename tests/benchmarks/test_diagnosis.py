@@ -1,6 +1,6 @@
 """What a diagnosis of a 60 s record against the whole list takes, and how often it is wrong.
 
-Run alone, with its figures printed:  pytest tests/benchmarks -s
+Run alone, with its figures printed:  pytest -m bench -s
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ finally:
 """
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("name", "values"),
     [
@@ -54,6 +55,7 @@ def test_a_60_s_record_is_diagnosed_in_under_10_s(
     assert taken < 10.0
 
 
+@pytest.mark.bench
 def test_memory_of_a_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gaps, "LONG_s", 60.0)
     nominal = gaps.nominal_rig(True)
@@ -69,6 +71,7 @@ def test_memory_of_a_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert peak < 500.0
 
 
+@pytest.mark.slow
 def test_false_alarms_on_records_without_an_effect(tmp_path: Path) -> None:
     alarms = 0
     for seed in range(100, 110):

@@ -1,6 +1,6 @@
 """What a coupled frame costs, as a ratio to JSBSim's own run(), measured side by side.
 
-Run alone, with its figures printed:  pytest tests/benchmarks -s
+Run alone, with its figures printed:  pytest -m bench -s
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import pytest
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.scenario import Scenario, read_run
+
+pytestmark = pytest.mark.bench
 
 FRAMES = 4800
 ROUNDS = 9
