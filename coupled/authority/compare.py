@@ -20,9 +20,10 @@ from coupled.flight.loop import fly
 from coupled.flight.scenario import Configuration, Scenario
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
+from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
-from coupled.rig.statics import specified_force, static_point
+from coupled.rig.statics import static_point
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]

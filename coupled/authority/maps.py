@@ -22,6 +22,7 @@ from coupled.flight.scenario import CONFIGURATIONS, Configuration, configure, re
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
+from coupled.rig.equations import bend_loss, specified_gradient
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -169,9 +170,9 @@ def _bob_weight(rig: Rig, pressure: Floats) -> Floats:
     the elevator by K̂·b and spares G_T·K̂·b.
     """
     control = rig.controls["column"]
-    table, host = control.schedule, control.compensation
-    gradient = np.interp(pressure, table.dynamic_pressure, table.total_gradient)
-    spared = host.bend * gradient if host.deflection else 0.0 * gradient
+    host = control.compensation
+    gradient = specified_gradient(control.schedule, pressure)
+    spared = bend_loss(host.bend if host.deflection else 0.0, gradient)
     return np.asarray(control.loader.bob_weight * (1.0 - spared))
 
 

@@ -213,9 +213,8 @@ def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
     """Return the rig with v₂ = 0: asked for the gradient that the host believes is basic."""
     data = rig.controls[control]
     host, table = data.compensation, data.schedule
-    basic = data.loader.basic_gradient if host.basic_gradient is None else host.basic_gradient
     flat = {
-        "total_gradient": [basic] * len(table.dynamic_pressure),
+        "total_gradient": [data.assumed_basic_gradient] * len(table.dynamic_pressure),
         "second_gradient": None,
         "break_deflection": 0.0,
     }

@@ -17,6 +17,7 @@ import numpy as np
 from coupled.calibration.belief import Scales
 from coupled.calibration.errors_in_variables import JointFit
 from coupled.calibration.estimate import Estimate, total
+from coupled.rig.equations import bend_loss, felt_gradient, modifying_gradient
 from coupled.rig.parameters import Control
 
 
@@ -34,8 +35,8 @@ class Outcome:
 
 def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g: float) -> float:
     """Return δ̂/δ − 1 at a gradient in N/d, for scales and K (d/N) believed and true."""
-    seen = true.s1 / found.s1 * (1.0 - true_bend * g)
-    return seen + bend * g * true.s3 / found.s3 - 1.0
+    seen = true.s1 / found.s1 * (1.0 - bend_loss(true_bend, g))
+    return seen + bend_loss(bend, g) * true.s3 / found.s3 - 1.0
 
 
 def felt_off(
@@ -46,8 +47,8 @@ def felt_off(
     `s2_ratio` is S₂ believed over true, `gradients` (G, G_B) in N/d.
     """
     g, basic = gradients
-    held = basic + (g / (1.0 - bend * g) - basic) * s2_ratio
-    return held / (1.0 + true_bend * held) / g - 1.0
+    held = basic + modifying_gradient(g, bend, basic) * s2_ratio
+    return felt_gradient(held, true_bend) / g - 1.0
 
 
 def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | None:
@@ -58,7 +59,7 @@ def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | 
     table = control.schedule.total_gradient
     bend = fit.line.bend.value
     tried = np.linspace(min(table), max(table), 9)
-    if bend * max(table) >= 1.0:
+    if bend_loss(bend, max(table)) >= 1.0:
         return None
     found = [_at(fit, s2, float(g), control.loader.basic_gradient) for g in tried if g > 0.0]
     return max(found, key=lambda one: one.deflection.half_width, default=None)
@@ -66,7 +67,7 @@ def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | 
 
 def _at(fit: JointFit, s2: Estimate | None, g: float, basic: float) -> Outcome:
     s1, bend, s3 = fit.line.s1.value, fit.line.bend.value, fit.s3.value
-    lost = bend * g
+    lost = bend_loss(bend, g)
     off = fit.estimate(0.0, -(1.0 - lost) / s1, g, -lost / s3)
     if s2 is None:
         return Outcome(g, off, None)

@@ -23,6 +23,7 @@ from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
+from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
@@ -70,12 +71,12 @@ def gradient_sets(rig: Rig, control: ControlName, count: int) -> list[tuple[floa
         raise InputError(rig.name, key, problem)
     way = slice(low, high + 1) if low < high else slice(high, low + 1)
     fine = np.linspace(pressures[way][0], pressures[way][-1], 4001)
-    along = np.interp(fine, pressures, gradients)
+    along = specified_gradient(table, fine)
     wanted = np.linspace(gradients[low], gradients[high], count)
     found = []
     for value in wanted:
         at = float(fine[int(np.argmin(np.abs(along - value)))])
-        found.append((at, float(np.interp(at, pressures, gradients))))
+        found.append((at, float(specified_gradient(table, at))))
     return found
 
 

@@ -30,9 +30,9 @@ from coupled.record.channels import TIME, ControlName, control_channels, record_
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
+from coupled.rig.equations import specified_gradient
 from coupled.rig.frame import step_frame_there, whereabouts
 from coupled.rig.packing import pack
-from coupled.rig.parameters import Control
 
 Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
@@ -128,18 +128,12 @@ def _actions(scenario: Scenario, pressure_Pa: float) -> dict[ControlName, Action
     rig, found = scenario.rig, {}
     for name, pilot in scenario.pilots.items():
         control = rig.controls[name]
-        gradient = gradient_at(control, pressure_Pa)
+        gradient = float(specified_gradient(control.schedule, pressure_Pa))
         met = pilot.meet(rig, scenario.rig_file, scenario.file, scenario.run.seed)
         action = met.act(control, gradient, name, scenario.file.parent)
         hand = replace(action.hand, reach=pilot.reach, gradient=gradient)
         found[name] = replace(action, hand=hand)
     return found
-
-
-def gradient_at(control: Control, pressure_Pa: float) -> float:
-    """Return the specified gradient of a control below its break, N/d."""
-    table = control.schedule
-    return float(np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient))
 
 
 def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:

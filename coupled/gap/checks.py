@@ -8,6 +8,7 @@ from coupled.errors import InputError
 from coupled.record.channels import ControlName, channel
 from coupled.record.importing import plausible
 from coupled.record.record import Record
+from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
 
 ANOTHER = 2.0  # factor on the gradient beyond which a rig file is another rig's
@@ -69,8 +70,7 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     if gradient not in record or pressure not in record:
         return
-    table = rig.controls[control].schedule
-    specified = np.interp(record[pressure], table.dynamic_pressure, table.total_gradient)
+    specified = specified_gradient(rig.controls[control].schedule, record[pressure])
     if not specified.any():
         return
     ratio = float(np.median(record[gradient]) / np.median(specified))

@@ -196,10 +196,8 @@ def apply(
             sections.setdefault(p.section, {})[p.field] = new
     host = data.compensation
     believed = {
-        "basic_gradient": data.loader.basic_gradient
-        if host.basic_gradient is None
-        else host.basic_gradient,
-        "breakout": data.loader.breakout if host.breakout is None else host.breakout,
+        "basic_gradient": data.assumed_basic_gradient,
+        "breakout": data.assumed_breakout,
     }
     flight = sections.pop("flight", None)
     changed = {name: getattr(data, name).model_copy(update=new) for name, new in sections.items()}

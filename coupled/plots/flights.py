@@ -14,8 +14,8 @@ from coupled.campaign.words import parameter
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.record.record import Record
+from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.statics import specified_force
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:

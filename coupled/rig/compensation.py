@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from coupled.rig import equations
 from coupled.rig.compiled import layout, stage
+
+true_deflection = stage(equations.true_deflection)
 
 
 class CompensationParameters(Protocol):
-    """What the host believes of the bend."""
+    """What the host assumes of the bend."""
 
     bend: float  # K̂, d/N; 0 where the deflection correction is off
 
@@ -22,4 +25,4 @@ COMPENSATION_PARAMETERS = layout(CompensationParameters)
 @stage
 def estimate(p: CompensationParameters, computed: float, force: float) -> float:
     """Return δ̂ in d from δc in d and F in N as read."""
-    return computed + p.bend * force
+    return true_deflection(computed, force, p.bend)

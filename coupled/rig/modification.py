@@ -1,10 +1,10 @@
 """Gradient modification: what the host adds to the basic gradient (figures 2 and 5).
 
 The pilot is to feel F = F_BO + G₁·δ up to δ₁ and the slope G₂ beyond (appendix C).
-The loader itself gives F_BO + G_B·δc, so the host adds
+The loader itself gives F_BO + G_B·δc, so the host adds what lacks, eqs. (9) and (10):
 
-    F_mod = ΔG·δc,    ΔG = G_T − G_B                      without compensation
-                      ΔG = G_T/(1 − K·G_T) − G_B          eq. (12), with it
+    F_mod = ΔG·δc  (11),    ΔG = G_T − G_B                      without compensation
+                            ΔG = G_T/(1 − K·G_T) − G_B          eq. (12), with it
 
 since the loader sees δc = δ − K·F. With a breakout, solving that for δ gives
 δ = (δc + K·F_BO)/(1 − K·G₁): eq. (11) needs one more term, a breakout of
@@ -12,7 +12,17 @@ since the loader sees δc = δ − K·F. With a breakout, solving that for δ gi
     F_extra = G₁·K·F_BO/(1 − K·G₁)
 
 which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too
-little at every deflection, G being the slope there. The break lies at δc₁ = δ₁ − K·F(δ₁).
+little at every deflection, G being the slope there.
+
+The break lies at δc₁ = δ₁ − K·F(δ₁). Where K·F(δ₁) ≥ δ₁ it lies within what the breakout
+bends: δc leaves neutral at the force at which δ = K·F(δ), which is on the second segment, so
+that G₂ holds from there on and F_extra fills up to it,
+
+    F_extra = F₀/(1 − K·G₂) − F_BO,    F₀ = F_BO + (G₁ − G₂)·δ₁
+
+Below that force the loader stands at neutral and the grip moves by the bend alone, δ = K·F,
+whatever is specified: no F_mod(δc) can give it.
+
 The host asks for ΔF in volts, v₂ = S₂·ΔF: a scale S₂ that is off makes another force of it.
 """
 
@@ -20,20 +30,24 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from coupled.rig import equations
 from coupled.rig.compiled import layout, stage
+
+computed_deflection = stage(equations.computed_deflection)  # eq. (1)
+total_to_computed = stage(equations.total_to_computed)  # eq. (12), without its − G_B
 
 
 class ModificationParameters(Protocol):
-    """What the host believes of the loader, and which corrections it makes."""
+    """What the host assumes of the loader, and which corrections it makes."""
 
-    basic_gradient: float  # G_B as the host believes it, N/d
+    basic_gradient: float  # G_B as the host assumes it, N/d
     bend: float  # K̂, d/N
-    breakout: float  # F_BO as the host believes it, N
+    breakout: float  # F_BO as the host assumes it, N
     break_deflection: float  # δ₁, d; 0 for one segment
     compensated: int  # gradient compensation, eq. (12), on or off
     exact: int  # with the breakout's term, or as printed
     digital: int  # the product ΔG·δc is made by the host and held over a frame
-    made: float  # ΔF as made over ΔF as asked for: S₂ believed over real
+    made: float  # ΔF as made over ΔF as asked for: S₂ assumed over real
 
 
 class ModificationState(Protocol):
@@ -51,28 +65,29 @@ MODIFICATION_STATE = layout(ModificationState)
 
 
 @stage
-def total_to_computed(gradient: float, bend: float) -> float:
-    """Return the gradient on δc, N/d, that is felt as `gradient` on δ: eq. (12)'s first term."""
-    return gradient / (1.0 - bend * gradient)
-
-
-@stage
 def set_gradients(
     p: ModificationParameters, s: ModificationState, first: float, second: float
 ) -> None:
     """Set the modification for the gradients G₁ and G₂ that the schedule asks for, N/d."""
-    s.break_computed = p.break_deflection
+    bend = p.bend if p.compensated else 0.0
+    preload = p.breakout if p.exact else 0.0
+    s.break_computed = 0.0
+    if p.break_deflection > 0.0:
+        force = preload + first * p.break_deflection
+        s.break_computed = computed_deflection(p.break_deflection, force, bend)
+        if s.break_computed <= 0.0:
+            # What holds at the break bends further than δ₁: the loader's first motion is
+            # beyond it already, on the second segment's line F = preload + G₂·δ.
+            s.break_computed = 0.0
+            preload += (first - second) * p.break_deflection
+            first = second
     s.breakout = 0.0
-    if p.compensated:
-        if p.break_deflection > 0.0:
-            s.break_computed -= p.bend * (p.breakout * p.exact + first * p.break_deflection)
-        if p.exact:
-            s.breakout = total_to_computed(first, p.bend) * p.bend * p.breakout
-        first = total_to_computed(first, p.bend)
-        second = total_to_computed(second, p.bend)
-    s.first = p.made * (first - p.basic_gradient)
-    s.second = p.made * (second - p.basic_gradient)
-    s.breakout *= p.made
+    if p.exact:
+        s.breakout = p.made * (
+            total_to_computed(first, bend) * bend * preload + (preload - p.breakout)
+        )
+    s.first = p.made * (total_to_computed(first, bend) - p.basic_gradient)
+    s.second = p.made * (total_to_computed(second, bend) - p.basic_gradient)
 
 
 @stage

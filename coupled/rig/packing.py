@@ -81,9 +81,8 @@ def _pack_host(p: Any, control: Control, frame_s: float) -> None:
     s["pressure_scale"], s["slope"] = table.pressure_scale, table.slope
     s["pressure_lag_gain"] = first_order_gain(table.pressure_lag, frame_s)
     m = p["modification"]
-    believed = host.basic_gradient
-    m["basic_gradient"] = loader.basic_gradient if believed is None else believed
-    m["breakout"] = loader.breakout if host.breakout is None else host.breakout
+    m["basic_gradient"] = control.assumed_basic_gradient
+    m["breakout"] = control.assumed_breakout
     m["bend"], m["compensated"] = host.bend, host.gradient
     m["break_deflection"] = table.break_deflection
     m["exact"] = host.breakout_term == "exact"

@@ -55,7 +55,7 @@ class Schedule(Section):
 
 
 class Compensation(Section):
-    """Which corrections the host makes, and what it believes of the hardware."""
+    """Which corrections the host makes, and the numbers that it assumes of the hardware."""
 
     deflection: bool
     gradient: bool
@@ -131,6 +131,18 @@ class Control(Section):
     gains: Gains = Gains()
     rigging: Rigging = Rigging()
     calibration: Calibration = Calibration()
+
+    @property
+    def assumed_basic_gradient(self) -> float:
+        """G_B as the host has it, N/d: the loader's own where the file says nothing else."""
+        given = self.compensation.basic_gradient
+        return self.loader.basic_gradient if given is None else given
+
+    @property
+    def assumed_breakout(self) -> float:
+        """F_BO as the host has it, N: the loader's own where the file says nothing else."""
+        given = self.compensation.breakout
+        return self.loader.breakout if given is None else given
 
 
 class Flight(Section):

@@ -1,24 +1,20 @@
 """The rig at rest: force, deflection and what the host makes of it, in closed form.
 
-    F/δ = G_T                    loss K·G_T           gradient right:  eqs. (6), (7), (7a)
-    F/δ = G_T/(1 + K·G_T)        loss K·G_T/(1 + K·G_T)    gradient left alone
-
-and in general, with breakout, two segments and a stiffening bend, along δc: the
-balance of the loader gives F(δc), the structure δ = δc + bend(F). Friction is left out:
-it is a band about this line.
+With breakout, two segments and a stiffening bend, along δc: the balance of the loader gives
+F(δc) = F_BO + F_L + k₃·δc³ + F_mod, which is eq. (9) solved for F; the structure δ = δc + bend(F).
+Friction is left out: it is a band about this line. `equations` has the linear case.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from coupled.record.channels import ControlName
 from coupled.rig.compensation import estimate
+from coupled.rig.equations import basic_force, specified_force
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import pack
@@ -26,19 +22,6 @@ from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 
 Floats = NDArray[np.float64]
-
-
-def bend_loss(bend_per_force: float, gradient: float) -> float:
-    """Return the share of the deflection lost when the pilot feels `gradient`: eq. (7a).
-
-    K in d/N, G_T in N/d, without unit; the host takes δc for δ.
-    """
-    return bend_per_force * gradient
-
-
-def uncompensated_loss(bend_per_force: float, gradient: float) -> float:
-    """Return the share lost when the loader holds F = G_T·δc: K·G_T/(1 + K·G_T)."""
-    return bend_per_force * gradient / (1.0 + bend_per_force * gradient)
 
 
 @dataclass(frozen=True)
@@ -67,38 +50,23 @@ def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) ->
     added = np.array([modifying_force(s["modification"], x) for x in computed])
     force = (
         loader["breakout"] * side
-        + (loader["basic_gradient"] + loader["cubic"] * computed**2) * computed
+        + basic_force(float(loader["basic_gradient"]), computed)
+        + loader["cubic"] * computed**3
         + added
     )
     deflection = computed + np.array([bend(p["linkage"], f) for f in force])
     read = p["sensing"]["deflection_scale"] * computed
     force_read = p["sensing"]["force_scale"] * force
-    believed = np.array(
+    estimates = np.array(
         [estimate(p["compensation"], x, f) for x, f in zip(read, force_read, strict=True)]
     )
     return Statics(
         computed,
         force,
         deflection,
-        believed,
+        estimates,
         specified_force(rig, control, pressure_Pa, deflection),
     )
-
-
-def specified_force(
-    rig: Rig, control: str, pressure_Pa: float | Floats, deflection: Floats
-) -> Floats:
-    """Return the force in N specified at δ in d: breakout and one or two slopes."""
-    data = rig.controls[cast(ControlName, control)]
-    table = data.schedule
-    first = np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient)
-    second = first
-    if table.second_gradient is not None:
-        second = np.interp(pressure_Pa, table.dynamic_pressure, table.second_gradient)
-    size = np.abs(deflection)
-    beyond = np.maximum(size - table.break_deflection, 0.0) if table.break_deflection else 0.0
-    slope_part = first * (size - beyond) + second * beyond
-    return np.asarray(np.sign(deflection) * (data.loader.breakout + slope_part))
 
 
 def static_point(rig: Rig, control: str, pressure_Pa: float, deflection: float) -> Statics:

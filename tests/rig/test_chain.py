@@ -11,11 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupled.flight.scenario import configure
-from coupled.rig import linkage, modification, sensing
+from coupled.rig import equations, linkage, sensing
+from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.packing import pack
-from coupled.rig.replay import drive_loader, replay_linkage, replay_schedule, replay_surface
+from coupled.rig.replay import (
+    drive_loader,
+    replay_linkage,
+    replay_product,
+    replay_schedule,
+    replay_surface,
+)
 from coupled.rig.rig import Rig
-from coupled.rig.statics import bend_loss, static_line, static_point, uncompensated_loss
+from coupled.rig.statics import static_line, static_point
 from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 SCHEDULE = "controls.column.schedule"
@@ -53,7 +60,7 @@ def test_pressure_lag_is_first_order() -> None:
 @given(share=st.floats(0.0, 0.95), gradient=st.floats(1.0, 5000.0))
 def test_eq_12_gives_the_asked_gradient_at_the_grip(share: float, gradient: float) -> None:
     bend = share / gradient
-    on_computed = modification.total_to_computed(gradient, bend)
+    on_computed = equations.total_to_computed(gradient, bend)
     computed = 0.03
     force = on_computed * computed
     assert force / (computed + bend * force) == pytest.approx(gradient, rel=1e-9)
@@ -74,6 +81,71 @@ def test_two_segments_with_breakout_are_felt_exactly() -> None:
     line = static_line(two_segments(9.0, "exact"), "column", 3000.0, np.linspace(0.001, 0.12, 200))
     assert line.force == pytest.approx(line.specified, rel=1e-12)
     assert line.estimate == pytest.approx(line.deflection, rel=1e-12)
+
+
+STIFF_737 = {  # a 737's column at 30 kPa on a structure that bends past the break
+    "breakout_N": 45.0,
+    "basic_gradient_N_per_m": 1750.0,
+    "bend_m_per_N": 1.3e-4,
+    f"{SCHEDULE}.total_gradient_N_per_m": [1750.0, 6130.0],
+    f"{SCHEDULE}.second_gradient_N_per_m": [990.0, 3120.0],
+    f"{SCHEDULE}.break_deflection_m": 0.022,
+    "controls.column.compensation.bend_m_per_N": 1.3e-4,
+}
+
+
+def test_a_break_within_the_breakouts_bend_puts_all_motion_on_the_second_segment() -> None:
+    """δc₁ = 0.022 − 1.3e-4·(45 + 6130·0.022) < 0; once read as one segment, felt 824 N for 507."""
+    rig = bench(STIFF_737)
+    point = static_point(rig, "column", 3000.0, 0.127)
+    assert point.specified[0] == pytest.approx(45.0 + 6130 * 0.022 + 3120 * (0.127 - 0.022))
+    line = static_line(rig, "column", 3000.0, np.linspace(-0.1, 0.1, 201)[np.r_[:100, 101:201]])
+    assert np.min(np.abs(line.deflection)) > 0.022
+    assert line.force == pytest.approx(line.specified, rel=1e-12)
+    assert line.estimate == pytest.approx(line.deflection, rel=1e-12)
+
+
+def test_under_that_break_the_grip_moves_by_the_bend_alone() -> None:
+    """Up to F₀/(1 − K·G₂), where δ = K·F meets the second segment; then the loader lets go."""
+    rig = bench(STIFF_737)
+    leaves = (45.0 + (6130 - 3120) * 0.022) / (1.0 - 1.3e-4 * 3120.0)
+    assert 1.3e-4 * leaves > 0.022
+    frames = 400
+    for force, moves in ((0.999 * leaves, False), (1.001 * leaves, True)):
+        nodes = np.full(frames * rig.substeps + 1, force)
+        first, second = np.full(frames, 6130.0), np.full(frames, 3120.0)
+        x, _ = drive_loader(rig, "column", nodes, first, np.zeros(frames), None, second)
+        assert (x[-1] > 0.0) == moves
+
+
+@given(
+    bend=st.floats(0.0, 1.55e-4),
+    breakout=st.floats(0.0, 200.0),
+    at=st.floats(0.001, 0.1),
+    gradients=st.tuples(st.floats(0.0, 6400.0), st.floats(0.0, 6400.0)),
+)
+def test_f_mod_is_the_force_specified_less_that_of_the_loader(
+    bend: float, breakout: float, at: float, gradients: tuple[float, float]
+) -> None:
+    """Eqs. (9) and (10), with breakout and either order of two segments, wherever δc moves."""
+    first, second = gradients
+    column = "controls.column"
+    rig = bench(STIFF_737).changed(
+        {
+            f"{column}.loader.breakout_N": breakout,
+            f"{column}.compensation.bend_m_per_N": bend,
+            f"{SCHEDULE}.total_gradient_N_per_m": [first, first],
+            f"{SCHEDULE}.second_gradient_N_per_m": [second, second],
+            f"{SCHEDULE}.break_deflection_m": at,
+        }
+    )
+    deflection = np.linspace(0.002, 0.15, 60)
+    wanted = equations.specified_force(rig, "column", 0.0, deflection)
+    computed = equations.computed_deflection(deflection, wanted, bend)
+    deflection, wanted, computed = (a[computed > 1e-6] for a in (deflection, wanted, computed))
+    given = replay_product(rig, "column", computed, 0.0 * computed + first, 0.0 * computed + second)
+    available = breakout + equations.basic_force(1750.0, computed)
+    assert given == pytest.approx(equations.added_force(wanted, available), rel=1e-9, abs=1e-7)
 
 
 def test_appendix_c_as_printed_is_too_light_by_k_g_times_the_breakout() -> None:

@@ -29,6 +29,7 @@ from coupled.authority.stability.planes import linear_rig
 from coupled.flight.loop import fly
 from coupled.flight.response import Response, elevator_response
 from coupled.flight.scenario import Scenario, scenarios_from_table
+from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 
@@ -80,7 +81,8 @@ def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:
     By theory, at the gradient of the rig's own trim; None where no frequency turns so far.
     """
     response = _response(rig, file)
-    gradient = _gradient(rig, response(float(_RATES_rad_per_s[0])).pressure_Pa)
+    pressure = response(float(_RATES_rad_per_s[0])).pressure_Pa
+    gradient = specified_gradient(rig.controls["column"].schedule, pressure)
     linear = hands_off_rig(rig, 0.0, gradient)
 
     def turn(rate: float) -> float:
@@ -102,7 +104,7 @@ def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float
     Found by flying the coupled rig; None where it does not change within a fifth of `near`.
     """
     pressure = _response(rig, file)(float(_RATES_rad_per_s[0])).pressure_Pa
-    gradient = _gradient(rig, pressure)
+    gradient = specified_gradient(rig.controls["column"].schedule, pressure)
 
     def growth(weight: float) -> float:
         return flown_growth(hands_off_rig(rig, weight, gradient), file, rate_rad_per_s)
@@ -149,11 +151,6 @@ def _response(rig: Rig, file: Path) -> Callable[[float], Response]:
     assert rig.flight is not None
     flight, frame_s = rig.flight, 1.0 / rig.frame_rate
     return lambda rate: elevator_response(flight, frame_s, ("column",), file, rate)
-
-
-def _gradient(rig: Rig, pressure_Pa: float) -> float:
-    table = rig.controls["column"].schedule
-    return float(np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient))
 
 
 def _loop(linear: Rig, response: Response, rate: float) -> complex:

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from coupled.rig.equations import modifying_gradient
 from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -40,11 +41,11 @@ _COMPUTED, _RATE, _POSITION, _SPEED = range(4)
 
 def added_gradient(control: Control) -> float:
     """Return ΔG as it is made, N/d, at the first gradient of the schedule: eq. (12)."""
-    asked, host = control.schedule.total_gradient[0], control.compensation
-    if host.gradient:
-        asked /= 1.0 - host.bend * asked
-    known = control.loader.basic_gradient if host.basic_gradient is None else host.basic_gradient
-    return (asked - known) / control.sensing.modifying_scale
+    host = control.compensation
+    bend = host.bend if host.gradient else 0.0
+    total = control.schedule.total_gradient[0]
+    asked = modifying_gradient(total, bend, control.assumed_basic_gradient)
+    return asked / control.sensing.modifying_scale
 
 
 def poles_growth(matrices: Floats) -> Floats:

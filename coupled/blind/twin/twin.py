@@ -87,12 +87,11 @@ def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
     numbers["pressures"][:rows] = table.dynamic_pressure
     numbers["first"][:rows] = table.total_gradient
     numbers["second"][:rows] = table.second_gradient or table.total_gradient
-    believed = host.basic_gradient, host.breakout
     twin.set(frame_s=frame_s, pressure_scale=table.pressure_scale, slope=table.slope)
     twin.set(pressure_gain=first_order(table.pressure_lag, frame_s), tent_width=1.0)
     twin.set(
-        believed_gradient=loader.basic_gradient if believed[0] is None else believed[0],
-        believed_breakout=loader.breakout if believed[1] is None else believed[1],
+        believed_gradient=column.assumed_basic_gradient,
+        believed_breakout=column.assumed_breakout,
         gradient_bend=host.bend if host.gradient else 0.0,
         exact=float(host.breakout_term == "exact"),
         break_deflection=table.break_deflection,

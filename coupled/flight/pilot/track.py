@@ -35,6 +35,7 @@ from coupled.flight.pilot.crossover import (
 )
 from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import PITCH, Response, elevator_response, path_angle
+from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import COMMAND_SIGN, Hand
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -105,10 +106,10 @@ class Track(Pilot):
     def _limbs(self, rig: Rig, pressure_Pa: float, rate: float) -> complex:
         """Return the elevator command per newton of the pilot's, on the rig as specified."""
         control, s, frame_s = rig.controls["column"], 1j * rate, 1.0 / rig.frame_rate
-        loader, table, rigging = control.loader, control.schedule, control.rigging
+        loader, rigging = control.loader, control.rigging
         servo = 2.0 * math.pi * loader.servo_frequency
         follows = servo**2 / (s**2 + 2.0 * loader.servo_damping_ratio * servo * s + servo**2)
-        gradient = np.interp(pressure_Pa, table.dynamic_pressure, table.total_gradient)
+        gradient = specified_gradient(control.schedule, pressure_Pa)
         feel = loader.mass * s**2 + loader.damping * s + gradient
         arm = (self.arm_stiffness + self.arm_damping * s) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, channel
 from coupled.record.importing import plausible
+from coupled.rig.equations import specified_gradient
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
@@ -124,9 +125,7 @@ def _force(
     if gradient in record:
         total = record[gradient]
     elif data is not None and "dynamic_pressure_Pa" in record:
-        table = data.schedule
-        pressure = record["dynamic_pressure_Pa"]
-        total = np.interp(pressure, table.dynamic_pressure, table.total_gradient)
+        total = specified_gradient(data.schedule, record["dynamic_pressure_Pa"])
     else:
         return None
     ratio = plausible.force_ratio(record[force], record[moved], total)

@@ -1,0 +1,116 @@
+"""The report's equations as closed forms, each in one place.
+
+    δc = δ − K·F                     eq. (1)     F = G_T·δ                  eq. (6)
+    δc = δ·(1 − K·G_T)               eq. (7)     Δδc = −δ·K·G_T             eq. (7a)
+    F_L = G_B·δc                     eq. (8)     F_mod = F − F_L            eq. (9)
+    F_mod = G_T·δ − G_B·δc           eq. (10)    F_mod = ΔG·δc              eq. (11)
+    ΔG = G_T/(1 − K·G_T) − G_B       eq. (12)
+
+Each works on numbers and on arrays; the kernels compile the same functions (`stage`), so
+none stands anywhere else. d is m, or rad for a wheel: δ and δc in d, F in N, gradients in
+N/d, K in d/N. This module does without a compiler, so that a reader of data has it at once.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.record.channels import ControlName
+from coupled.rig.parameters import Schedule
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+N = TypeVar("N", float, Floats)
+
+
+def specified_gradient(schedule: Schedule, pressure_Pa: N) -> N:
+    """Return the G_T in N/d that a rig's table specifies at q̄; of the shape of q̄.
+
+    Linear between the table's rows and held at its ends; below the break, where there is one.
+    The table as it is: what may be wrong with its use (`slope`, `pressure_scale`) is left out.
+    """
+    return _looked_up(schedule.dynamic_pressure, schedule.total_gradient, pressure_Pa)
+
+
+def second_gradient(schedule: Schedule, pressure_Pa: N) -> N:
+    """Return the slope in N/d specified beyond the break; G_T where there is one segment."""
+    table = schedule.second_gradient or schedule.total_gradient
+    return _looked_up(schedule.dynamic_pressure, table, pressure_Pa)
+
+
+def specified_force(
+    rig: Rig, control: str, pressure_Pa: float | Floats, deflection: Floats
+) -> Floats:
+    """Return the force in N specified at δ in d: eq. (6), with breakout and two segments.
+
+    F_BO + G₁·δ up to the break δ₁, and the slope G₂ beyond (appendix C); odd in δ.
+    """
+    data = rig.controls[cast(ControlName, control)]
+    pressure = np.asarray(pressure_Pa, dtype=float)
+    first = specified_gradient(data.schedule, pressure)
+    second = second_gradient(data.schedule, pressure)
+    size, at = np.abs(deflection), data.schedule.break_deflection
+    beyond = np.maximum(size - at, 0.0) if at else 0.0
+    slope_part = first * (size - beyond) + second * beyond
+    return np.asarray(np.sign(deflection) * (data.loader.breakout + slope_part))
+
+
+def _looked_up(pressures: list[float], gradients: list[float], pressure_Pa: N) -> N:
+    found: N = np.interp(pressure_Pa, pressures, gradients)
+    return found
+
+
+def computed_deflection(deflection: N, force: N, bend: float) -> N:
+    """Return δc in d of a control at δ in d under F in N: eq. (1)."""
+    return deflection - bend * force
+
+
+def true_deflection(computed: N, force: N, bend: float) -> N:
+    """Return δ in d at δc in d under F in N: eq. (1) solved for δ."""
+    return computed + bend * force
+
+
+def bend_loss(bend: float, gradient: N) -> N:
+    """Return the share of the deflection lost when the pilot feels `gradient`: eq. (7a).
+
+    K in d/N, G_T in N/d, without unit; the host takes δc for δ. 1 less it is eq. (7)'s factor.
+    """
+    return bend * gradient
+
+
+def uncompensated_loss(bend: float, gradient: N) -> N:
+    """Return the share lost when the loader holds F = G_T·δc: K·G_T/(1 + K·G_T)."""
+    return bend * felt_gradient(gradient, bend)
+
+
+def felt_gradient(gradient: N, bend: float) -> N:
+    """Return F/δ in N/d where the loader holds F = `gradient`·δc: eqs. (1) and (8)."""
+    return gradient / (1.0 + bend * gradient)
+
+
+def total_to_computed(gradient: N, bend: float) -> N:
+    """Return the gradient on δc, N/d, that is felt as `gradient` on δ: eq. (12)'s first term."""
+    return gradient / (1.0 - bend * gradient)
+
+
+def modifying_gradient(gradient: N, bend: float, basic: float) -> N:
+    """Return ΔG in N/d for G_T and G_B in N/d: eq. (12); with K = 0 that of figure 2."""
+    return total_to_computed(gradient, bend) - basic
+
+
+def basic_force(basic: float, computed: N) -> N:
+    """Return the force that the loader gives of itself, N: eq. (8)."""
+    return basic * computed
+
+
+def added_force(force: N, available: N) -> N:
+    """Return the F_mod needed, N, for a force wanted and the one available: eq. (9)."""
+    return force - available
+
+
+def needed_force(gradient: N, deflection: N, basic: float, computed: N) -> N:
+    """Return the F_mod needed at δ, where the loader is at δc, N: eq. (10)."""
+    return added_force(gradient * deflection, basic_force(basic, computed))
