@@ -4,14 +4,35 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from itertools import islice
 
 LONGEST = 200  # characters of a user's word that a message repeats
+LONGEST_MESSAGE = 3000  # characters of a whole message
+LISTED = 100  # known words that a hint lists
+_SEARCHED = 2000  # known words that a hint is sought among
 
 
-def _shown(text: str) -> str:
-    """Return a user's word on one line, cut if it is endless."""
-    plain = "".join(c if c.isprintable() else "?" for c in text)
-    return plain if len(plain) <= LONGEST else plain[:LONGEST] + "…"
+def printable(text: str) -> str:
+    """Return text with a question mark for each character that a terminal would act on.
+
+    Escape sequences, other control characters and bytes that are no text go; spaces,
+    tabs and the ends of lines stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else "?" for c in text)
+
+
+def shown(text: str, longest: int = LONGEST) -> str:
+    """Return a user's word as a message repeats it: on one line, printable, and cut if long."""
+    plain = printable(text[: longest + 1]).replace("\n", "?").replace("\t", "?")
+    return plain if len(plain) <= longest else plain[:longest] + "…"
+
+
+def _sentence(text: str) -> str:
+    """Return a message on one line, its long words cut, and the whole cut if it is endless."""
+    cut = " ".join(shown(word) for word in text[: 100 * LONGEST_MESSAGE].split())
+    return shown(cut, LONGEST_MESSAGE)
 
 
 class InputError(ValueError):
@@ -22,9 +43,9 @@ class InputError(ValueError):
     """
 
     def __init__(self, file: object, key: str, problem: str) -> None:
-        self.file, self.key, self.problem = _shown(str(file)), _shown(key), problem
+        self.file, self.key, self.problem = shown(str(file)), shown(key), _sentence(problem)
         where = f"{self.file}: {self.key}: " if key else f"{self.file}: "
-        super().__init__(where + " ".join(problem.split()))
+        super().__init__(where + self.problem)
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
         """Let it pass from one process to another."""
@@ -32,9 +53,11 @@ class InputError(ValueError):
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a hint that names the known word most like `word`, or lists them all."""
-    known = list(known)
-    plain = {name.casefold(): name for name in known}
-    word = word[:LONGEST].casefold()
-    match = difflib.get_close_matches(word, plain, n=1, cutoff=0.6)
-    return f"did you mean {plain[match[0]]}?" if match else "known: " + ", ".join(sorted(known))
+    """Return a hint that names the known word most like `word`, or lists the first of them."""
+    names = [shown(name) for name in islice(known, _SEARCHED + 1)]
+    plain = {name.casefold(): name for name in names}
+    match = difflib.get_close_matches(word[:LONGEST].casefold(), plain, n=1, cutoff=0.6)
+    if match:
+        return f"did you mean {plain[match[0]]}?"
+    more = ", …" if len(names) > LISTED else ""
+    return "known: " + ", ".join(sorted(names)[:LISTED]) + more

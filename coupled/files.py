@@ -1,77 +1,247 @@
-"""Files are written whole or not at all."""
+"""Files are read once they are known to be files, and written whole or not at all.
+
+What a command is given to read may be a folder, a pipe, a device or of any size: every
+reader opens it here. What it writes is made beside its place, under a name that tells the
+process that makes it, and put there in one step; what a killed process left is cleared by
+the next one that writes into the same folder.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-import tempfile
+import platform
+import re
+import secrets
+import shutil
+import stat
+import time
 from collections.abc import Callable, Iterable
+from functools import lru_cache
+from io import BufferedReader
 from pathlib import Path
+from typing import Any
 
 from coupled.errors import InputError
 
+MOST_TEXT_bytes = 64 * 2**20  # of a text that a person or this program wrote
+MOST_TABLE_bytes = 4 * 2**30  # of a table of numbers: hours of a record
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+_STARTED_s = time.time()
+_HOST = re.sub(r"[^A-Za-z0-9]", "_", platform.node())[:40]
+_UNFINISHED = re.compile(r"\.coupled-([A-Za-z0-9_]*)-(\d{1,9})-[0-9a-f]{12}(\.[^/]*)?", re.DOTALL)
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let `write` make a file beside `path`, then put it in its place in one step."""
+
+def open_file(path: Path, most_bytes: int = MOST_TABLE_bytes) -> BufferedReader:
+    """Return an open plain file of at most so many bytes.
+
+    Raises InputError for a folder, a pipe, a socket or a device, without waiting for any.
+    """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be written: {error.strerror}") from None
+        # A pipe that nobody writes to would hold back an open that waits.
+        handle = os.open(path, os.O_RDONLY | _AT_ONCE)
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    found = os.fstat(handle)
+    if stat.S_ISREG(found.st_mode) and found.st_size <= most_bytes:
+        return os.fdopen(handle, "rb")
     os.close(handle)
-    part = Path(name)
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError(path, "", "cannot be read: is a folder; give a file")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(path, "", "is a pipe or a device; give a file")
+    raise _too_large(path, most_bytes)
+
+
+def read_bytes(path: Path, most_bytes: int = MOST_TABLE_bytes) -> bytes:
+    """Return what a file holds. Raises InputError where it cannot be read or is too large."""
+    with open_file(path, most_bytes) as file:
+        try:
+            content = file.read(most_bytes + 1)
+        except OSError as error:
+            raise _unreadable(path, error) from None
+    if len(content) > most_bytes:
+        raise _too_large(path, most_bytes)
+    return content
+
+
+def read_text(path: Path, wanted: str, most_bytes: int = MOST_TEXT_bytes) -> str:
+    """Return a text file in UTF-8, with a mark at its start or without; `wanted` is said if not."""
     try:
-        write(part)
-        part.chmod(0o666 & ~_umask())
-        part.replace(path)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be written: {error.strerror or error}") from None
-    finally:
-        part.unlink(missing_ok=True)
+        text = read_bytes(path, most_bytes).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(path, "", f"is not text in UTF-8; {wanted}") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_json(path: Path, wanted: str) -> Any:
+    """Return what a JSON file holds; `wanted` is said where it is none."""
+    text = read_text(path, wanted)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError(path, "", f"is not JSON; {wanted}") from None
+
+
+def sha256(path: Path) -> str:
+    """Return a file's hash."""
+    with open_file(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def check_format(found: object, known: int, file: object, what: str) -> int:
+    """Return the version of a file's format; 0 for a file from before formats had one.
+
+    `found` is the file's own `format`, None where it has none; `known` the newest that this
+    release reads; `what` the kind of file. Raises InputError for a newer one.
+    """
+    if found is None:
+        return 0
+    if not isinstance(found, int) or isinstance(found, bool) or found < 1:
+        raise InputError(file, "format", f"should be a whole number from 1 to {known}")
+    if found > known:
+        problem = f"this {what} is of format {found}, written by a newer release of coupled; this"
+        problem += f" one reads up to {known}: install the newer, or make the {what} anew with this"
+        raise InputError(file, "format", problem)
+    return found
+
+
+def _unreadable(path: Path, error: OSError | ValueError) -> InputError:
+    why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return InputError(path, "", f"cannot be read: {why}")
+
+
+def _too_large(path: Path, most_bytes: int) -> InputError:
+    size = f"{most_bytes / 2**20:g} MiB" if most_bytes < 2**30 else f"{most_bytes / 2**30:g} GiB"
+    return InputError(path, "", f"is larger than {size}, the most that is read here")
 
 
 def check_target(path: Path, inputs: Iterable[Path] = ()) -> None:
     """Refuse a file that could not be written, before the work that it is to hold.
 
-    Nothing is made or changed. `inputs` are files that must not be overwritten.
+    Nothing is made or changed. `inputs` are files that must not be overwritten, under
+    whatever name or link they are given.
     """
-    try:
-        if path.is_dir():
-            raise InputError(path, "", "is a folder; give a file")
-        if any(other.is_file() and path.exists() and path.samefile(other) for other in inputs):
+    check_targets([path], inputs)
+
+
+def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+    """Refuse files of which one could not be written, is an input, or is meant twice."""
+    read = {identity for path in inputs for identity in _identities(path)}
+    written: set[object] = set()
+    for path in paths:
+        try:
+            _check_place(path)
+        except (OSError, ValueError):
+            raise InputError(path, "", "cannot be written there") from None
+        identities = _identities(path)
+        if not read.isdisjoint(identities):
             raise InputError(path, "", "is a file that this reads; give another to write")
-        parent = path.absolute().parent
-        while not parent.exists():
-            parent = parent.parent
-        if not parent.is_dir() or not os.access(parent, os.W_OK) or len(path.name) > 200:
-            raise InputError(path, "", "cannot be written there")
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(path, "", "cannot be written there") from None
+        if not written.isdisjoint(identities):
+            raise InputError(path, "", "would be written twice; give each output its own file")
+        written |= identities
 
 
-def read_text(path: Path, wanted: str) -> str:
-    """Return a text file in UTF-8, with a mark at its start or without; `wanted` is said if not."""
+def _check_place(path: Path) -> None:
+    if path.is_dir():
+        raise InputError(path, "", "is a folder; give a file")
+    if path.exists() and not path.is_file():
+        raise InputError(path, "", "is a pipe or a device; give a file to write")
+    parent = path.absolute().parent
+    while not parent.exists():
+        parent = parent.parent
+    if not parent.is_dir() or not os.access(parent, os.W_OK) or len(os.fsencode(path.name)) > 200:
+        raise InputError(path, "", "cannot be written there")
+
+
+def _identities(path: Path) -> set[object]:
+    """Return what tells a file under all its names: its path without links, and its inode."""
+    found: set[object] = {os.path.realpath(path)}
     try:
-        return path.read_text(encoding="utf-8-sig")
+        there = path.stat()
+    except (OSError, ValueError):
+        return found
+    return found | {(there.st_dev, there.st_ino)}
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file beside `path`, then put it in its place in one step."""
+    part = path.parent / unfinished_name(path.suffix)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        clear(path.parent)
+        part.touch(exist_ok=False)
+        write(part)
+        part.replace(path)
     except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "", f"is not text in UTF-8; {wanted}") from None
+        raise unwritable(path, error) from None
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole."""
-    write_whole(path, lambda part: part.write_text(text, encoding="utf-8"))
+    """Write a text file in UTF-8, whole; a file name that is no text appears with `?` in it."""
+    write_whole(path, lambda part: part.write_bytes(text.encode("utf-8", "replace")))
 
 
-def sha256(path: Path) -> str:
-    """Return a file's hash."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def json_text(table: Any, indent: int = 2, sort_keys: bool = False) -> str:
+    """Return a table as JSON, its letters as they are; escaped where a file name is no text."""
+    text = json.dumps(table, indent=indent, sort_keys=sort_keys, ensure_ascii=False)
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(table, indent=indent, sort_keys=sort_keys)
+    return text + "\n"
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def unwritable(path: Path, error: OSError) -> InputError:
+    """Return the fault of a file that the system does not let be written."""
+    return InputError(path, "", f"cannot be written: {error.strerror or error}")
+
+
+def unfinished_name(suffix: str) -> str:
+    """Return a new name for what this process has not finished: it tells computer and process."""
+    return f".coupled-{_HOST}-{os.getpid()}-{secrets.token_hex(6)}{suffix}"
+
+
+def clear(folder: Path) -> None:
+    """Remove what killed processes of this computer left unfinished in a folder.
+
+    A process looks once at a folder.
+    """
+    _clear(folder.absolute())
+
+
+@lru_cache(maxsize=1000)
+def _clear(folder: Path) -> None:
+    with os.scandir(folder) as entries:
+        left = [entry.path for entry in entries if _UNFINISHED.fullmatch(entry.name)]
+    for name in left:
+        path = Path(name)
+        try:
+            if not _is_stale(path):
+                continue
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+        except OSError:
+            continue  # another process clears it, or may not be asked
+
+
+def _is_stale(path: Path) -> bool:
+    """Tell whether no living process of this computer makes an unfinished file."""
+    match = _UNFINISHED.fullmatch(path.name)
+    if match is None or match[1] != _HOST or os.name != "posix":
+        return False
+    process = int(match[2])
+    if process == os.getpid():  # in a container every run may have the same number
+        return path.stat().st_mtime < _STARTED_s - 1.0
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False

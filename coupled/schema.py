@@ -7,6 +7,7 @@ so that one physics serves all controls.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,6 +27,8 @@ class Section(BaseModel):
 
 S = TypeVar("S", bound=Section)
 LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
+MOST_TOML_bytes = 2**20  # tomllib takes seconds for a MiB
+MOST_DOTS = 100  # in a dotted key; tomllib's time grows with their square
 
 
 def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
@@ -52,15 +55,34 @@ def file_keys(section: type[Section], d: str) -> dict[str, str]:
 
 def load_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's tables."""
-    return loads_toml(read_text(path, "a TOML file is wanted"), path)
+    return loads_toml(read_text(path, "a TOML file is wanted", MOST_TOML_bytes), path)
 
 
 def loads_toml(text: str, file: object) -> dict[str, Any]:
     """Return the tables of a TOML text; `file` is named in faults."""
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_DOTS and _dots(line) > MOST_DOTS:
+            raise InputError(file, f"line {number}", f"a key of more than {MOST_DOTS} parts")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(file, "", f"is not valid TOML: {error}") from None
+
+
+_TOKEN = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+|[ \t]+|.""", re.DOTALL)
+
+
+def _dots(line: str) -> int:
+    """Return how many dots the longest dotted key of a line has."""
+    most = dots = 0
+    for match in _TOKEN.finditer(line):
+        token = match[0]
+        if token == ".":
+            dots += 1
+        elif not (token[0] in "\"'-_ \t" or token[0].isalnum()):
+            dots = 0
+        most = max(most, dots)
+    return most
 
 
 def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) -> dict[str, Any]:

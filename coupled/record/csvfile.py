@@ -1,4 +1,4 @@
-"""Columns of numbers from a CSV or Parquet file; a fault names the file, the column, the row."""
+"""Tables of numbers from and to CSV and Parquet; a fault names the file, the column, the row."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.files import read_bytes, write_whole
 from coupled.schema import LARGEST
 
 Floats = NDArray[np.float64]
@@ -21,21 +22,46 @@ def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
 
     An empty cell is NaN where `gaps` are allowed, and a fault where not.
     """
-    try:
-        content = io.BytesIO(path.read_bytes())
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    content = io.BytesIO(read_bytes(path))
     try:
         if path.suffix.lower() == ".parquet":
             table = pl.read_parquet(content)
         else:
             table = pl.read_csv(content, infer_schema=False)
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise InputError(path, "", f"is not a table: {str(error).splitlines()[0]}") from None
+        raise InputError(path, "", f"is not a table: {first_line(error)}") from None
     doubled = [name for name in table.columns if "_duplicated_" in name]
     if doubled:
-        raise InputError(path, doubled[0].partition("_duplicated_")[0], "stands there twice")
+        raise InputError(path, doubled[0].partition("_duplicated_")[0], "duplicate column")
     return {name: numbers(path, name, table[name], gaps) for name in table.columns}
+
+
+def write_table(frame: pl.DataFrame, path: Path) -> None:
+    """Write a table whole, as Parquet where the file's extension says so, else as CSV."""
+
+    def write(part: Path) -> None:
+        with part.open("wb") as file:
+            try:
+                if path.suffix.lower() == ".parquet":
+                    frame.write_parquet(file)
+                else:
+                    frame.write_csv(file)
+            except pl.exceptions.PolarsError as error:  # so it calls a full disk
+                raise OSError(first_line(error)) from None
+
+    write_whole(path, write)
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of what an error says, or its kind where it says nothing."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def check_numeric(path: Path, name: str, column: pl.Series) -> None:
+    """Refuse a column that holds neither numbers nor text: lists, dates, bytes, categories."""
+    kind = column.dtype
+    if not (kind.is_numeric() or kind in (pl.String, pl.Boolean, pl.Null)):
+        raise InputError(path, name, f"holds {kind}, no numbers")
 
 
 def numbers(
@@ -51,6 +77,7 @@ def numbers(
     Text is read as numbers; an empty cell is NaN where `gaps` are allowed. `line` tells
     where a row, counted from 0, stands in the file; no number may exceed `largest`.
     """
+    check_numeric(path, name, column)
     if column.dtype == pl.String:
         column = column.str.strip_chars()
         column = column.set(column == "", None)

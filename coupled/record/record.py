@@ -17,12 +17,14 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
-from coupled.files import write_text, write_whole
+from coupled.files import MOST_TEXT_bytes, check_format, json_text, read_bytes, write_text
+from coupled.outputs import Outputs
 from coupled.record.channels import TIME
-from coupled.record.csvfile import read_columns
+from coupled.record.csvfile import read_columns, write_table
 
 Floats = NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet")
+FORMAT = 1  # of a record and its manifest; one without is from before this was written
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,13 @@ def check_suffix(path: Path) -> None:
 
 
 def write_record(record: Record, path: Path) -> None:
-    """Write a record, and its manifest beside it, each whole."""
+    """Write a record, and its manifest beside it: both, or neither."""
     check_suffix(path)
     frame = pl.DataFrame(record.data, schema=list(record.channels), orient="row")
-    if path.suffix.lower() == ".csv":
-        write_whole(path, frame.write_csv)
-    else:
-        write_whole(path, frame.write_parquet)
-    text = json.dumps(record.manifest, indent=2, ensure_ascii=False, sort_keys=True)
-    write_text(manifest_path(path), text + "\n")
+    manifest = {**record.manifest, "format": FORMAT}
+    with Outputs() as outputs:
+        write_table(frame, outputs.at(path))
+        write_text(outputs.at(manifest_path(path)), json_text(manifest, sort_keys=True))
 
 
 def read_record(path: Path) -> Record:
@@ -93,8 +93,16 @@ def read_record(path: Path) -> Record:
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
+    """Return a record's manifest; nothing where there is none, or one of another program."""
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        path.lstat()
+    except OSError:
         return {}
-    return manifest if isinstance(manifest, dict) else {}
+    try:
+        manifest = json.loads(read_bytes(path, MOST_TEXT_bytes))
+    except (ValueError, RecursionError):
+        return {}
+    if not isinstance(manifest, dict):
+        return {}
+    check_format(manifest.get("format"), FORMAT, path, "record")
+    return manifest

@@ -15,7 +15,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
-from coupled.record.csvfile import numbers
+from coupled.files import read_bytes
+from coupled.record.csvfile import check_numeric, first_line, numbers
 from coupled.record.importing.apart import read_apart
 from coupled.record.importing.mapping import Layout
 
@@ -56,7 +57,6 @@ class Log:
     def values(self, name: str, map_file: Path, key: str) -> Floats:
         """Return a column as doubles, NaN where a cell is empty, shape (rows,)."""
         column = self.find(name, map_file, key)
-        self._check_kind(name, column)
         return numbers(self.file, name, column, gaps=True, line=self.line)
 
     def time(self, name: str, map_file: Path, key: str) -> tuple[Floats, bool]:
@@ -75,17 +75,12 @@ class Log:
             if column.dtype == pl.Date:
                 raise InputError(self.file, name, "holds days, without a time of day")
             return steps.cast(pl.Float64).to_numpy().astype(np.float64) / per_s, True
-        self._check_kind(name, column)
+        check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
         if column.dtype.is_integer() and column.len() and column[0] is not None:
             wide = column.cast(pl.Int64, strict=False) - int(column[0])
             return wide.cast(pl.Float64).to_numpy().astype(np.float64), False
         return (values - values[0] if values.size else values), False
-
-    def _check_kind(self, name: str, column: pl.Series) -> None:
-        kind = column.dtype
-        if not (kind.is_numeric() or kind in (pl.String, pl.Boolean, pl.Null)):
-            raise InputError(self.file, name, f"holds {kind}, no numbers")
 
 
 def read_log(path: Path, layout: Layout) -> Log:
@@ -94,20 +89,10 @@ def read_log(path: Path, layout: Layout) -> Log:
     if kind is None:
         known = ", ".join(FORMATS)
         raise InputError(path, "", f"its format is not known; {known}, or log.format in the map")
-    if not path.is_file():
-        missing = "there is no such file" if not path.exists() else "is no file"
-        raise InputError(path, "", missing)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror or error}") from None
+    content = read_bytes(path)
     if kind == "csv":
         return _read_csv(path, content, layout)
     return Log(path, read_apart(path, content, kind, layout))
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
@@ -129,7 +114,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
             separator=delimiter,
         )
     except (pl.exceptions.PolarsError, OSError, ValueError) as error:
-        raise InputError(path, "", f"is not a table: {_first_line(error)}") from None
+        raise InputError(path, "", f"is not a table: {first_line(error)}") from None
     heads = 1 if layout.header else 0
     under = heads + (1 if layout.units_row else 0)
     if table.height <= under:
