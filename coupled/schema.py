@@ -25,6 +25,32 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
+class Given(Section):
+    """A section that Python code makes as well as a file: its keys are its fields' names.
+
+    What a file may not say is refused here too, as an InputError that names the class.
+    """
+
+    def __init__(self, **values: Any) -> None:
+        name = f"coupled.{type(self).__name__}"
+        keys = file_keys(type(self), "m")
+        plain = {key: _plain(value) for key, value in values.items()}
+        known_keys(plain, keys, name, "")
+        for key, value in plain.items():
+            _refuse_huge(value, name, key)
+        try:
+            super().__init__(**plain)
+        except ValidationError as error:
+            raise _first_fault(error, keys, name, "") from None
+
+
+def _plain(value: Any) -> Any:
+    """Return an array or a number of numpy, or a tuple, as a file would give it."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return list(value) if isinstance(value, tuple) else value
+
+
 S = TypeVar("S", bound=Section)
 LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
 MOST_TOML_bytes = 2**20  # tomllib takes seconds for a MiB
@@ -161,6 +187,9 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
         return section(**values)
     except ValidationError as error:
         raise _first_fault(error, keys, file, path) from None
+    except InputError as error:  # of a section that names itself
+        dotted = f"{path}.{error.key}" if path else error.key
+        raise InputError(file, dotted, error.problem) from None
 
 
 def grouped(changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coupled.authority.compare import Flight, compare
-from coupled.flight.scenario import read_run
+from coupled.flight.runfile import read_run
 from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs
 
@@ -21,8 +21,8 @@ def flown(name: str) -> list[Flight]:
 @pytest.mark.parametrize("name", sorted(set(shipped_runs()) - WORST - OWN))
 def test_every_run_flies_to_its_end(name: str) -> None:
     flights = flown(name)
-    scenario = flights[0].scenario
-    assert len(flights) == len(read_run(name)) * len(scenario.run.configurations)
+    scenario = flights[0].manoeuvre
+    assert len(flights) == len(read_run(name)) * len(scenario.configurations)
     for flight in flights:
         assert flight.outcome.ended_early == ""
         assert len(flight.record) == scenario.frames

@@ -11,8 +11,9 @@ import pytest
 from coupled.campaign.plan import Survive, SweepFile, Vary
 from coupled.flight.event import Event
 from coupled.flight.expectation import Expect
+from coupled.flight.manoeuvre import Measure, PressureProfile
 from coupled.flight.pilot import PILOTS
-from coupled.flight.scenario import Bench, Measure, RunFile
+from coupled.flight.runfile import RunFile
 from coupled.flight.weather import Gust, Turbulence
 from coupled.flight.wind import Wind
 from coupled.record import channels
@@ -91,7 +92,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
-    sections += [RunFile, Bench, Wind, Gust, Turbulence, Event, Measure, Expect]
+    sections += [RunFile, PressureProfile, Wind, Gust, Turbulence, Event, Measure, Expect]
     sections += [SweepFile, Vary, Survive]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
     for section in sections:

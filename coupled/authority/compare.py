@@ -1,6 +1,6 @@
 """Authority: what the bend takes away in flight terms, and what each correction gives back.
 
-One scenario is flown in the five configurations; an `Outcome` holds the figures of one
+One manoeuvre is flown in the five configurations; an `Outcome` holds the figures of one
 flight. Loss and feel are read while the control stands still, held at half or more of its
 greatest deflection, beside the closed form of the rig's statics there (which leaves friction
 out). Breakout and bob weight are taken off the force before it is compared.
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Configuration, Scenario
+from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.equations import specified_force
@@ -62,31 +62,31 @@ class Outcome:
 class Flight:
     """One flight of a comparison."""
 
-    scenario: Scenario
+    manoeuvre: Manoeuvre
     configuration: Configuration
     record: Record
     outcome: Outcome
 
 
-def compare(scenarios: list[Scenario], progress: Progress | None = None) -> list[Flight]:
+def compare(manoeuvres: list[Manoeuvre], progress: Progress | None = None) -> list[Flight]:
     """Fly every case in every configuration that its run asks for.
 
     `progress` is called with what is flown, frames done and frames in all.
     """
     flights = []
-    total = sum(s.frames * len(s.run.configurations) for s in scenarios)
+    total = sum(s.frames * len(s.configurations) for s in manoeuvres)
     before = 0
-    for scenario in scenarios:
-        for configuration in scenario.run.configurations:
-            configured = scenario.configured(configuration)
-            label = f"{scenario.label}, {configuration}"
+    for manoeuvre in manoeuvres:
+        for configuration in manoeuvre.configurations:
+            configured = manoeuvre.configured(configuration)
+            label = f"{manoeuvre.label}, {configuration}"
 
             def report(done: int, _: int, label: str = label, before: int = before) -> None:
                 if progress is not None:
                     progress(label, before + done, total)
 
             record = fly(configured, report)
-            before += scenario.frames
+            before += manoeuvre.frames
             outcome = judge(configured, configuration, record)
             flights.append(Flight(configured, configuration, record, outcome))
             if record.manifest["ended_early"] and outcome.ended_early.startswith("interrupted"):
@@ -94,14 +94,14 @@ def compare(scenarios: list[Scenario], progress: Progress | None = None) -> list
     return flights
 
 
-def judge(scenario: Scenario, configuration: str, record: Record) -> Outcome:
+def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     """Return the figures of a flight's record."""
-    control, rig = scenario.control, scenario.rig
+    control, rig = manoeuvre.control, manoeuvre.rig
     ended = record.manifest["ended_early"]
     why = f"{ended['reason']} at {ended['time_s']:.2f} s" if ended else ""
     nan = float("nan")
     if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
-        return Outcome(scenario.label, configuration, control, *(nan,) * 8, None, None, None, why)
+        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 8, None, None, None, why)
     deflection = record[channel(control, "deflection")]
     force = record[channel(control, "force")]
     held = _where_held(record.time_s, deflection)
@@ -112,7 +112,7 @@ def judge(scenario: Scenario, configuration: str, record: Record) -> Outcome:
     point = static_point(rig, control, pressure, float(np.mean(deflection[held])))
     breakout = side * rig.controls[control].loader.breakout
     return Outcome(
-        scenario.label,
+        manoeuvre.label,
         configuration,
         control,
         asked,
@@ -123,12 +123,12 @@ def judge(scenario: Scenario, configuration: str, record: Record) -> Outcome:
         float((point.force[0] - breakout) / (point.specified[0] - breakout)) if specified else nan,
         float(np.max(np.abs(force))),
         float(np.max(np.abs(record[channel(control, "force_step")]))),
-        *_motion_figures(scenario, control, record, side),
+        *_motion_figures(manoeuvre, control, record, side),
         why,
     )
 
 
-def held_forces(scenario: Scenario, control: ControlName, record: Record) -> tuple[float, float]:
+def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> tuple[float, float]:
     """Return the mean force felt and specified where a control is held, N; NaN if it never moves.
 
     Breakout and bob weight are taken off both.
@@ -137,7 +137,7 @@ def held_forces(scenario: Scenario, control: ControlName, record: Record) -> tup
     if len(record) < 2 or not np.any(deflection):
         return float("nan"), float("nan")
     held = _where_held(record.time_s, deflection)
-    return _felt_and_specified(scenario.rig, control, record, held)
+    return _felt_and_specified(manoeuvre.rig, control, record, held)
 
 
 def _where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
@@ -184,17 +184,17 @@ def _felt_and_specified(
 
 
 def _motion_figures(
-    scenario: Scenario, control: ControlName, record: Record, side: float
+    manoeuvre: Manoeuvre, control: ControlName, record: Record, side: float
 ) -> tuple[float | None, float | None, float | None]:
     """Return peak rate in rad/s, peak load factor, and the time to the attitude in s."""
-    if scenario.rig.flight is None:
+    if manoeuvre.rig.flight is None:
         return None, None, None
-    start = scenario.pilots[control].start if control in scenario.pilots else 0.0
+    start = manoeuvre.pilots[control].start_s if control in manoeuvre.pilots else 0.0
     rate = side * record[f"{_RATE[control]}_rad_per_s"]
     load = record["load_factor"]
     far = load[np.argmax(np.abs(load - load[0]))] if control == "column" else load.max()
     attitude = np.unwrap(record[_ATTITUDE[control]])
-    there = side * (attitude - attitude[0]) >= scenario.run.measure.attitude_change
+    there = side * (attitude - attitude[0]) >= manoeuvre.measure.attitude_change
     there &= record.time_s >= start
     reached = float(record.time_s[np.argmax(there)]) - start if there.any() else None
     return float(rate.max()), float(far), reached

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.airframe import ELEVATOR, JSBSimAirframe
 from coupled.flight.loop import fly
-from coupled.flight.scenario import CONFIGURATIONS, Configuration, configure, read_run
+from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, configure
+from coupled.flight.runfile import read_run
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
@@ -110,7 +111,7 @@ def shipped_flights(rig: Rig, progress: Progress) -> list[Record]:
     scenarios = [case for name in named for case in read_run(name)]
     records = []
     for i, scenario in enumerate(scenarios):
-        progress(scenario.run.name, i, len(scenarios))
+        progress(scenario.name, i, len(scenarios))
         records.append(fly(scenario))
     return records
 

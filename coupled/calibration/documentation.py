@@ -9,7 +9,7 @@ from pathlib import Path
 from coupled.calibration.checks import Check, dynamic_checks, static_checks, surface_checks
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.scenario import configure
+from coupled.flight.manoeuvre import configure
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig

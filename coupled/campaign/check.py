@@ -9,20 +9,21 @@ from coupled.authority.compare import Flight, compare
 from coupled.campaign.verdict import UnjudgedError, Verdict, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect
-from coupled.flight.scenario import Configuration, Scenario, read_run
+from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.runfile import read_run
 
 Progress = Callable[[str, int, int], None]
 
 
-def read_expecting(name: str) -> list[Scenario]:
+def read_expecting(name: str) -> list[Manoeuvre]:
     """Return the cases of a run that expects something; to check any other says nothing."""
     scenarios = read_run(name)
-    if not scenarios[0].run.expect:
+    if not scenarios[0].expect:
         raise InputError(scenarios[0].file, "expect", "there is none: nothing could fail")
     return scenarios
 
 
-def check_run(scenarios: Sequence[Scenario], progress: Progress | None = None) -> list[Verdict]:
+def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) -> list[Verdict]:
     """Fly what a run's expectations look at, and return the verdicts, case by case."""
     flights = compare([_needed(scenario) for scenario in scenarios], progress)
     flown: dict[tuple[str, str], Flight]
@@ -30,27 +31,28 @@ def check_run(scenarios: Sequence[Scenario], progress: Progress | None = None) -
     return [
         _verdict(expect, scenario, configuration, flown)
         for scenario in scenarios
-        for expect in scenario.run.expect
-        for configuration in scenario.run.configurations
+        for expect in scenario.expect
+        for configuration in scenario.configurations
         if expect.concerns(scenario.label, configuration)
     ]
 
 
-def _needed(scenario: Scenario) -> Scenario:
+def _needed(scenario: Manoeuvre) -> Manoeuvre:
     """Return the scenario with only those configurations that something is expected of."""
-    run, wanted = scenario.run, set[str]()
-    for expect in run.expect:
-        looked_at: set[str] = {c for c in run.configurations if expect.concerns(scenario.label, c)}
+    wanted = set[str]()
+    for expect in scenario.expect:
+        flown: Sequence[str] = scenario.configurations
+        looked_at = {c for c in flown if expect.concerns(scenario.label, c)}
         if looked_at and expect.reference is not None:
             looked_at.add(expect.reference)
         wanted |= looked_at
-    kept = [c for c in run.configurations if c in wanted]
-    return replace(scenario, run=run.model_copy(update={"configurations": kept}))
+    kept = tuple(c for c in scenario.configurations if c in wanted)
+    return replace(scenario, configurations=kept)
 
 
 def _verdict(
     expect: Expect,
-    scenario: Scenario,
+    scenario: Manoeuvre,
     configuration: Configuration,
     flown: dict[tuple[str, str], Flight],
 ) -> Verdict:
@@ -59,5 +61,5 @@ def _verdict(
     try:
         return judge_expectation(expect, flight, other)
     except UnjudgedError as why:
-        where = (scenario.run.name, scenario.label, configuration)
+        where = (scenario.name, scenario.label, configuration)
         return Verdict(*where, expect.words, None, *expect.bounds, str(why))

@@ -24,7 +24,8 @@ from coupled.errors import InputError, nearest
 from coupled.files import sha256
 from coupled.flight.expectation import Figure
 from coupled.flight.loop import input_files, make_airframe
-from coupled.flight.scenario import Configuration, Scenario, scenarios_from_table
+from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.runfile import manoeuvres_from_table
 from coupled.resources import find, shipped_runs
 from coupled.rig.parameters import PLAIN_NAME
 from coupled.rig.rigfile import change
@@ -100,7 +101,7 @@ class Plan:
         """The keys that vary, one a parameter."""
         return [vary.key for vary in self.sweep.vary]
 
-    def scenario(self, changes: Mapping[str, Any]) -> Scenario:
+    def scenario(self, changes: Mapping[str, Any]) -> Manoeuvre:
         """Return the run's case with values changed, by their dotted keys."""
         return _changed(self.table, self.run_file, self.sweep.case, changes)
 
@@ -122,7 +123,7 @@ def read_plan(file: Path) -> Plan:
     run_table = load_toml(run_file)
     try_changes = partial(_changed, run_table, run_file, sweep.case)
     if sweep.case is not None:
-        labels = [scenario.label for scenario in scenarios_from_table(dict(run_table), run_file)]
+        labels = [scenario.label for scenario in manoeuvres_from_table(dict(run_table), run_file)]
         if sweep.case not in labels:
             raise InputError(file, "case", f"no {sweep.case!r}; {nearest(sweep.case, labels)}")
     base = try_changes({})
@@ -157,7 +158,7 @@ def jobs(plan: Plan) -> list[Job]:
 
 def _changed(
     table: Mapping[str, Any], file: Path, label: str | None, changes: Mapping[str, Any]
-) -> Scenario:
+) -> Manoeuvre:
     tables = copy.deepcopy(dict(table))
     tables.pop("expect", None)
     listed = tables.get("case", []) or [{"label": str(tables.get("name", "run"))}]
@@ -174,7 +175,7 @@ def _changed(
         elif not change(tables, key, value):
             raise InputError(file, key, "leads through a value, not a table")
     tables["case"] = [case]
-    return scenarios_from_table(tables, file)[0]
+    return manoeuvres_from_table(tables, file)[0]
 
 
 def _check_values(sweep: SweepFile, file: Path) -> None:
@@ -221,7 +222,7 @@ def _check_range(sweep: SweepFile, vary: Vary, place: str, file: Path) -> None:
 
 
 def _check_keys(
-    sweep: SweepFile, file: Path, try_changes: Callable[[dict[str, Any]], Scenario]
+    sweep: SweepFile, file: Path, try_changes: Callable[[dict[str, Any]], Manoeuvre]
 ) -> set[Path]:
     """Try every value alone, and return the files that its flight would read."""
     files = set[Path]()
@@ -242,7 +243,7 @@ def _check_keys(
     return files
 
 
-def _check_property(scenario: Scenario, key: str) -> None:
+def _check_property(scenario: Manoeuvre, key: str) -> None:
     """Refuse a property that the aircraft lacks; one that will not trim is a row of the table."""
     try:
         make_airframe(scenario)

@@ -36,7 +36,7 @@ def judge_standard(
     `control` is the one that the comparison looks at where none is named. Of two
     tolerances the wider holds.
     """
-    looked_at = control or flight.scenario.control
+    looked_at = control or flight.manoeuvre.control
     if standard in _PILOT_FORCE_lbf:
         force = float(np.max(np.abs(flight.record[channel(looked_at, "force")])))
         return force, (None, _PILOT_FORCE_lbf[standard][looked_at] * POUND_N)
@@ -45,6 +45,6 @@ def judge_standard(
         peak, wanted = (f.outcome.peak_rate_rad_per_s or 0.0 for f in (flight, rigid))
         allowed = max(_RATE_rad_per_s, _RATE_SHARE * abs(wanted))
         return peak, (wanted - allowed, wanted + allowed)
-    felt, specified = held_forces(flight.scenario, looked_at, flight.record)
+    felt, specified = held_forces(flight.manoeuvre, looked_at, flight.record)
     allowed = max(_FORCE_lbf[looked_at] * POUND_N, _FORCE_SHARE * abs(specified))
     return felt, (specified - allowed, specified + allowed)

@@ -44,8 +44,8 @@ def fly_job(plan: Plan, job: Job) -> Row:
     try:
         scenario = plan.scenario(job.changes)
         if job.seed is not None:
-            scenario = replace(scenario, run=scenario.run.model_copy(update={"seed": job.seed}))
-        row["seed"] = scenario.run.seed
+            scenario = replace(scenario, seed=job.seed)
+        row["seed"] = scenario.seed
         if job.configuration:
             scenario = scenario.configured(job.configuration)
         record = fly(scenario)

@@ -61,9 +61,9 @@ def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | Non
     if flight is None or (expect.reference is not None and other is None):
         raise UnjudgedError("was not flown")
     value, bounds = _figure(expect, flight, other)
-    scenario = flight.scenario
+    scenario = flight.manoeuvre
     return Verdict(
-        scenario.run.name, scenario.label, flight.configuration, expect.words, value, *bounds
+        scenario.name, scenario.label, flight.configuration, expect.words, value, *bounds
     )
 
 
@@ -110,7 +110,7 @@ def _refuse_early(flight: Flight, end_s: float) -> None:
 
 def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
     """Return what is taken of a channel: of every row, the one nearest to its bound."""
-    last_s = flight.scenario.run.duration if expect.end is None else expect.end
+    last_s = flight.manoeuvre.duration_s if expect.end is None else expect.end
     end_s = last_s if expect.at is None else expect.at
     flights = [flight] if other is None else [flight, other]
     for flown in flights:
@@ -135,7 +135,7 @@ def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
 def _time_reached(expect: Expect, flight: Flight) -> float:
     """Return when the channel first meets or crosses the level, straight between rows, in s."""
     assert expect.reaches is not None
-    end_s = flight.scenario.run.duration if expect.end is None else expect.end
+    end_s = flight.manoeuvre.duration_s if expect.end is None else expect.end
     times, values = _window(expect, flight, end_s)
     over = values - expect.reaches
     met = np.flatnonzero(np.append(over[:-1] * over[1:] <= 0.0, over[-1] == 0.0))

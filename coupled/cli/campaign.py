@@ -37,7 +37,7 @@ def check(
     from coupled.flight.loop import input_files
 
     found = [read_expecting(name) for name in run]
-    names = [scenarios[0].run.name for scenarios in found]
+    names = [scenarios[0].name for scenarios in found]
     for name in names:
         if names.count(name) > 1:
             raise InputError(name, "", "two of the runs have this name")

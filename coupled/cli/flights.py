@@ -34,20 +34,21 @@ def compare(
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
     from coupled.cli.tables.flights import print_comparison
-    from coupled.flight.scenario import read_run
+    from coupled.flight.loop import input_files
+    from coupled.flight.runfile import read_run
 
-    scenarios = read_run(run)
-    path = figure or Path("out") / f"{scenarios[0].run.name}.png"
-    inputs = [scenarios[0].file, *(scenario.rig_file for scenario in scenarios)]
+    cases = read_run(run)
+    path = figure or Path("out") / f"{cases[0].name}.png"
+    inputs = [file for case in cases for file in input_files(case)]
     if not no_figure:
         from coupled.plots.saving import check_format
 
         check_format(path)
         check_target(path, inputs)
     check_json(json_file, [*inputs, path])
-    say_stale(scenarios[0].rig)
+    say_stale(cases[0].rig)
     with progress() as advance:
-        flights = compare_flights(scenarios, advance)
+        flights = compare_flights(cases, advance)
     if json_file != "-":
         print_comparison(out, flights)
     if not no_figure:
@@ -78,32 +79,33 @@ def fly(
     """Fly one run and write its record, and a manifest beside it."""
     from coupled.authority.compare import judge
     from coupled.errors import nearest
-    from coupled.flight.loop import fly as fly_scenario
+    from coupled.flight.loop import fly as fly_manoeuvre
     from coupled.flight.loop import input_files
-    from coupled.flight.scenario import CONFIGURATIONS, read_run
+    from coupled.flight.manoeuvre import CONFIGURATIONS
+    from coupled.flight.runfile import read_run
     from coupled.record.record import check_suffix, manifest_path, write_record
 
-    scenarios = {scenario.label: scenario for scenario in read_run(run)}
-    if case and case not in scenarios:
-        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, scenarios)}")
-    scenario = scenarios[case] if case else next(iter(scenarios.values()))
+    cases = {each.label: each for each in read_run(run)}
+    if case and case not in cases:
+        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, cases)}")
+    manoeuvre = cases[case] if case else next(iter(cases.values()))
     for known in CONFIGURATIONS:
         if configuration == known:
-            scenario = scenario.configured(known)
+            manoeuvre = manoeuvre.configured(known)
     if configuration and configuration not in CONFIGURATIONS:
         hint = nearest(configuration, CONFIGURATIONS)
         raise InputError(run, "--configuration", f"no {configuration!r}; {hint}")
-    path = output or Path("out") / f"{scenario.run.name}.csv"
+    path = output or Path("out") / f"{manoeuvre.name}.csv"
     check_suffix(path)
-    inputs = input_files(scenario)
+    inputs = input_files(manoeuvre)
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
     check_json(json_file, [*inputs, path, manifest_path(path)])
-    say_stale(scenario.rig)
+    say_stale(manoeuvre.rig)
     with progress() as advance:
-        record = fly_scenario(scenario, lambda done, total: advance(scenario.label, done, total))
+        record = fly_manoeuvre(manoeuvre, lambda done, total: advance(manoeuvre.label, done, total))
     write_record(record, path)
-    outcome = judge(scenario, configuration or "as the rig file says", record)
+    outcome = judge(manoeuvre, configuration or "as the rig file says", record)
     if json_file != "-":
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")

@@ -1,1 +1,1 @@
-"""The rig coupled to an aircraft: airframe, pilots, scenario, and the frame loop."""
+"""The rig coupled to an aircraft: airframe, pilots, manoeuvre, run file, and the frame loop."""

@@ -24,9 +24,10 @@ from coupled.flight.airframe import ALTITUDE, JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
 from coupled.flight.conditions import meet
 from coupled.flight.direct import check_direct_controls
-from coupled.flight.pilot import Action, Table
-from coupled.flight.scenario import Scenario
-from coupled.record.channels import TIME, ControlName, control_channels, record_channels
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.pilot import Action, ForceTable
+from coupled.flight.pilot.base import Start
+from coupled.record.channels import TIME, ControlName, channel, record_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
@@ -39,24 +40,26 @@ Floats = NDArray[np.float64]
 
 
 def fly(
-    scenario: Scenario, progress: Progress | None = None, air_m_per_s: Sequence[float] | None = None
+    manoeuvre: Manoeuvre,
+    progress: Progress | None = None,
+    air_m_per_s: Sequence[float] | None = None,
 ) -> Record:
-    """Fly a scenario and return its record, SI, one row a frame.
+    """Fly a manoeuvre and return its record, SI, one row a frame.
 
     `progress` is called now and then with frames done and frames in all. The manifest says
     what went in, and under `ended_early` why and when a flight ended before its time.
     `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame.
     """
-    run, rig = scenario.run, scenario.rig
-    airframe = make_airframe(scenario, air_m_per_s)
-    frames, substeps = scenario.frames, rig.substeps
+    rig, properties = manoeuvre.rig, manoeuvre.record_properties
+    airframe = make_airframe(manoeuvre, air_m_per_s)
+    frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
-    actions = _actions(scenario, airframe.motion()[0])
+    actions = _actions(manoeuvre, airframe.motion()[0])
     names = list(rig.controls)
     channels = record_channels(names, rig.flight is not None)
     controls = pack(rig, {str(name): action.hand for name, action in actions.items()})
     script = _script(names, actions, frames * substeps + 1, h)
-    data = _noise(channels, rig.noise, frames, run.seed)
+    data = _noise(channels, rig.noise, frames, manoeuvre.seed)
     hands = controls["state"]["hand"]
     looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
     extra: list[tuple[float, ...]] = []
@@ -65,7 +68,7 @@ def fly(
     arrays = whereabouts(controls, script, data)
     place = int(arrays.ctypes.data)
     rig_frame = bound(step_frame_there, place, 0, read(), 1.0)
-    flown, asked = rig.flight is not None, bool(run.record_properties)
+    flown, asked = rig.flight is not None, bool(properties)
     ended: dict[str, Any] | None = None
     done = 0
     try:
@@ -95,43 +98,47 @@ def fly(
         ended = {"reason": "the state is not finite", "time_s": int(lost[0]) / rig.frame_rate}
     data[:, 0] = np.arange(len(data)) / rig.frame_rate
     if asked:
-        channels = (*channels, *run.record_properties)
+        channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
-    return Record(channels, data, _manifest(scenario, channels, data, ended))
+    return Record(channels, data, _manifest(manoeuvre, channels, data, ended))
 
 
-def make_airframe(scenario: Scenario, air_m_per_s: Sequence[float] | None = None) -> Airframe:
-    """Return the scenario's aircraft, trimmed and checked, or its bench."""
-    rig, run = scenario.rig, scenario.run
+def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = None) -> Airframe:
+    """Return the manoeuvre's aircraft, trimmed and checked, or its bench."""
+    rig, source = manoeuvre.rig, manoeuvre.source
     if rig.flight is None:
-        assert run.bench is not None
-        points = list(zip(run.bench.time, run.bench.dynamic_pressure, strict=True))
+        assert manoeuvre.bench is not None
+        profile = manoeuvre.bench
+        points = list(zip(profile.time_s, profile.dynamic_pressure_Pa, strict=True))
         return Bench(1.0 / rig.frame_rate, points)
-    where: dict[str, Any] = {"models": [aircraft_folder()], "file": scenario.rig_file}
+    where: dict[str, Any] = {"models": [aircraft_folder()], "file": manoeuvre.rig_file}
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
     try:
         check_direct_controls(rig.flight, frame_s, controls, **where)
-        asked: dict[str, Any] = {"record": run.record_properties, "record_file": scenario.file}
-        asked |= {"seed": run.seed, "air_m_per_s": air_m_per_s}
+        asked: dict[str, Any] = {
+            "record": manoeuvre.record_properties,
+            "record_file": manoeuvre.file,
+            "seed": manoeuvre.seed,
+            "air_m_per_s": air_m_per_s,
+        }
         airframe = JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
     except InputError as error:
-        if error.key not in scenario.changes:
+        if source is None or error.key not in source.changes:
             raise
-        place = f"case {scenario.label!r}: rig.{error.key}"
-        raise InputError(scenario.file, place, error.problem) from None
-    meet(airframe, run, scenario.file, frame_s, run.seed)
+        place = f"case {manoeuvre.label!r}: rig.{error.key}"
+        raise InputError(source.run_file, place, error.problem) from None
+    meet(airframe, manoeuvre.conditions, manoeuvre.file, frame_s, manoeuvre.seed)
     return airframe
 
 
-def _actions(scenario: Scenario, pressure_Pa: float) -> dict[ControlName, Action]:
+def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Action]:
     """Return what each pilot does on a control, within reach, at the dynamic pressure of trim."""
-    rig, found = scenario.rig, {}
-    for name, pilot in scenario.pilots.items():
-        control = rig.controls[name]
-        gradient = float(specified_gradient(control.schedule, pressure_Pa))
-        met = pilot.meet(rig, scenario.rig_file, scenario.file, scenario.run.seed)
-        action = met.act(control, gradient, name, scenario.file.parent)
-        hand = replace(action.hand, reach=pilot.reach, gradient=gradient)
+    rig, found = manoeuvre.rig, {}
+    for name, pilot in manoeuvre.pilots.items():
+        gradient = float(specified_gradient(rig.controls[name].schedule, pressure_Pa))
+        start = Start(gradient, manoeuvre.seed, manoeuvre.file, manoeuvre.rig_file)
+        action = pilot.act(rig, name, start)
+        hand = replace(action.hand, reach=pilot.reach(name), gradient=gradient)
         found[name] = replace(action, hand=hand)
     return found
 
@@ -167,33 +174,33 @@ def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, see
     return hiss
 
 
-def input_files(scenario: Scenario) -> list[Path]:
-    """Return the files that a flight reads: run, rig, and a pilot's tables."""
-    tables = [pilot.file for pilot in scenario.pilots.values() if isinstance(pilot, Table)]
-    here = scenario.file.parent
-    return [scenario.file, scenario.rig_file, *(here / name for name in tables)]
+def input_files(manoeuvre: Manoeuvre) -> list[Path]:
+    """Return the files that a flight reads, if any: run, rig, and a pilot's tables."""
+    source = manoeuvre.source
+    own = [source.run_file, source.rig_file] if source is not None else []
+    pilots = manoeuvre.pilots.values()
+    return own + [Path(p.file) for p in pilots if isinstance(p, ForceTable) and p.file]
 
 
 def _manifest(
-    scenario: Scenario, channels: tuple[str, ...], data: Floats, ended: dict[str, Any] | None
+    manoeuvre: Manoeuvre, channels: tuple[str, ...], data: Floats, ended: dict[str, Any] | None
 ) -> dict[str, Any]:
     stops = {}
-    for control in scenario.rig.controls:
-        met = np.flatnonzero(data[:, channels.index(control_channels(control)[-1])])
+    for control in manoeuvre.rig.controls:
+        met = np.flatnonzero(data[:, channels.index(channel(control, "stop"))])
         if met.size:
             stops[control] = float(data[met[0], channels.index(TIME)])
+    files = [path for path in input_files(manoeuvre) if path.is_file()]
     return {
-        "run": scenario.run.name,
-        "case": scenario.label,
-        "rig": scenario.rig.model_dump(),
-        "seed": scenario.run.seed,
+        "run": manoeuvre.name,
+        "case": manoeuvre.label,
+        "rig": manoeuvre.rig.model_dump(),
+        "seed": manoeuvre.seed,
         "channels": list(channels),
         "rows": len(data),
         "ended_early": ended,
         "stop_first_met_s": stops,
-        "inputs_sha256": {
-            path.name: sha256(path) for path in input_files(scenario) if path.is_file()
-        },
+        "inputs_sha256": {path.name: sha256(path) for path in files},
         "versions": dict(_versions()),
     }
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +44,7 @@ def elevator_response(
     flight: Flight,
     frame_s: float,
     controls: tuple[ControlName, ...],
-    file: Path,
+    file: object,
     rate_rad_per_s: float,
 ) -> Response:
     """Return the response of an aircraft in still air.
@@ -58,7 +57,7 @@ def elevator_response(
 
 @lru_cache(maxsize=64)
 def _response(
-    flight_json: str, frame_s: float, controls: tuple[ControlName, ...], file: Path, rate: float
+    flight_json: str, frame_s: float, controls: tuple[ControlName, ...], file: object, rate: float
 ) -> Response:
     flight = Flight.model_validate_json(flight_json)
     period = 2.0 * math.pi / rate
@@ -80,7 +79,7 @@ def _response(
 
 
 def _aircraft(
-    flight: Flight, frame_s: float, controls: tuple[ControlName, ...], file: Path
+    flight: Flight, frame_s: float, controls: tuple[ControlName, ...], file: object
 ) -> JSBSimAirframe:
     return JSBSimAirframe(flight, frame_s, controls, [aircraft_folder()], file)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -11,14 +10,14 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Action, Pilot
-from coupled.flight.scenario import Bench, RunFile, Scenario
+from coupled.flight.pilot.base import Start
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
-from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -35,7 +34,7 @@ class Recorded(Pilot):
     times: list[float]
     forces: list[float]
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the recorded force, straight between its samples."""
         times, forces = np.array(self.times), np.array(self.forces)
         return Action(force=lambda t: np.interp(t, times, forces))
@@ -62,15 +61,12 @@ def fly_force(
     if rig.flight is None:
         assert pressure_Pa is not None
         told = slice(None, None, TOLD_EVERY)
-        bench = Bench(time=times[told].tolist(), dynamic_pressure=pressure_Pa[told].tolist())
-    duration = frames / rig.frame_rate
-    run = RunFile(
-        name="again", card="again", rig="again", duration=duration, seed=seed, bench=bench
+        bench = PressureProfile(time_s=times[told], dynamic_pressure_Pa=pressure_Pa[told])
+    again = Manoeuvre(
+        rig, pilots, frames / rig.frame_rate, seed=seed, bench=bench, name="flown-again"
     )
-    nowhere = Path()
-    scenario = Scenario(run, nowhere, rig, nowhere, pilots, "again")
     air = None if air_m_per_s is None else air_m_per_s[1:].tolist()
-    return fly(scenario, air_m_per_s=air)
+    return fly(again, air_m_per_s=air)
 
 
 def closed_loop(

@@ -41,7 +41,7 @@ def draw_comparison(flights: Sequence[Flight]) -> Figure:
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     if len(cases) > 1 and all(len(case) == 1 for case in cases):
         return _draw_step_panels(cases)
-    flown = flights[0].scenario.rig.flight is not None
+    flown = flights[0].manoeuvre.rig.flight is not None
     rows = [_draw_surface, *([_draw_motion] if flown else []), _draw_force, _draw_loss]
     columns, height = (len(cases), len(rows)) if len(cases) > 1 else (2, 2)
     figure = Figure(figsize=(1.2 + 3.9 * columns, 0.9 + 2.6 * height), layout="constrained")
@@ -83,9 +83,9 @@ def _draw_step_panels(cases: Sequence[Sequence[Flight]]) -> Figure:
 
 
 def _title(flight: Flight) -> str:
-    flown = flight.scenario.rig.flight
-    where = f"{flown.model} behind the {flight.scenario.rig.name} rig" if flown else "on the bench"
-    return f"{flight.scenario.run.name}: {where}"
+    flown = flight.manoeuvre.rig.flight
+    where = f"{flown.model} behind the {flight.manoeuvre.rig.name} rig" if flown else "on the bench"
+    return f"{flight.manoeuvre.name}: {where}"
 
 
 def _wrapped(text: str, width: int = 42) -> str:
@@ -111,7 +111,7 @@ def _line(configuration: str) -> dict[str, Any]:
 
 def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
     """Begin a time axis 3 s before the control moves, where it does so in the second half."""
-    record, control = case[0].record, case[0].scenario.control
+    record, control = case[0].record, case[0].manoeuvre.control
     deflection = np.abs(record[channel(control, "deflection")])
     moves, end = record.time_s[np.argmax(deflection > 0.01 * np.max(deflection))], record.time_s[-1]
     if moves > 0.5 * end:
@@ -120,8 +120,8 @@ def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
 
 def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
     """Surface command about trim, against what the pilot's deflection asks for."""
-    control = case[0].scenario.control
-    data = case[0].scenario.rig.controls[control]
+    control = case[0].manoeuvre.control
+    data = case[0].manoeuvre.rig.controls[control]
     sign = COMMAND_SIGN[data.surface]
     for flight in case:
         record = flight.record
@@ -137,14 +137,14 @@ def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
 
 def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
     """Pitch, roll or yaw rate, or the channel that the run wants drawn."""
-    drawn = case[0].scenario.run.measure.drawn
+    drawn = case[0].manoeuvre.measure.drawn
     if drawn is not None:
         for flight in case:
             axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight.configuration))
         axes.set_xlabel("time, s")
         axes.set_ylabel(parameter(drawn))
         return
-    name = _RATE[case[0].scenario.control]
+    name = _RATE[case[0].manoeuvre.control]
     for flight in case:
         rate = flight.record[f"{name}_rad_per_s"] / DEGREE_rad
         axes.plot(flight.record.time_s, rate, **_line(flight.configuration))
@@ -155,7 +155,7 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
 
 def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
     """Force against true deflection, with what was specified."""
-    control = case[0].scenario.control
+    control = case[0].manoeuvre.control
     scale, unit = (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
     for flight in case:
         deflection = flight.record[channel(control, "deflection")]
@@ -166,7 +166,7 @@ def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
     peak = int(np.argmax(np.abs(deflection)))
     line = np.linspace(0.0, deflection[peak], 50)
     pressure = float(record["dynamic_pressure_Pa"][peak])
-    wanted = specified_force(case[0].scenario.rig, control, pressure, line)
+    wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
     axes.plot(scale * line, wanted, color="0.65", linewidth=4.5, zorder=0)
     axes.set_xlabel(f"true deflection of the {control}, {unit}")
     axes.set_ylabel("pilot's force, N")
@@ -204,7 +204,7 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
 def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:
     """Jumps of the modifying force from frame to frame, which the hand feels."""
     flight = case[0]
-    step = flight.record[channel(flight.scenario.control, "force_step")]
+    step = flight.record[channel(flight.manoeuvre.control, "force_step")]
     axes.vlines(flight.record.time_s, 0.0, step, color="#d55e00", linewidth=0.8)
     axes.annotate(
         f"largest {flight.outcome.force_step_N:.2f} N",

@@ -8,12 +8,14 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.runfile import read_run
 
 pytestmark = pytest.mark.bench
 
@@ -21,26 +23,23 @@ FRAMES = 4800
 ROUNDS = 9
 
 
-def of(run: str, controls: int, frames: int) -> Scenario:
+def of(run: str, controls: int, frames: int) -> Manoeuvre:
     """Return a shipped run with its first controls only, of so many frames."""
     scenario = read_run(run)[0]
     names = list(scenario.rig.controls)[:controls]
-    rig = scenario.rig.model_copy(
-        update={"controls": {name: scenario.rig.controls[name] for name in names}}
-    )
-    length = scenario.run.model_copy(update={"duration": frames / rig.frame_rate})
+    rig = scenario.rig.changed({"controls": {name: scenario.rig.controls[name] for name in names}})
     pilots = {name: pilot for name, pilot in scenario.pilots.items() if name in names}
-    return Scenario(length, scenario.file, rig, scenario.rig_file, pilots, scenario.label)
+    return replace(scenario, rig=rig, pilots=pilots, duration_s=frames / rig.frame_rate)
 
 
-def flown_s(scenario: Scenario) -> float:
+def flown_s(scenario: Manoeuvre) -> float:
     start = time.perf_counter()
     record = fly(scenario)
     assert len(record) == scenario.frames
     return time.perf_counter() - start
 
 
-def bare_s(scenario: Scenario) -> float:
+def bare_s(scenario: Manoeuvre) -> float:
     assert scenario.rig.flight is not None
     airframe = JSBSimAirframe(scenario.rig.flight, 1.0 / scenario.rig.frame_rate)
     run = airframe._fdm.run
@@ -91,7 +90,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 
 
 def test_a_second_start_takes_under_2_s() -> None:
-    code = "from coupled.flight.loop import fly; from coupled.flight.scenario import read_run;"
+    code = "from coupled.flight.loop import fly"
     code += "from tests.benchmarks.test_frame_cost import of; fly(of('pull-up-c172p', 1, 2))"
     taken = []
     for _ in range(4):

@@ -19,12 +19,11 @@ from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.setting import NOISE, draw_setting, fly_clean
 from coupled.blind.twin.twin import Twin, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
-from coupled.flight.pilot import Table
-from coupled.flight.scenario import Bench, RunFile, Scenario
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
+from coupled.flight.pilot import ForceTable
 from coupled.gap.effects import BY_NAME
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.schema import build
 
 Floats = NDArray[np.float64]
 POOL = shipped_pool()
@@ -140,11 +139,9 @@ def test_the_library_flies_the_same(tmp_path: Path, name: str) -> None:
     rows = "".join(f"{a:.10f},{b:.9f}\n" for a, b in zip(t, force, strict=True))
     (tmp_path / "force.csv").write_text("time_s,column_force_N\n" + rows)
     flown = rig.flight is not None
-    told = None if flown else Bench(time=[0.0, 20.0], dynamic_pressure=[300.0, 2900.0])
-    run = RunFile(name="t", card="t", rig="t", duration=20.0, bench=told)
-    pilot = build(Table, {"kind": "table", "file": "force.csv"}, "t", "pilot.column")
-    here = tmp_path / "force.csv"
-    theirs = fly(Scenario(run, here, rig, here, {"column": pilot}, "t"))
+    profile = PressureProfile(time_s=[0.0, 20.0], dynamic_pressure_Pa=[300.0, 2900.0])
+    pilot = ForceTable(file=str(tmp_path / "force.csv"))
+    theirs = fly(Manoeuvre(rig, {"column": pilot}, 20.0, bench=None if flown else profile))
     q = None if flown else np.interp(np.arange(frames) / 120, [0.0, 20.0], [300.0, 2900.0])
     ours = fly_twin(
         rig, nominal_twin(rig), force, frames, q, np.zeros((frames, 14 if flown else 7))

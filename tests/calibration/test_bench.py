@@ -19,7 +19,8 @@ from coupled.calibration.outcome import deflection_off, felt_off
 from coupled.calibration.plan import stations
 from coupled.errors import InputError
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.pilot.base import Start
+from coupled.flight.runfile import read_run
 from coupled.record.channels import ControlName
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
@@ -87,9 +88,7 @@ def test_the_bench_is_the_rig_that_flies() -> None:
     rig = scenario.rig
     flown = fly(scenario)
     pressure = flown["dynamic_pressure_Pa"]
-    action = scenario.pilots["column"].act(
-        rig.controls["column"], 0.0, "column", scenario.file.parent
-    )
+    action = scenario.pilots["column"].act(rig, "column", Start(0.0))
     frames = scenario.frames
     times = np.arange(frames * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
     assert action.force is not None
@@ -197,8 +196,7 @@ def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
 
 def flown(rig: Rig, configuration: str) -> Any:
     base = read_run("worst-case")[0]
-    chosen = base.run.model_copy(update={"configurations": [configuration]})
-    made = Scenario(chosen, base.file, rig, base.rig_file, base.pilots, base.label, base.changes)
+    made = replace(base, rig=rig, configurations=(configuration,))
     [flight] = compare([made])
     return flight.outcome
 

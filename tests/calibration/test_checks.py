@@ -19,7 +19,7 @@ from coupled.calibration.checks import (
 )
 from coupled.calibration.documentation import document
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
-from coupled.flight.scenario import configure
+from coupled.flight.manoeuvre import configure
 from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.rig import Rig
 from tests.support.rigs import G_STIFF, K_REPORT, bench

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import typing
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,7 +18,7 @@ from coupled.campaign.standards import judge_standard
 from coupled.campaign.verdict import UnjudgedError, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect, Figure
-from coupled.flight.scenario import read_run
+from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 from coupled.resources import shipped_runs
 from coupled.schema import build
@@ -55,8 +55,6 @@ def expect(**keys: Any) -> Expect:
 
 def flight(values: Any, ended: bool = False) -> Flight:
     """Return a flight of 10 Hz over 1 s whose one channel, `x`, is as given."""
-    scenario = read_run("appendix-c")[0]
-    run = scenario.run.model_copy(update={"duration": 1.0})
     x = np.asarray(values, dtype=float)
     manifest = {"ended_early": {"reason": "test", "time_s": 0.1 * len(x)} if ended else None}
     record = Record(
@@ -67,8 +65,8 @@ def flight(values: Any, ended: bool = False) -> Flight:
     figures = dict.fromkeys((f.name for f in fields(Outcome)), 0.25)
     why = "test at 0.10 s" if ended else ""
     outcome = Outcome(**{**figures, "ended_early": why, "time_to_attitude_s": None})
-    changed = type(scenario)(**{**scenario.__dict__, "run": run})
-    return Flight(changed, "rigid", record, outcome)
+    manoeuvre = replace(read_run("appendix-c")[0], duration_s=1.0)
+    return Flight(manoeuvre, "rigid", record, outcome)
 
 
 RISE = np.linspace(0.0, 0.9, 10)

@@ -11,7 +11,7 @@ from coupled.campaign.plan import Job, jobs, read_plan
 from coupled.campaign.survival import limits
 from coupled.campaign.sweep import SURVIVED, fly_job, table
 from coupled.errors import InputError
-from coupled.flight.scenario import Configuration
+from coupled.flight.manoeuvre import Configuration
 from coupled.plots.saving import save
 from coupled.plots.survival import draw_survival
 from coupled.resources import runs_folder

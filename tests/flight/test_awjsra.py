@@ -258,7 +258,7 @@ def test_the_diagnosis_can_alter_its_elevator_and_damping() -> None:
 
 def test_it_loads_and_flies_without_a_word(tmp_path: Path) -> None:
     code = """
-from coupled.flight.scenario import read_run
+from coupled.flight.runfile import read_run
 from coupled.flight.loop import fly
 record = fly(read_run("worst-case")[0])
 assert len(record) > 100

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ import pytest
 from coupled.errors import InputError
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly, make_airframe
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.units import POUND_N, FOOT_m
@@ -40,7 +42,7 @@ def scenario(
     extra: list[str] | None = None,
     duration: float = 4.0,
     seed: int = 3,
-) -> Scenario:
+) -> Manoeuvre:
     path = folder / "adverse.toml"
     told = RUN.format(
         conditions=conditions, rig=rig, extra=extra or [], duration=duration, seed=seed
@@ -74,10 +76,8 @@ def test_turbulence_comes_from_the_seed_and_grows_with_the_wind(tmp_path: Path, 
     def air(wind: float, seed: int) -> np.ndarray:
         told = f'[turbulence]\nmodel = "{model}"\nwind_at_6m_m_per_s = {wind}\nseverity = 3\n'
         low = scenario(tmp_path, told, extra=AIR, duration=20.0, seed=seed)
-        assert low.rig.flight is not None
-        flight = low.rig.flight.model_copy(update={"altitude": 200.0})
-        rig = low.rig.model_copy(update={"flight": flight})
-        return fly(Scenario(**{**low.__dict__, "rig": rig})).data[:, -3:]
+        rig = low.rig.changed({"flight.altitude_m": 200.0})
+        return fly(replace(low, rig=rig)).data[:, -3:]
 
     one, again, other, double = air(5.0, 1), air(5.0, 1), air(5.0, 2), air(10.0, 1)
     assert np.array_equal(one, again)
@@ -185,12 +185,10 @@ def test_a_centre_of_gravity_further_aft_takes_nose_down_elevator() -> None:
 def test_fuel_is_mass(tmp_path: Path) -> None:
     weight = "inertia/weight-lbs"
     run = scenario(tmp_path, "", rig="737", extra=[weight], duration=0.1)
-    assert run.rig.flight is not None
     found = {}
     for fuel in (0.5, 1.0):
-        flight = run.rig.flight.model_copy(update={"fuel": fuel})
-        rig = run.rig.model_copy(update={"flight": flight})
-        found[fuel] = fly(Scenario(**{**run.__dict__, "rig": rig}))[weight][0]
+        rig = run.rig.changed({"flight.fuel": fuel})
+        found[fuel] = fly(replace(run, rig=rig))[weight][0]
     assert found[1.0] - found[0.5] == pytest.approx(0.5 * (found[1.0] - 83_000.0), rel=1e-3)
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from coupled.flight import loop
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.runfile import read_run
 from coupled.record.channels import record_channels
 from coupled.record.record import manifest_path, read_record, write_record
 
@@ -27,7 +28,7 @@ seed = 3
 """
 
 
-def scenario(folder: Path, pilot: str, duration: float = 4.0, more: str = "") -> Scenario:
+def scenario(folder: Path, pilot: str, duration: float = 4.0, more: str = "") -> Manoeuvre:
     path = folder / "test.toml"
     path.write_text(RUN.format(duration=duration, pilot=pilot) + more, encoding="utf-8")
     return read_run(str(path))[0]

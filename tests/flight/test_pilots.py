@@ -9,6 +9,7 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Track
 from coupled.flight.pilot.crossover import (
     Acting,
@@ -20,7 +21,7 @@ from coupled.flight.pilot.crossover import (
 )
 from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import elevator_response
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 
 RUN = """
@@ -37,7 +38,9 @@ kind = "track"
 _PERIOD_s = 60.0
 
 
-def scenario(folder: Path, pilot: str, rig: str = "report-column", duration: float = 6) -> Scenario:
+def scenario(
+    folder: Path, pilot: str, rig: str = "report-column", duration: float = 6
+) -> Manoeuvre:
     path = folder / "test.toml"
     path.write_text(RUN.format(duration=duration, pilot=pilot, rig=rig), encoding="utf-8")
     return read_run(str(path))[0]
@@ -50,7 +53,7 @@ def measured(record: Record, flown: np.ndarray, pilot: Track) -> tuple[float, fl
     """
     rows = round(_PERIOD_s / record.time_s[1])
     t = record.time_s[-rows:]
-    waves = [wave(rate * t) for rate in pilot.sine_rates for wave in (np.sin, np.cos)]
+    waves = [wave(rate * t) for rate in pilot.sine_rates_rad_per_s for wave in (np.sin, np.cos)]
     basis = np.column_stack((np.ones(rows), t - t.mean(), *waves))
 
     def amplitudes(signal: np.ndarray) -> np.ndarray:
@@ -59,7 +62,7 @@ def measured(record: Record, flown: np.ndarray, pilot: Track) -> tuple[float, fl
 
     y, r = amplitudes(flown), amplitudes(pilot.target(record.time_s))
     loop = y / (r - y)
-    rates = np.log(pilot.sine_rates)
+    rates = np.log(pilot.sine_rates_rad_per_s)
     at = np.interp(0.0, -np.log(np.abs(loop)), rates)
     margin = np.pi + np.interp(at, rates, np.unwrap(np.angle(loop)))
     return float(np.exp(at)), float((margin + np.pi) % (2 * np.pi) - np.pi)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.flight.manoeuvre import CONFIGURATIONS, configure
 from coupled.flight.pilot import edges, read_force_table
-from coupled.flight.scenario import CONFIGURATIONS, configure, read_run
+from coupled.flight.runfile import read_run
 from coupled.resources import shipped_runs
 from tests.support.rigs import K_REPORT, bench
 
@@ -28,8 +29,8 @@ force_N = 30.0
 @pytest.mark.parametrize("name", list(shipped_runs()))
 def test_every_shipped_run_reads_and_has_a_card(name: str) -> None:
     scenarios = read_run(name)
-    assert scenarios[0].run.name == name
-    assert len(scenarios[0].run.card.split()) > 12
+    assert scenarios[0].name == name
+    assert len(scenarios[0].card.split()) > 12
 
 
 @pytest.mark.parametrize(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.flight.conditions import Conditions
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Scenario, read_run
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 
 RUN = """
@@ -28,7 +30,7 @@ force_N = 0.0
 """
 
 
-def scenario(folder: Path, wind: str, rig: str = "report-column") -> Scenario:
+def scenario(folder: Path, wind: str, rig: str = "report-column") -> Manoeuvre:
     path = folder / "windy.toml"
     path.write_text(RUN.format(rig=rig, wind=wind), encoding="utf-8")
     return read_run(str(path))[0]
@@ -54,8 +56,7 @@ def test_a_tail_wind_takes_airspeed_and_an_updraught_gives_angle_of_attack(tmp_p
 
 def test_no_wind_is_no_different_from_a_wind_of_nothing(tmp_path: Path) -> None:
     nothing = scenario(tmp_path, "time_s = [0.0]\nalong_m_per_s = [0.0]\nup_m_per_s = [0.0]")
-    without: dict[str, Any] = {"run": nothing.run.model_copy(update={"wind": None})}
-    plain = Scenario(**(nothing.__dict__ | without))
+    plain = replace(nothing, conditions=Conditions())
     assert np.allclose(fly(nothing).data, fly(plain).data, rtol=1e-9, atol=1e-9)
 
 

@@ -10,7 +10,7 @@ noise of a stage's input is carried through the stage.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
-from coupled.flight.scenario import read_run
+from coupled.flight.runfile import read_run
 from coupled.record.record import Record, read_record
 from coupled.rig.replay import (
     replay_compensation,
@@ -75,9 +75,8 @@ def case(request: pytest.FixtureRequest) -> Case:
         rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
         return Case(rig, read_record(FOUNDERS / "examples" / f"{name}.csv"))
     [scenario] = read_run("sweep")
-    noisy = scenario.rig.model_copy(update={"noise": NOISE})
-    changed = scenario.__class__(**{**scenario.__dict__, "rig": noisy})
-    return Case(noisy, fly(changed))
+    noisy = scenario.rig.changed({"noise": NOISE})
+    return Case(noisy, fly(replace(scenario, rig=noisy)))
 
 
 def white(signal: Floats) -> float:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupled.flight.scenario import configure
+from coupled.flight.manoeuvre import configure
 from coupled.rig import equations, linkage, sensing
 from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.packing import pack

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
-from coupled.flight.scenario import Bench, RunFile, Scenario, configure
 from coupled.record.record import Record
 from coupled.schema import build
 from tests.support.rigs import G_STIFF, K_REPORT, bench
@@ -30,11 +29,9 @@ def run(
     rig = bench(changes).model_copy(update={"frame_rate": frame_rate})
     if configuration:
         rig = configure(rig, configuration)
-    told = Bench(time=[0.0], dynamic_pressure=[q])
-    file = RunFile(name="t", card="t", rig="t", duration=seconds, bench=told, seed=seed)
+    profile = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[q])
     hand = build(PILOTS[pilot["kind"]], pilot, "t", "pilot.column")
-    here = Path(__file__)
-    return fly(Scenario(file, here, rig, here, {"column": hand}, "t"))
+    return fly(Manoeuvre(rig, {"column": hand}, seconds, seed=seed, bench=profile))
 
 
 CLAMP = {"kind": "clamp", "deflection_m": 0.0508}

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Configuration, Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
-from coupled.flight.scenario import Bench, Configuration, RunFile, Scenario, configure
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
@@ -26,11 +25,9 @@ SHARE = K_REPORT * G_STIFF
 def pushed(
     rig: Rig, hand: dict[str, Any], control: ControlName = "column", q: float = 3000.0
 ) -> Record:
-    told = Bench(time=[0.0], dynamic_pressure=[q])
-    file = RunFile(name="t", card="t", rig="t", duration=8.0, bench=told)
+    profile = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[q])
     pilot = build(PILOTS[hand["kind"]], hand, "t", "pilot", unit_of(control))
-    here = Path(__file__)
-    return fly(Scenario(file, here, rig, here, {control: pilot}, "t"))
+    return fly(Manoeuvre(rig, {control: pilot}, 8.0, bench=profile))
 
 
 @pytest.mark.parametrize(

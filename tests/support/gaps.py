@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.loop import fly
-from coupled.flight.pilot import Table
-from coupled.flight.scenario import Bench, RunFile, Scenario, read_run
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
+from coupled.flight.pilot import ForceTable
+from coupled.flight.runfile import read_run
 from coupled.gap.effects import BY_NAME, apply
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.schema import build
 from tests.reference.test_records import NOISE
 from tests.support.rigs import BENCH, bench
 
@@ -58,10 +58,8 @@ def made(
     t, force = pushes(seed)
     rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
     (folder / "force.csv").write_text("time_s,column_force_N\n" + rows)
-    pilot = build(Table, {"kind": "table", "file": "force.csv"}, "t", "pilot.column")
+    pilot = ForceTable(file=str(folder / "force.csv"))
     pressures = [300.0, 300.0, 1200.0, 1200.0, 2000.0, 2000.0, 2900.0]
     times = [0.0, 9.0, 10.0, 19.0, 20.0, 29.0, 30.0]
-    told_q = None if flown else Bench(time=times, dynamic_pressure=pressures)
-    run = RunFile(name="t", card="t", rig="t", duration=LONG_s, seed=seed, bench=told_q)
-    here = folder / "force.csv"
-    return fly(Scenario(run, here, real, here, {"column": pilot}, "t"))
+    profile = None if flown else PressureProfile(time_s=times, dynamic_pressure_Pa=pressures)
+    return fly(Manoeuvre(real, {"column": pilot}, LONG_s, seed=seed, bench=profile))

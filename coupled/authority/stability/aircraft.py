@@ -17,7 +17,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,9 @@ from scipy.optimize import brentq
 from coupled.authority.stability.linear import added_gradient
 from coupled.authority.stability.planes import linear_rig
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.pilot import Step
 from coupled.flight.response import Response, elevator_response
-from coupled.flight.scenario import Scenario, scenarios_from_table
 from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
@@ -107,7 +107,7 @@ def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float
     gradient = specified_gradient(rig.controls["column"].schedule, pressure)
 
     def growth(weight: float) -> float:
-        return flown_growth(hands_off_rig(rig, weight, gradient), file, rate_rad_per_s)
+        return flown_growth(hands_off_rig(rig, weight, gradient), rate_rad_per_s)
 
     low, high = near_N_per_g / _SPAN, near_N_per_g * _SPAN
     if growth(low) >= 0.0 or growth(high) <= 0.0:
@@ -115,13 +115,13 @@ def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float
     return float(brentq(growth, low, high, rtol=1e-3, xtol=1e-3 * near_N_per_g))
 
 
-def flown_growth(rig: Rig, file: Path, rate_rad_per_s: float) -> float:
+def flown_growth(rig: Rig, rate_rad_per_s: float) -> float:
     """Return the growth of a tapped column's motion at a frequency, 1/s, hands off.
 
     Half the difference of a push and a pull leaves what the trim drifts out; of each period
     the size about a straight line is taken.
     """
-    up, down = (fly(_tapped(rig, file, side * _TAP_N)) for side in (1.0, -1.0))
+    up, down = (fly(_tapped(rig, side * _TAP_N)) for side in (1.0, -1.0))
     swing = 0.5 * (up["column_computed_m"] - down["column_computed_m"])
     period = max(4, round(2.0 * math.pi / rate_rad_per_s * rig.frame_rate))
     swing = swing[round(_SETTLED_s * rig.frame_rate) :]
@@ -134,17 +134,9 @@ def flown_growth(rig: Rig, file: Path, rate_rad_per_s: float) -> float:
     return float(np.polyfit(times, size, 1)[0])
 
 
-def _tapped(rig: Rig, file: Path, force: float) -> Scenario:
-    tap = {"kind": "step", "start_s": 0.5, "duration_s": 0.3, "force_N": force}
-    table: dict[str, Any] = {
-        "name": "tapped",
-        "card": "The column is tapped and let go.",
-        "rig": str(file.absolute()),
-        "duration_s": _FLOWN_s,
-        "pilot": {"column": tap},
-    }
-    (made,) = scenarios_from_table(table, file)
-    return Scenario(made.run, file, rig, file, made.pilots, made.label)
+def _tapped(rig: Rig, force: float) -> Manoeuvre:
+    tap = Step(start_s=0.5, duration_s=0.3, force_N=force)
+    return Manoeuvre(rig, {"column": tap}, _FLOWN_s, name="tapped")
 
 
 def _response(rig: Rig, file: Path) -> Callable[[float], Response]:

@@ -36,7 +36,7 @@ _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("y
 
 def print_comparison(console: Console, flights: Sequence[Flight]) -> None:
     """Print a comparison: its card, and a table a case (one in all for a single configuration)."""
-    run = flights[0].scenario.run
+    run = flights[0].manoeuvre
     width = min(92, console.width)
     console.print(Panel(escape(" ".join(run.card.split())), title=escape(run.name), width=width))
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
@@ -53,9 +53,9 @@ def print_comparison(console: Console, flights: Sequence[Flight]) -> None:
 
 
 def _print_table(console: Console, title: str, columns: Sequence[tuple[str, Flight]]) -> None:
-    scenario = columns[0][1].scenario
-    rate, angle = _WORDS[scenario.control]
-    change = scenario.run.measure.attitude_change / DEGREE_rad
+    manoeuvre = columns[0][1].manoeuvre
+    rate, angle = _WORDS[manoeuvre.control]
+    change = manoeuvre.measure.attitude_change / DEGREE_rad
     table = Table(box=None, title=escape(title) or None, title_justify="left", title_style="bold")
     table.add_column("", no_wrap=True)
     for head, _ in columns:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from coupled.flight.pilot.base import STRONGEST, Action, Pilot, edges
-from coupled.record.channels import LONGITUDINAL
+from coupled.flight.pilot.base import STRONGEST, Action, Pilot, Start, edges, needs_aircraft
+from coupled.record.channels import LONGITUDINAL, ControlName
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
@@ -21,32 +20,38 @@ class Attitude(Pilot):
     and pitch rate. Limited to `force_limit_N`.
     """
 
-    kind: Literal["attitude"]
-    change: float = quantity("rad", 0.0, ge=-1.5, le=1.5)
-    rise: float = quantity("s", 1.0, ge=0)
-    gain: float = quantity("N_per_rad", ge=0, le=1e6)
-    rate_gain: float = quantity("N_s_per_rad", 0.0, ge=0, le=1e6)
-    integral_gain: float = quantity("N_per_rad_s", 0.0, ge=0, le=1e6)
-    lag: float = quantity("s", 0.1, ge=0, le=7200)
-    force_limit: float = quantity("N", 330.0, gt=0, le=STRONGEST)
+    kind: Literal["attitude"] = "attitude"
+    change_rad: float = quantity("", 0.0, ge=-1.5, le=1.5)
+    rise_s: float = quantity("", 1.0, ge=0)
+    gain_N_per_rad: float = quantity("", ge=0, le=1e6)
+    rate_gain_N_s_per_rad: float = quantity("", 0.0, ge=0, le=1e6)
+    integral_gain_N_per_rad_s: float = quantity("", 0.0, ge=0, le=1e6)
+    lag_s: float = quantity("", 0.1, ge=0, le=7200)
+    force_limit_N: float = quantity("", 330.0, gt=0, le=STRONGEST)
     _PITCH: ClassVar[int] = LONGITUDINAL.index("pitch_rad")
     _RATE: ClassVar[int] = LONGITUDINAL.index("pitch_rate_rad_per_s")
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def check(self, rig: Rig, control: ControlName, file: object) -> None:
+        """Refuse any but the column of a rig that flies."""
+        super().check(rig, control, file)
+        needs_aircraft(rig, control, file)
+
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the hand, with a memory of its own."""
-        found, integral, last = None, 0.0, self.start
+        found, integral, last = None, 0.0, self.start_s
 
         def look(time: float, motion: tuple[float, ...]) -> float:
             nonlocal found, integral, last
-            if time < self.start:
+            if time < self.start_s:
                 return 0.0
             found = motion[self._PITCH] if found is None else found
-            wanted = self.change * float(edges(np.array([time]), [(self.start, 1.0)], self.rise)[0])
-            error = found + wanted - motion[self._PITCH]
-            force = self.gain * error + integral - self.rate_gain * motion[self._RATE]
-            if abs(force) < self.force_limit:
-                integral += self.integral_gain * error * (time - last)
+            share = edges(np.array([time]), [(self.start_s, 1.0)], self.rise_s)[0]
+            error = found + self.change_rad * float(share) - motion[self._PITCH]
+            damping = self.rate_gain_N_s_per_rad * motion[self._RATE]
+            force = self.gain_N_per_rad * error + integral - damping
+            if abs(force) < self.force_limit_N:
+                integral += self.integral_gain_N_per_rad_s * error * (time - last)
             last = time
-            return min(max(force, -self.force_limit), self.force_limit)
+            return min(max(force, -self.force_limit_N), self.force_limit_N)
 
-        return Action(hand=Hand(lag_s=self.lag), look=look)
+        return Action(hand=Hand(lag_s=self.lag_s), look=look)

@@ -1,20 +1,25 @@
-"""What every pilot is: a section of a run file that says what a hand does on a control."""
+"""What every pilot is: a section of a run file, or an object in Python, that moves one control."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.errors import InputError
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
-from coupled.schema import Section, quantity
+from coupled.schema import Given, file_keys, known_keys, quantity
 
 Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    Values = Sequence[float] | Floats
+else:
+    Values = list[float]  # a section holds what a file would give
 Look = Callable[[float, tuple[float, ...]], float]
 
 
@@ -33,27 +38,54 @@ class Action:
     look: Look | None = None
 
 
+@dataclass(frozen=True)
+class Start:
+    """What a pilot finds at the start of a flight, and what is named in faults.
+
+    `gradient` is the specified one at the q̄ of trim, N/d; `seed` that of the pilot's noise;
+    `file` names the run, `rig_file` the rig.
+    """
+
+    gradient: float
+    seed: int = 0
+    file: object = "manoeuvre"
+    rig_file: object = "rig"
+
+
 STRONGEST = 5000.0  # N; 14 CFR 25.143 asks at most 670 N of a pilot, for a short time
 
 
-class Pilot(Section):
-    """What every pilot has."""
+class Pilot(Given):
+    """What every pilot has.
+
+    `start_s` is when the pilot begins; `reach_m` (`reach_rad` on a wheel) the deflection on
+    either side beyond which the arm cannot follow, 0 for none.
+    """
 
     kind: str
-    start: float = quantity("s", 1.0, ge=0, le=7200)
-    reach: float = quantity("{d}", 0.0, ge=0)
+    start_s: float = quantity("", 1.0, ge=0, le=7200)
+    reach_m: float = quantity("", 0.0, ge=0)
+    reach_rad: float = quantity("", 0.0, ge=0)
+    _BY_UNIT: ClassVar[tuple[str, ...]] = ("reach",)  # keys that end in the control's unit
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
-        """Return what this pilot does on a control.
+    @classmethod
+    def keys_on(cls, control: ControlName) -> dict[str, str]:
+        """Return {key in a run file: field} of this pilot on a control."""
+        wrong = {f"{name}_{'m' if unit_of(control) == 'rad' else 'rad'}" for name in cls._BY_UNIT}
+        return {key: name for key, name in file_keys(cls, "m").items() if key not in wrong}
 
-        `gradient` is the specified one at the start, N/d; `name` the control's; files are
-        sought in `folder`.
-        """
+    def check(self, rig: Rig, control: ControlName, file: object) -> None:
+        """Raise InputError for what cannot be flown on a rig's control; `file` is named."""
+        given = {key: None for key in file_keys(type(self), "m") if key in self.model_fields_set}
+        known_keys(given, self.keys_on(control), file, f"pilot.{control}")
+
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
+        """Return what this pilot does on a rig's control."""
         raise NotImplementedError
 
-    def meet(self, rig: Rig, rig_file: Path, run_file: Path, seed: int) -> Pilot:
-        """Return this pilot as it flies a rig; most need not know it beforehand."""
-        return self
+    def reach(self, control: ControlName) -> float:
+        """Return the reach on a control, d; 0 for none."""
+        return self.reach_rad if unit_of(control) == "rad" else self.reach_m
 
 
 def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> Floats:
@@ -70,3 +102,10 @@ def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> 
         out[end:] += level - before
         before = level
     return out
+
+
+def needs_aircraft(rig: Rig, control: ControlName, file: object) -> None:
+    """Refuse a pilot who looks at the motion, on any but the column of a rig that flies."""
+    if control != "column" or rig.flight is None:
+        problem = "only the column of a rig that flies follows pitch, path or airspeed"
+        raise InputError(file, f"pilot.{control}", problem)

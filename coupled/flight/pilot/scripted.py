@@ -5,99 +5,111 @@ Edges are half cosines over `rise_s`, as a hand's are.
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot, edges
+from coupled.errors import InputError
+from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot, Start, edges
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
 class _Levels(Pilot):
     """A force that goes from level to level."""
 
-    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
-    rise: float = quantity("s", 0.1, ge=0, le=7200)
+    force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
+    rise_s: float = quantity("", 0.1, ge=0, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the (time in s, share of the force) that the signal goes to."""
         raise NotImplementedError
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the scripted force."""
-        return Action(force=lambda t: self.force * edges(t, self.levels(), self.rise))
+        return Action(force=lambda t: self.force_N * edges(t, self.levels(), self.rise_s))
 
 
 class Step(_Levels):
     """A force held for `duration_s`, or to the end where that is 0."""
 
-    kind: Literal["step"]
-    duration: float = quantity("s", 0.0, ge=0, le=7200)
+    kind: Literal["step"] = "step"
+    duration_s: float = quantity("", 0.0, ge=0, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return one level, and its end."""
-        end = [(self.start + self.duration, 0.0)] if self.duration > 0.0 else []
-        return [(self.start, 1.0), *end]
+        end = [(self.start_s + self.duration_s, 0.0)] if self.duration_s > 0.0 else []
+        return [(self.start_s, 1.0), *end]
 
 
 class Ramp(Pilot):
     """A force that grows evenly over `ramp_s`, and is then held."""
 
-    kind: Literal["ramp"]
-    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
-    ramp: float = quantity("s", ge=1e-3, le=7200)
+    kind: Literal["ramp"] = "ramp"
+    force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
+    ramp_s: float = quantity("", ge=1e-3, le=7200)
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the ramp."""
-        return Action(force=lambda t: self.force * np.clip((t - self.start) / self.ramp, 0.0, 1.0))
+
+        def force(t: Floats) -> Floats:
+            return np.asarray(self.force_N * np.clip((t - self.start_s) / self.ramp_s, 0.0, 1.0))
+
+        return Action(force=force)
 
 
 class Doublet(_Levels):
     """A force one way, then as long the other way."""
 
-    kind: Literal["doublet"]
-    half_period: float = quantity("s", ge=1e-3, le=7200)
+    kind: Literal["doublet"] = "doublet"
+    half_period_s: float = quantity("", ge=1e-3, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the two halves."""
-        t, half = self.start, self.half_period
+        t, half = self.start_s, self.half_period_s
         return [(t, 1.0), (t + half, -1.0), (t + 2 * half, 0.0)]
 
 
 class ThreeTwoOneOne(_Levels):
     """The 3-2-1-1 of aircraft identification: alternating pulses of 3, 2, 1 and 1 units."""
 
-    kind: Literal["3211"]
-    unit: float = quantity("s", ge=1e-3, le=7200)
+    kind: Literal["3211"] = "3211"
+    unit_s: float = quantity("", ge=1e-3, le=7200)
 
     def levels(self) -> list[tuple[float, float]]:
         """Return the four pulses."""
-        at = self.start + self.unit * np.array([0, 3, 5, 6, 7])
+        at = self.start_s + self.unit_s * np.array([0, 3, 5, 6, 7])
         return list(zip(at.tolist(), [1.0, -1.0, 1.0, -1.0, 0.0], strict=True))
 
 
-class Sweep(Pilot):
+class FrequencySweep(Pilot):
     """A sine whose frequency goes exponentially from `low_Hz` to `high_Hz`."""
 
-    kind: Literal["sweep"]
-    force: float = quantity("N", ge=-STRONGEST, le=STRONGEST)
-    duration: float = quantity("s", ge=1e-3, le=7200)
-    low: float = quantity("Hz", 0.1, ge=1e-3, le=50)
-    high: float = quantity("Hz", 2.0, ge=1e-3, le=50)
+    kind: Literal["sweep"] = "sweep"
+    force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
+    duration_s: float = quantity("", ge=1e-3, le=7200)
+    low_Hz: float = quantity("", 0.1, ge=1e-3, le=50)
+    high_Hz: float = quantity("", 2.0, ge=1e-3, le=50)
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def check(self, rig: Rig, control: ControlName, file: object) -> None:
+        """Refuse frequencies that the frames cannot show."""
+        super().check(rig, control, file)
+        if max(self.low_Hz, self.high_Hz) > 0.5 * rig.frame_rate:
+            problem = f"is beyond half the frame rate, {0.5 * rig.frame_rate:g} Hz"
+            raise InputError(file, f"pilot.{control}.high_Hz", problem)
+
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the sweep, faded in and out over a tenth of it."""
 
         def force(t: Floats) -> Floats:
-            u = np.clip((t - self.start) / self.duration, 0.0, 1.0)
-            ratio = np.log(self.high / self.low)
+            u = np.clip((t - self.start_s) / self.duration_s, 0.0, 1.0)
+            ratio = np.log(self.high_Hz / self.low_Hz)
             scale = np.expm1(ratio * u) / ratio if ratio != 0.0 else u
-            phase = 2.0 * np.pi * self.low * self.duration * scale
+            phase = 2.0 * np.pi * self.low_Hz * self.duration_s * scale
             fade = np.sin(0.5 * np.pi * np.clip(np.minimum(u, 1.0 - u) / 0.1, 0.0, 1.0)) ** 2
-            return np.asarray(self.force * fade * np.sin(phase))
+            return np.asarray(self.force_N * fade * np.sin(phase))
 
         return Action(force=force)
 
@@ -109,16 +121,34 @@ class Clamp(Pilot):
     deflection dies as exp(−bandwidth·t) on any rig, without a lasting error.
     """
 
-    kind: Literal["clamp"]
-    deflection: float = quantity("{d}")
-    rise: float = quantity("s", 0.5, gt=0)
-    duration: float = quantity("s", 0.0, ge=0, le=7200)
-    bandwidth: float = quantity("rad_per_s", 6.0, gt=0, le=30)
+    kind: Literal["clamp"] = "clamp"
+    deflection_m: float = quantity("", 0.0)
+    deflection_rad: float = quantity("", 0.0)
+    rise_s: float = quantity("", 0.5, gt=0)
+    duration_s: float = quantity("", 0.0, ge=0, le=7200)
+    bandwidth_rad_per_s: float = quantity("", 6.0, gt=0, le=30)
+    _BY_UNIT: ClassVar[tuple[str, ...]] = ("reach", "deflection")
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def deflection(self, control: ControlName) -> float:
+        """Return the deflection held on a control, d."""
+        return self.deflection_rad if unit_of(control) == "rad" else self.deflection_m
+
+    def check(self, rig: Rig, control: ControlName, file: object) -> None:
+        """Refuse a deflection beyond the stops."""
+        super().check(rig, control, file)
+        key = f"deflection_{unit_of(control)}"
+        if key not in self.model_fields_set:
+            raise InputError(file, f"pilot.{control}.{key}", "is missing")
+        held, travel = self.deflection(control), rig.controls[control].travel
+        if abs(held) > travel:
+            problem = f"{held:g} is beyond the control's travel of ±{travel:g}"
+            raise InputError(file, f"pilot.{control}.{key}", problem)
+
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the held deflection, and the clamp's impedance."""
-        end = [(self.start + self.duration, 0.0)] if self.duration > 0.0 else []
-        levels = [(self.start, 1.0), *end]
-        w, loader = self.bandwidth, control.loader
-        hand = Hand(w * loader.damping, w * loader.mass, w * gradient)
-        return Action(held=lambda t: self.deflection * edges(t, levels, self.rise), hand=hand)
+        end = [(self.start_s + self.duration_s, 0.0)] if self.duration_s > 0.0 else []
+        levels = [(self.start_s, 1.0), *end]
+        w, held = self.bandwidth_rad_per_s, self.deflection(control)
+        loader = rig.controls[control].loader
+        hand = Hand(w * loader.damping, w * loader.mass, w * start.gradient)
+        return Action(held=lambda t: held * edges(t, levels, self.rise_s), hand=hand)

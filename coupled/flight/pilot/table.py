@@ -1,34 +1,68 @@
-"""A pilot's force from a table."""
+"""A pilot's force from a table: of a file, or of arrays."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from coupled.errors import InputError, nearest
-from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot
-from coupled.record.channels import TIME, channel
+from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot, Start, Values
+from coupled.record.channels import TIME, ControlName, channel
 from coupled.record.csvfile import read_columns
-from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
-class Table(Pilot):
-    """A force from a CSV with `time_s` and the control's force channel, straight between rows.
+class ForceTable(Pilot):
+    """A force over time, straight between rows, from arrays or from a file.
 
-    `start_s` is added to the table's times; outside of them the force is zero.
+    Arrays: `time_s` and `force_N`, of one length. A file: a CSV with `time_s` and the control's
+    force channel, as `column_force_N`. `start_s` is added to the times; outside of them the
+    force is zero.
     """
 
-    kind: Literal["table"]
-    file: str
-    start: float = quantity("s", 0.0, ge=0, le=7200)
+    kind: Literal["table"] = "table"
+    file: str = ""
+    time_s: Values = quantity("", [])
+    force_N: Values = quantity("", [])
+    start_s: float = quantity("", 0.0, ge=0, le=7200)
 
-    def act(self, control: Control, gradient: float, name: str, folder: Path) -> Action:
+    def beside(self, folder: Path) -> ForceTable:
+        """Return this pilot with its file sought in a folder."""
+        given: dict[str, Any] = {key: getattr(self, key) for key in self.model_fields_set}
+        return ForceTable(**{**given, "file": str(folder / self.file)})
+
+    def check(self, rig: Rig, control: ControlName, file: object) -> None:
+        """Refuse a table that cannot be read, or whose times do not rise."""
+        super().check(rig, control, file)
+        place = f"pilot.{control}"
+        given = self.model_fields_set & {"time_s", "force_N"}
+        if self.file and given:
+            raise InputError(file, f"{place}.file", "is given with time_s and force_N; give either")
+        if self.file:
+            read_force_table(Path(self.file), channel(control, "force"))
+            return
+        if not given:
+            raise InputError(file, place, "needs a file, or time_s and force_N")
+        if len(self.time_s) != len(self.force_N):
+            problem = f"has {len(self.force_N)} values, time_s {len(self.time_s)}; give as many"
+            raise InputError(file, f"{place}.force_N", problem)
+        keys = (f"{place}.time_s", f"{place}.force_N")
+        _check_rows(np.array(self.time_s), np.array(self.force_N), file, keys, 0)
+
+    def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the table's force."""
-        times, forces = read_force_table(folder / self.file, channel(name, "force"))
-        return Action(force=lambda t: np.interp(t - self.start, times, forces, left=0.0, right=0.0))
+        times, forces = np.array(self.time_s), np.array(self.force_N)
+        if self.file:
+            times, forces = read_force_table(Path(self.file), channel(control, "force"))
+
+        def force(t: Floats) -> Floats:
+            found = np.interp(t - self.start_s, times, forces, left=0.0, right=0.0)
+            return np.asarray(found)
+
+        return Action(force=force)
 
 
 def read_force_table(path: Path, wanted: str) -> tuple[Floats, Floats]:
@@ -38,18 +72,26 @@ def read_force_table(path: Path, wanted: str) -> tuple[Floats, Floats]:
         if name not in columns:
             raise InputError(path, name, f"no such column; {nearest(name, columns)}")
     times, forces = columns[TIME], columns[wanted]
-    if np.max(np.abs(forces), initial=0.0) > STRONGEST:
-        raise InputError(path, wanted, f"holds more than {STRONGEST:g} N, which no pilot can")
-    if len(times) < 2:
-        raise InputError(path, TIME, "needs at least two rows")
-    disorder = np.flatnonzero(np.diff(times) <= 0.0)
-    if disorder.size:
-        raise InputError(path, TIME, f"must rise: row {disorder[0] + 3} does not")
-    _refuse_gaps(times, path)
+    _check_rows(times, forces, path, (TIME, wanted), 2)  # of a file the second line is row 2
     return times, forces
 
 
-def _refuse_gaps(times: Floats, path: Path) -> None:
+def _check_rows(
+    times: Floats, forces: Floats, file: object, keys: tuple[str, str], first: int
+) -> None:
+    """Refuse times that do not rise, a force that no pilot has, missing rows; `first` is a row."""
+    time_key, force_key = keys
+    if np.max(np.abs(forces), initial=0.0) > STRONGEST:
+        raise InputError(file, force_key, f"holds more than {STRONGEST:g} N, which no pilot can")
+    if len(times) < 2:
+        raise InputError(file, time_key, "needs at least two rows")
+    disorder = np.flatnonzero(np.diff(times) <= 0.0)
+    if disorder.size:
+        raise InputError(file, time_key, f"must rise: row {disorder[0] + 1 + first} does not")
+    _refuse_gaps(times, file, time_key, first)
+
+
+def _refuse_gaps(times: Floats, file: object, key: str, first: int) -> None:
     """Refuse a sampled table with missing rows; a few typed breakpoints may lie as they like."""
     steps = np.diff(times)
     usual = float(np.median(steps))
@@ -58,8 +100,5 @@ def _refuse_gaps(times: Floats, path: Path) -> None:
     wide = np.flatnonzero(steps > 1.5 * usual)
     if wide.size:
         row = wide[0]
-        raise InputError(
-            path,
-            TIME,
-            f"gap of {steps[row]:g} s after row {row + 2} in a table of {usual:g} s steps; fill it",
-        )
+        problem = f"gap of {steps[row]:g} s after row {row + first} in a table of {usual:g} s steps"
+        raise InputError(file, key, f"{problem}; fill it")

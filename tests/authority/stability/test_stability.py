@@ -22,7 +22,8 @@ from coupled.authority.stability.planes import crossings, linear_rig, plane, pos
 from coupled.cli import app
 from coupled.errors import InputError
 from coupled.flight.loop import fly
-from coupled.flight.scenario import Scenario, scenarios_from_table
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.runfile import manoeuvres_from_table
 from coupled.resources import shipped_rigs
 from coupled.rig.growth import growth as simulated
 from coupled.rig.packing import Hand
@@ -192,7 +193,7 @@ def test_the_frame_loop_flies_the_growth_that_the_map_shows() -> None:
     assert sides[0] < 0.0 < sides[1]
 
 
-def let_go(rig: Rig) -> Scenario:
+def let_go(rig: Rig) -> Manoeuvre:
     """Return a run of a bench rig, tapped and let go, at one gradient."""
     table = {
         "name": "let-go",
@@ -202,7 +203,7 @@ def let_go(rig: Rig) -> Scenario:
         "bench": {"time_s": [0.0], "dynamic_pressure_Pa": [0.0]},
         "pilot": {"column": {"kind": "step", "start_s": 0.2, "force_N": 1e-6, "duration_s": 0.3}},
     }
-    (made,) = scenarios_from_table(table, Path("let-go.toml"))
+    (made,) = manoeuvres_from_table(table, Path("let-go.toml"))
     return replace(made, rig=rig)
 
 

@@ -1,0 +1,208 @@
+"""A manoeuvre: a rig, a pilot on some of its controls, and for how long. It needs no file.
+
+It is checked when it is made, as a run file is and with the same errors; what a fault names
+is the run's file where there is one, or else the manoeuvre's name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
+
+from coupled.errors import InputError, nearest
+from coupled.flight.conditions import Conditions
+from coupled.flight.expectation import Expect
+from coupled.flight.pilot import Pilot
+from coupled.flight.pilot.base import Values
+from coupled.record.channels import ControlName, record_channels, unit_of
+from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.rig import Rig
+from coupled.schema import Given, Section, build, quantity
+
+Configuration = Literal["rigid", "uncompensated", "deflection only", "gradient only", "compensated"]
+CONFIGURATIONS: tuple[Configuration, ...] = (
+    "rigid",
+    "uncompensated",
+    "deflection only",
+    "gradient only",
+    "compensated",
+)
+
+
+class PressureProfile(Given):
+    """The dynamic pressure of a bench over time, straight between points and held at the ends.
+
+    On a rig without aircraft; `time_s` must rise, `dynamic_pressure_Pa` has as many values.
+    """
+
+    time_s: Values = quantity("", min_length=1)
+    dynamic_pressure_Pa: Values = quantity("", min_length=1)
+
+    def check(self, file: object) -> None:
+        """Raise InputError for a profile that is none; `file` is named."""
+        if len(self.time_s) != len(self.dynamic_pressure_Pa):
+            raise InputError(file, "bench.dynamic_pressure_Pa", "needs as many values as time_s")
+        if any(b <= a for a, b in pairwise(self.time_s)):
+            raise InputError(file, "bench.time_s", "must rise from value to value")
+        if min(self.dynamic_pressure_Pa) < 0.0:
+            raise InputError(file, "bench.dynamic_pressure_Pa", "cannot be negative")
+
+
+class Measure(Section):
+    """What a comparison looks at: the control, the change of attitude that is timed, a channel."""
+
+    control: ControlName | None = None
+    attitude_change: float = quantity("rad", 0.1, gt=0)
+    drawn: str | None = None
+
+
+class Flown(Section):
+    """The keys of a run file that any manoeuvre has."""
+
+    name: str = quantity("", pattern=PLAIN_NAME)
+    duration: float = quantity("s", gt=0, le=7200)
+    seed: int = quantity("", 0, ge=0)
+    record_properties: list[str] = []
+
+
+@dataclass(frozen=True)
+class Source:
+    """The files that a manoeuvre was read from, and what its case changes of the rig."""
+
+    run_file: Path
+    rig_file: Path
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What is flown: a rig, and a pilot on some of its controls, for `duration_s` seconds.
+
+    rig                 as `Rig.changed` and `configured` make it
+    pilots              {control: pilot}, as {"column": Step(force_N=50)}; at least one
+    duration_s          up to 7200 s
+    seed                of noise, turbulence, gusts and a pilot's remnant
+    conditions          wind, gust, turbulence and events; only with an aircraft
+    bench               q̄ over time; only, and always, on a rig without aircraft
+    record_properties   JSBSim properties that become channels of the record
+    configurations      those that a comparison flies, of the five
+    measure             what a comparison looks at
+    expect              what a check holds the flights against
+    name, label         of the run, and of its case
+    card                what the run shows, for people
+    source              the files that it was read from, if any
+
+    Raises InputError as a run file does: `KEY` is that of a run file.
+    """
+
+    rig: Rig
+    pilots: Mapping[ControlName, Pilot]
+    duration_s: float
+    seed: int = 0
+    conditions: Conditions = field(default_factory=Conditions)
+    bench: PressureProfile | None = None
+    record_properties: tuple[str, ...] = ()
+    configurations: tuple[Configuration, ...] = CONFIGURATIONS
+    measure: Measure = field(default_factory=Measure)
+    expect: tuple[Expect, ...] = ()
+    name: str = "manoeuvre"
+    label: str = ""
+    card: str = ""
+    source: Source | None = None
+
+    def __post_init__(self) -> None:
+        if not self.label:
+            object.__setattr__(self, "label", self.name)
+        scalars = {"name": self.name, "duration_s": self.duration_s, "seed": self.seed}
+        build(Flown, scalars, self.file, "")
+        self._check_kind()
+        self._check_pilots()
+        self._check_measure()
+
+    @property
+    def file(self) -> object:
+        """What a fault of the run names: its file, or else its name."""
+        return self.source.run_file if self.source is not None else self.name
+
+    @property
+    def rig_file(self) -> object:
+        """What a fault of the rig names: its file, or else its name."""
+        return self.source.rig_file if self.source is not None else self.rig.name
+
+    @property
+    def _rig_name(self) -> str:
+        return self.source.rig_file.name if self.source is not None else self.rig.name
+
+    @property
+    def frames(self) -> int:
+        """Rows of the record."""
+        return max(1, round(self.duration_s * self.rig.frame_rate))
+
+    @property
+    def control(self) -> ControlName:
+        """The control that a comparison looks at."""
+        named = self.measure.control
+        return next(iter(self.pilots)) if named is None else named
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of the record."""
+        own = record_channels(list(self.rig.controls), self.rig.flight is not None)
+        return (*own, *self.record_properties)
+
+    def configured(self, configuration: Configuration) -> Manoeuvre:
+        """Return this manoeuvre with the rig in one of the five configurations."""
+        return replace(self, rig=configure(self.rig, configuration))
+
+    def _check_kind(self) -> None:
+        """Refuse what only a bench has with an aircraft, and the reverse."""
+        rig, file, bench = self._rig_name, self.file, self.bench
+        if self.rig.flight is not None:
+            if bench is not None:
+                raise InputError(file, "bench", f"{rig} has an aircraft, which gives q̄ itself")
+            return
+        if bench is None:
+            raise InputError(file, "bench", f"is missing: {rig} has no aircraft, so say q̄")
+        if self.record_properties:
+            raise InputError(file, "record_properties", f"{rig} has no aircraft to ask")
+        if self.conditions.given:
+            raise InputError(file, self.conditions.given[0], f"{rig} has no aircraft for it")
+        bench.check(file)
+
+    def _check_pilots(self) -> None:
+        if not self.pilots:
+            controls = ", ".join(self.rig.controls)
+            raise InputError(self.file, "pilot", f"needs at least one of {controls}")
+        for control, pilot in self.pilots.items():
+            if control not in self.rig.controls:
+                problem = f"the rig has no {control}; {nearest(control, self.rig.controls)}"
+                raise InputError(self.file, f"pilot.{control}", problem)
+            pilot.check(self.rig, control, self.file)
+
+    def _check_measure(self) -> None:
+        control, drawn = self.measure.control, self.measure.drawn
+        if control is not None and control not in self.rig.controls:
+            problem = f"{self._rig_name} has no {control}"
+            raise InputError(self.file, "measure.control", problem)
+        if drawn is not None and drawn not in self.channels:
+            problem = f"no {drawn!r}; {nearest(drawn, self.channels)}"
+            raise InputError(self.file, "measure.drawn", problem)
+
+
+def configure(rig: Rig, configuration: Configuration) -> Rig:
+    """Return the rig with its structure rigid, or bending with the named corrections on.
+
+    Rigid: K = 0 and the host's K̂ = 0. Otherwise the rig's own K and K̂.
+    """
+    changes: dict[str, Any] = {}
+    for name in rig.controls:
+        loader, host = f"controls.{name}.loader", f"controls.{name}.compensation"
+        if configuration == "rigid":
+            d = unit_of(name)
+            changes |= {f"{loader}.bend_{d}_per_N": 0.0, f"{host}.bend_{d}_per_N": 0.0}
+        changes[f"{host}.deflection"] = configuration in ("deflection only", "compensated")
+        changes[f"{host}.gradient"] = configuration in ("gradient only", "compensated")
+    return rig.changed(changes)
