@@ -30,7 +30,7 @@ from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
 from coupled.calibration.readings import Readings, readings_of
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
-from coupled.rig.told import nodes_of, run_told, smooth, under_supply
+from coupled.rig.standalone import nodes_of, run_control, smooth, under_supply
 
 Floats = NDArray[np.float64]
 PULL_s = 0.3  # the hand goes to its next force so quickly
@@ -134,7 +134,7 @@ def _hold(
         held = held * (1.0 + bench.instruments.hand * _wander(frames, rate, rng))
     ends = np.append(np.arange(frames), frames) / rate
     nodes = np.interp(nodes_of(rig, frames), ends, np.append(held, held[-1]))
-    told = run_told(rig, bench.control, nodes, np.repeat(pressures, each))
+    told = run_control(rig, bench.control, nodes, np.repeat(pressures, each))
     first = np.arange(len(forces)) * each + math.ceil((2.0 * pull_s + settle) * rate)
     looks = [first + round(i * GLANCE_s * rate) for i in range(6)]
     seen = (told.deflection, told.force, told.computed, told.force, told.force, told.deflection)

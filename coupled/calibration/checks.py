@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from coupled.calibration.sweeps import Release
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
-from coupled.rig.told import Told
+from coupled.rig.standalone import History
 from coupled.units import POUND_N, DEGREE_rad
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ class Check:
         return {**self.__dict__, "margin": self.margin, "passed": self.passed}
 
 
-def legs(told: Told) -> list[tuple[Floats, Floats, Floats]]:
+def legs(told: History) -> list[tuple[Floats, Floats, Floats]]:
     """Return (δ, F, surface) of a sweep's four legs, each with δ rising in size."""
     turn = [0, int(np.argmax(told.deflection)), int(np.argmin(told.deflection)), len(told.force)]
     neutral = turn[1] + int(np.argmax(told.deflection[turn[1] :] <= 0.0))
@@ -99,7 +99,7 @@ def band(control: ControlName, force: Floats) -> Floats:
 
 
 def judged(
-    control: ControlName, travel: float, felt: Told, specified: Told
+    control: ControlName, travel: float, felt: History, specified: History
 ) -> list[tuple[Floats, Floats, Floats]]:
     """Return (δ, F felt, F specified) along each leg, at the same δ in d, where it is judged."""
     found = []
@@ -123,7 +123,11 @@ def breakout(deflection: Floats, force: Floats, travel: float, straight: float) 
 
 
 def static_checks(
-    rig: Rig, control: ControlName, pressure_Pa: float, felt: Told, specified: Told
+    rig: Rig,
+    control: ControlName,
+    pressure_Pa: float,
+    felt: History,
+    specified: History,
 ) -> list[Check]:
     """Return breakout both ways, and the force where it is nearest to its limit on each leg."""
     found = []
@@ -145,7 +149,11 @@ def static_checks(
 
 
 def surface_checks(
-    control: ControlName, travel: float, surface_rad: float, pressure_Pa: float, felt: Told
+    control: ControlName,
+    travel: float,
+    surface_rad: float,
+    pressure_Pa: float,
+    felt: History,
 ) -> list[Check]:
     """Return the surface's position where it is farthest off the deflection's, both ways.
 

@@ -13,7 +13,7 @@ from coupled.flight.manoeuvre import configure
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import aircraft_folder
 from coupled.rig.rig import Rig
-from coupled.rig.told import Told
+from coupled.rig.standalone import History
 
 Progress = Callable[[str, int, int], None]
 SIDES = {"positive": 1.0, "negative": -1.0}
@@ -27,10 +27,10 @@ class Condition:
     """
 
     pressure_Pa: float
-    specified: Told
-    uncompensated: Told
-    compensated: Told
-    felt: Told
+    specified: History
+    uncompensated: History
+    compensated: History
+    felt: History
     let_go: dict[str, tuple[Release, Release]]
 
 

@@ -17,8 +17,8 @@ from coupled.calibration.plan import gradient_sets
 from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
+from coupled.rig.standalone import History, nodes_of, run_control
 from coupled.rig.statics import static_line, static_point
-from coupled.rig.told import Told, nodes_of, run_told
 
 Floats = NDArray[np.float64]
 SWEEP_s = 100.0
@@ -47,7 +47,7 @@ def feel_pressures(rig: Rig, control: ControlName) -> list[float]:
         return [float(rig.controls[control].schedule.dynamic_pressure[0])]
 
 
-def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> Told:
+def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     """Return a slow sweep to both stops at a dynamic pressure."""
     data = rig.controls[control]
     frames = round(SWEEP_s * rig.frame_rate)
@@ -66,7 +66,7 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> Told:
     side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
     force = force + side * max(data.loader.friction, data.loader.breakaway)
     nodes = np.interp(nodes_of(rig, frames), ends, force)
-    return run_told(rig, control, nodes, np.full(frames, pressure_Pa))
+    return run_control(rig, control, nodes, np.full(frames, pressure_Pa))
 
 
 def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> Release:
@@ -86,7 +86,7 @@ def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> 
     nodes[:held_nodes] = force * pull[:held_nodes]
     friction = max(rig.controls[control].loader.friction, rig.controls[control].loader.breakaway)
     nodes[:held_nodes] += side * friction * pull[:held_nodes]
-    told = run_told(rig, control, nodes, np.full(frames, pressure_Pa))
+    told = run_control(rig, control, nodes, np.full(frames, pressure_Pa))
     start = float(told.deflection[last])
     time_s = told.time_s[last:] - told.time_s[last]
     return Release(time_s, told.deflection[last:], start)

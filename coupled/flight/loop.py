@@ -32,7 +32,7 @@ from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
 from coupled.rig.equations import specified_gradient
-from coupled.rig.frame import step_frame_there, whereabouts
+from coupled.rig.frame import addresses, step_frame_at
 from coupled.rig.packing import pack
 
 Progress = Callable[[int, int], None]
@@ -65,9 +65,9 @@ def fly(
     extra: list[tuple[float, ...]] = []
 
     read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
-    arrays = whereabouts(controls, script, data)
+    arrays = addresses(controls, script, data)
     place = int(arrays.ctypes.data)
-    rig_frame = bound(step_frame_there, place, 0, read(), 1.0)
+    rig_frame = bound(step_frame_at, place, 0, read(), 1.0)
     flown, asked = rig.flight is not None, bool(properties)
     ended: dict[str, Any] | None = None
     done = 0

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from coupled.rig import equations
 from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration
 
 true_deflection = stage(equations.true_deflection)
 
@@ -19,7 +20,10 @@ class CompensationParameters(Protocol):
     bend: float  # K̂, d/N; 0 where the deflection correction is off
 
 
-COMPENSATION_PARAMETERS = layout(CompensationParameters)
+COMPENSATION = Declaration(
+    layout(CompensationParameters),
+    derived={"bend": lambda g: g.control.compensation.bend * g.control.compensation.deflection},
+)
 
 
 @stage

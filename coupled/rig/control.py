@@ -1,8 +1,13 @@
-"""One control of the rig as the kernels hold it: the stages' layouts side by side."""
+"""One control of the rig as the kernels hold it: its stages, listed once.
+
+`ControlParameters` is that list, in the order of the signal chain: each stage's parameters, and
+the declaration that says how they are laid out and from what they are made. `ControlState` says
+to the type checker what the kernels see of those that have a state.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Annotated, Protocol, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +24,7 @@ from coupled.rig import (
     surface,
 )
 from coupled.rig.compiled import layout
+from coupled.rig.declaration import Declaration
 
 
 class Clock(Protocol):
@@ -28,20 +34,25 @@ class Clock(Protocol):
     substep: float  # s
 
 
+CLOCK = Declaration(
+    layout(Clock),
+    derived={"substeps": lambda g: g.substeps, "substep": lambda g: g.substep_s},
+)
+
+
 class ControlParameters(Protocol):
-    """Parameters of every stage, in the order of the signal chain."""
+    """Parameters of every stage, and its declaration, in the order of the signal chain."""
 
-    clock: Clock
-
-    hand: hand.HandParameters
-    schedule: schedule.ScheduleParameters
-    modification: modification.ModificationParameters
-    loader: loader.LoaderParameters
-    friction: friction.FrictionParameters
-    linkage: linkage.LinkageParameters
-    sensing: sensing.SensingParameters
-    compensation: compensation.CompensationParameters
-    surface: surface.SurfaceParameters
+    clock: Annotated[Clock, CLOCK]
+    hand: Annotated[hand.HandParameters, hand.HAND]
+    schedule: Annotated[schedule.ScheduleParameters, schedule.SCHEDULE]
+    modification: Annotated[modification.ModificationParameters, modification.MODIFICATION]
+    loader: Annotated[loader.LoaderParameters, loader.LOADER]
+    friction: Annotated[friction.FrictionParameters, friction.FRICTION]
+    linkage: Annotated[linkage.LinkageParameters, linkage.LINKAGE]
+    sensing: Annotated[sensing.SensingParameters, sensing.SENSING]
+    compensation: Annotated[compensation.CompensationParameters, compensation.COMPENSATION]
+    surface: Annotated[surface.SurfaceParameters, surface.SURFACE]
 
 
 class ControlState(Protocol):
@@ -62,31 +73,12 @@ class Control(Protocol):
     state: ControlState
 
 
-CONTROL_PARAMETERS = np.dtype(
-    [
-        ("clock", layout(Clock)),
-        ("hand", hand.HAND_PARAMETERS),
-        ("schedule", schedule.SCHEDULE_PARAMETERS),
-        ("modification", modification.MODIFICATION_PARAMETERS),
-        ("loader", loader.LOADER_PARAMETERS),
-        ("friction", friction.FRICTION_PARAMETERS),
-        ("linkage", linkage.LINKAGE_PARAMETERS),
-        ("sensing", sensing.SENSING_PARAMETERS),
-        ("compensation", compensation.COMPENSATION_PARAMETERS),
-        ("surface", surface.SURFACE_PARAMETERS),
-    ]
-)
-CONTROL_STATE = np.dtype(
-    [
-        ("hand", hand.HAND_STATE),
-        ("schedule", schedule.SCHEDULE_STATE),
-        ("modification", modification.MODIFICATION_STATE),
-        ("loader", loader.LOADER_STATE),
-        ("linkage", linkage.LINKAGE_STATE),
-        ("surface", surface.SURFACE_STATE),
-    ]
-)
-
+STAGES: dict[str, Declaration] = {
+    name: next(found for found in kind.__metadata__ if isinstance(found, Declaration))
+    for name, kind in get_type_hints(ControlParameters, include_extras=True).items()
+}
+CONTROL_PARAMETERS = np.dtype([(name, one.parameters) for name, one in STAGES.items()])
+CONTROL_STATE = np.dtype([(n, one.state) for n, one in STAGES.items() if one.state is not None])
 CONTROL = np.dtype([("parameters", CONTROL_PARAMETERS), ("state", CONTROL_STATE)])
 
 # An array of that layout, one element a control; a kernel sees an element as a `Control`.

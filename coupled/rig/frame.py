@@ -15,7 +15,7 @@ from coupled.rig.control import CONTROL, ControlArray, ControlParameters, Contro
 from coupled.rig.hand import grip_force, move_muscle, only_scripted
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
-from coupled.rig.modification import modifying_force, set_gradients
+from coupled.rig.modification import ModificationState, modifying_force, set_gradients
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
 from coupled.rig.surface import command_surface
@@ -24,6 +24,25 @@ Floats = NDArray[np.float64]
 
 # What the kernel records of each control, in this order; `record` names the channels.
 CHANNELS_PER_CONTROL = 9
+
+
+@stage
+def set_product(
+    p: ControlParameters, m: ModificationState, computed: float, computed_read: float
+) -> float:
+    """Set F_mod for the frame, through the host's converter, and return it at t_k in N.
+
+    A digital host sends the product of δc as it reads it, to be held; a hybrid one sends ΔG,
+    and the multiplier takes δc as it is (figure 5).
+    """
+    if p.modification.digital:
+        product = modifying_force(m, computed_read)
+        m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
+        return m.held
+    step, full = p.sensing.gradient_step, p.sensing.gradient_range
+    m.first = converted(m.first, step, full)
+    m.second = converted(m.second, step, full)
+    return modifying_force(m, computed)
 
 
 @stage
@@ -49,22 +68,14 @@ def host_frame(
     computed_read = read_computed(p.sensing, computed, out[1])
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
     set_gradients(p.modification, m, first, second)
-    if p.modification.digital:
-        product = modifying_force(m, computed_read)
-        m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
-        product = m.held
-    else:
-        step, full = p.sensing.gradient_step, p.sensing.gradient_range
-        m.first = converted(m.first, step, full)
-        m.second = converted(m.second, step, full)
-        product = modifying_force(m, computed)
-    believed = estimate(p.compensation, computed_read, force_read)
-    command = command_surface(p.surface, s.surface, believed, pressure)
+    product = set_product(p, m, computed, computed_read)
+    estimated = estimate(p.compensation, computed_read, force_read)
+    command = command_surface(p.surface, s.surface, estimated, pressure)
 
     out[0] = force_read
     out[1] = computed_read
     out[2] += transducer(p.linkage, deflection(p.linkage, s.linkage, force))
-    out[3] = believed
+    out[3] = estimated
     out[4] = first
     out[5] += product
     out[6] = product - ended
@@ -150,8 +161,8 @@ def step_frame(
     return first_command, second_command, third_command
 
 
-def whereabouts(controls: ControlArray, script: Floats, record: Floats) -> NDArray[np.int64]:
-    """Return where the arrays of `step_frame` lie, for `step_frame_there`; keep all four alive."""
+def addresses(controls: ControlArray, script: Floats, record: Floats) -> NDArray[np.int64]:
+    """Return addresses and sizes of `step_frame`'s arrays for `step_frame_at`; keep all alive."""
     assert all(array.flags.c_contiguous for array in (controls, script, record))
     return np.array(
         [
@@ -163,10 +174,10 @@ def whereabouts(controls: ControlArray, script: Floats, record: Floats) -> NDArr
 
 
 @entry
-def step_frame_there(
+def step_frame_at(
     address: int, k: int, motion: tuple[float, ...], load_factor: float
 ) -> tuple[float, float, float]:
-    """Run `step_frame` on the arrays whose whereabouts lie at an address.
+    """Run `step_frame` on the arrays whose addresses stand at `address`.
 
     To hand over three arrays at every frame costs as much as half of the physics.
     """

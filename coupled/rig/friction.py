@@ -13,6 +13,7 @@ import math
 from typing import Protocol
 
 from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration
 
 
 class FrictionParameters(Protocol):
@@ -23,7 +24,14 @@ class FrictionParameters(Protocol):
     stribeck_rate: float  # v_s, d/s
 
 
-FRICTION_PARAMETERS = layout(FrictionParameters)
+FRICTION = Declaration(
+    layout(FrictionParameters),
+    section="control.loader",
+    derived={
+        "running": lambda g: g.control.loader.friction,
+        "breakaway": lambda g: max(g.control.loader.friction, g.control.loader.breakaway),
+    },
+)
 
 
 @stage

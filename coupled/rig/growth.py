@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import entry, stage
-from coupled.rig.control import ControlArray, ControlState
+from coupled.rig.control import CONTROL, STAGES, ControlArray, ControlState
 from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame
 from coupled.rig.hand import grip_force
 from coupled.rig.loader import start_delay
@@ -37,7 +37,13 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
     stiffness = control.loader.basic_gradient + max(control.schedule.total_gradient)
     packed = pack(rig, {name: hand})
     logs = np.empty(frames)
-    _grow(packed, math.sqrt(stiffness / control.loader.mass), logs)
+    _grow(
+        packed,
+        packed.view(np.float64),
+        _growing(),
+        math.sqrt(stiffness / control.loader.mass),
+        logs,
+    )
     late = logs[frames // 2 :]
     if not np.all(np.isfinite(late)):
         return math.inf
@@ -55,23 +61,25 @@ def _size(s: ControlState, rate: float) -> float:
     return math.sqrt(moved + rate * rate * away)
 
 
-@stage
-def _scale(s: ControlState, factor: float) -> None:
-    """Make the whole state so much larger."""
-    s.loader.computed *= factor
-    s.loader.rate *= factor
-    s.loader.delayed *= factor
-    s.loader.history *= factor
-    s.linkage.position *= factor
-    s.linkage.rate *= factor
-    s.linkage.grip *= factor
-    s.hand.force *= factor
-    s.hand.integral *= factor
+def _growing() -> NDArray[np.bool_]:
+    """Return which of a control's numbers, eight bytes each, grow with its motion."""
+    marks = np.zeros(1, CONTROL)
+    for name, declared in STAGES.items():
+        state = declared.state or np.dtype([])
+        for field in set(state.names or ()) - set(declared.fixed):
+            if state[field].base == np.float64:
+                marks["state"][name][field] = 1.0
+    return np.asarray(marks.view(np.int64) != 0)
 
 
 @entry
-def _grow(controls: ControlArray, rate: float, logs: Floats) -> None:
-    """Run a control from a deflection with some speed; write its size's logarithm each frame."""
+def _grow(
+    controls: ControlArray, numbers: Floats, growing: NDArray[np.bool_], rate: float, logs: Floats
+) -> None:
+    """Run a control from a deflection with some speed; write its size's logarithm each frame.
+
+    `numbers` are the control's own, the same memory.
+    """
     p, s = controls[0].parameters, controls[0].state
     still = np.zeros(p.clock.substeps + 1)
     out = np.zeros(CHANNELS_PER_CONTROL)
@@ -88,4 +96,6 @@ def _grow(controls: ControlArray, rate: float, logs: Floats) -> None:
         logs[k] = grown + math.log(size) if size > 0.0 else -math.inf
         if size > _LARGEST or 0.0 < size < _SMALLEST:
             grown += math.log(size)
-            _scale(s, 1.0 / size)
+            for i in range(len(numbers)):
+                if growing[i]:
+                    numbers[i] /= size

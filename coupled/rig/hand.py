@@ -33,6 +33,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.declaration import Declaration, first_order_gain
 from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
 
 
@@ -65,8 +66,22 @@ class HandState(Protocol):
     straight: float  # the side on which the reach is the limit, or 0
 
 
-HAND_PARAMETERS = layout(HandParameters)
-HAND_STATE = layout(HandState)
+REACH_BANDWIDTH = 6.0  # rad/s, with which a hand comes to the end of its reach, as a clamp's
+
+HAND = Declaration(
+    layout(HandParameters),
+    section="hand",
+    derived={
+        "lag_gain": lambda g: first_order_gain(g.hand.lag_s, g.substep_s),
+        "endurance": lambda g: g.hand.endurance_s,
+        "reach_stiffness": lambda g: REACH_BANDWIDTH * g.control.loader.damping,
+        "reach_damping": lambda g: REACH_BANDWIDTH * g.control.loader.mass,
+        "reach_gradient": lambda g: g.hand.gradient,
+        "reach_bandwidth": lambda g: REACH_BANDWIDTH,
+    },
+    state=layout(HandState),
+    fixed=("effort", "straight"),
+)
 
 
 @stage

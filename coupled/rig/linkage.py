@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import cmath
 import math
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.declaration import Declaration, Given
 
 SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
 
@@ -43,10 +45,6 @@ class LinkageState(Protocol):
     grip: float  # behind the play, before the bend, d
 
 
-LINKAGE_PARAMETERS = layout(LinkageParameters, position=(4,), speed=(4,))
-LINKAGE_STATE = layout(LinkageState)
-
-
 def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDArray[np.float64]:
     """Return the servo's exact one-substep map, shape (2, 4).
 
@@ -67,6 +65,28 @@ def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDA
     level = np.array([1.0, 0.0]) - free[:, 0]
     ramp = np.array([h - lag, 1.0]) - free @ np.array([-lag, 1.0])
     return np.column_stack((free, level - ramp / h, ramp / h))
+
+
+def _servo(g: Given) -> NDArray[np.float64]:
+    loader = g.control.loader
+    omega = 2.0 * math.pi * loader.servo_frequency
+    return _weights(omega, loader.servo_damping_ratio, g.substep_s)
+
+
+_weights = lru_cache(maxsize=64)(servo_weights)
+
+
+LINKAGE = Declaration(
+    layout(LinkageParameters, position=(4,), speed=(4,)),
+    section="control.loader",
+    derived={
+        "position": lambda g: _servo(g)[0],
+        "speed": lambda g: _servo(g)[1],
+        "rate_limit": lambda g: g.control.loader.servo_rate_limit,
+        "arc_length": lambda g: g.control.length if g.control.loader.arc_geometry else 0.0,
+    },
+    state=layout(LinkageState),
+)
 
 
 @stage

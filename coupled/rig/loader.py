@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.declaration import Declaration
 from coupled.rig.friction import FrictionParameters, running_friction
 from coupled.rig.modification import ModificationState, slope, smooth_force
 from coupled.rig.parameters import DELAY_SLOTS
@@ -59,8 +60,17 @@ class LoaderState(Protocol):
     history: NDArray[np.float64]  # the pilot's force at past nodes, N
 
 
-LOADER_PARAMETERS = layout(LoaderParameters)
-LOADER_STATE = layout(LoaderState, history=(DELAY_SLOTS,))
+LOADER = Declaration(
+    layout(LoaderParameters),
+    section="control.loader",
+    derived={
+        "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
+        "travel": lambda g: g.control.travel,
+        "digital": lambda g: g.control.loader.multiplier == "digital",
+    },
+    state=layout(LoaderState, history=(DELAY_SLOTS,)),
+    fixed=("external",),
+)
 
 
 @stage

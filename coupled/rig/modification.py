@@ -32,6 +32,7 @@ from typing import Protocol
 
 from coupled.rig import equations
 from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration
 
 computed_deflection = stage(equations.computed_deflection)  # eq. (1)
 total_to_computed = stage(equations.total_to_computed)  # eq. (12), without its − G_B
@@ -60,8 +61,21 @@ class ModificationState(Protocol):
     held: float  # the digital product, N
 
 
-MODIFICATION_PARAMETERS = layout(ModificationParameters)
-MODIFICATION_STATE = layout(ModificationState)
+MODIFICATION = Declaration(
+    layout(ModificationParameters),
+    section="control.compensation",
+    derived={
+        "basic_gradient": lambda g: g.control.assumed_basic_gradient,
+        "breakout": lambda g: g.control.assumed_breakout,
+        "break_deflection": lambda g: g.control.schedule.break_deflection,
+        "compensated": lambda g: g.control.compensation.gradient,
+        "exact": lambda g: g.control.compensation.breakout_term == "exact",
+        "digital": lambda g: g.control.loader.multiplier == "digital",
+        "made": lambda g: 1.0 / g.control.sensing.modifying_scale,
+    },
+    state=layout(ModificationState),
+    fixed=("first", "second", "break_computed", "breakout"),
+)
 
 
 @stage

@@ -15,13 +15,13 @@ from scipy.interpolate import CubicSpline
 
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
+from coupled.rig.frame import set_product
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
-from coupled.rig.modification import modifying_force, set_gradients
+from coupled.rig.modification import set_gradients
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
-from coupled.rig.sensing import converted
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -80,8 +80,8 @@ def drive_loader(
     h = 1.0 / (rig.frame_rate * rig.substeps)
     every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
-    told = np.stack((*both, misread, level, position, rate))
-    _loader(p, s, nodes_N, told, every, rig.substeps, h, out)
+    given = np.stack((*both, misread, level, position, rate))
+    _loader(p, s, nodes_N, given, every, rig.substeps, h, out)
     return out[0], out[1]
 
 
@@ -113,16 +113,15 @@ def replay_compensation(rig: Rig, control: str, computed: Floats, force_N: Float
     return _compensation(p, computed, force_N, np.empty_like(force_N))
 
 
-def replay_surface(rig: Rig, control: str, believed: Floats, pressure_Pa: Floats) -> Floats:
+def replay_surface(rig: Rig, control: str, estimated: Floats, pressure_Pa: Floats) -> Floats:
     """Return the command about trim, in ±1, over each frame, for δ̂ in d and q̄ in Pa."""
     p, s = _one(rig, control)
-    return _surface(p, s, believed, pressure_Pa, np.empty_like(believed))
+    return _surface(p, s, estimated, pressure_Pa, np.empty_like(estimated))
 
 
 def _one(rig: Rig, control: str) -> tuple[Any, Any]:
     """Return parameters and state of one control at rest, each of shape (1,)."""
-    i = [str(name) for name in rig.controls].index(control)
-    packed = pack(rig)[i : i + 1]
+    packed = pack(rig, only=control)
     return packed["parameters"].copy(), packed["state"].copy()
 
 
@@ -146,15 +145,15 @@ def _loader(
     parameters: Any,
     states: Any,
     force: Floats,
-    told: Floats,
+    given: Floats,
     every: int,
     substeps: int,
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader; `told`, shape (6, frames): G_T twice, misread δc, load factor, restarts."""
+    """Run the loader; `given`, shape (6, frames): G_T twice, misread δc, load factor, restarts."""
     p, s = parameters[0], states[0]
-    gradient, misread, level, position, rate = told[:2], told[2], told[3], told[4], told[5]
+    gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
     start_delay(p.loader, s.loader, force[0])
     frames = len(misread)
     for k in range(frames):
@@ -162,14 +161,9 @@ def _loader(
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
-        if p.modification.digital:
-            read = p.sensing.deflection_scale * s.loader.computed + misread[k]
-            product = modifying_force(m, read)
-            m.held = converted(product, p.sensing.product_step, p.sensing.product_range)
-            product = m.held
-        else:
-            product = modifying_force(m, s.loader.computed)
-        out[0, k], out[1, k] = s.loader.computed, product
+        read = p.sensing.deflection_scale * s.loader.computed + misread[k]
+        out[1, k] = set_product(p, m, s.loader.computed, read)
+        out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
@@ -181,7 +175,7 @@ def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) ->
     m = s[0].modification
     for k in range(len(out)):
         set_gradients(p[0].modification, m, gradient[0, k], gradient[1, k])
-        out[k] = modifying_force(m, computed[k])
+        out[k] = set_product(p[0], m, computed[k], computed[k])
     return out
 
 
@@ -212,7 +206,7 @@ def _compensation(p: Any, computed: Floats, force: Floats, out: Floats) -> Float
 
 
 @entry
-def _surface(p: Any, s: Any, believed: Floats, pressure: Floats, out: Floats) -> Floats:
+def _surface(p: Any, s: Any, estimated: Floats, pressure: Floats, out: Floats) -> Floats:
     for k in range(len(out)):
-        out[k] = command_surface(p[0].surface, s[0].surface, believed[k], pressure[k])
+        out[k] = command_surface(p[0].surface, s[0].surface, estimated[k], pressure[k])
     return out

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration, first_order_gain
 from coupled.rig.parameters import MAX_ROWS
 
 Table = NDArray[np.float64]
@@ -38,9 +39,29 @@ class ScheduleState(Protocol):
     pressure: float  # Pa
 
 
+def _rows(values: list[float]) -> Table:
+    """Return a table's column at its full length, zeros behind its last row."""
+    column = np.zeros(MAX_ROWS)
+    column[: len(values)] = values
+    return column
+
+
 _SHAPES = dict.fromkeys(("dynamic_pressure", "total_gradient", "second_gradient"), (MAX_ROWS,))
-SCHEDULE_PARAMETERS = layout(ScheduleParameters, **_SHAPES)
-SCHEDULE_STATE = layout(ScheduleState)
+SCHEDULE = Declaration(
+    layout(ScheduleParameters, **_SHAPES),
+    section="control.schedule",
+    derived={
+        "rows": lambda g: len(g.control.schedule.dynamic_pressure),
+        "dynamic_pressure": lambda g: _rows(g.control.schedule.dynamic_pressure),
+        "total_gradient": lambda g: _rows(g.control.schedule.total_gradient),
+        "second_gradient": lambda g: _rows(
+            g.control.schedule.second_gradient or g.control.schedule.total_gradient
+        ),
+        "pressure_lag_gain": lambda g: first_order_gain(g.control.schedule.pressure_lag, g.frame_s),
+    },
+    state=layout(ScheduleState),
+    fixed=("pressure",),
+)
 
 
 @stage

@@ -8,9 +8,12 @@ scale. A scale S₁ or S₃ that is off makes the δc or F read that factor too 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration, Given
+from coupled.rig.parameters import Sensing
 
 
 class SensingParameters(Protocol):
@@ -28,7 +31,29 @@ class SensingParameters(Protocol):
     gradient_range: float
 
 
-SENSING_PARAMETERS = layout(SensingParameters)
+_SCALES: dict[str, Callable[[Sensing], float]] = {  # full scale of each, in its own unit
+    "computed": lambda s: s.full_scale / s.s1,
+    "force": lambda s: s.full_scale / s.s3,
+    "product": lambda s: s.full_scale / s.s2,
+    "gradient": lambda s: s.s1 / s.s2,  # the multiplier's other input: v₂ = v₁ at full scale
+}
+
+
+def _range(of: str) -> Callable[[Given], float]:
+    return lambda g: _SCALES[of](g.control.sensing) if g.control.sensing.word_length else 0.0
+
+
+def _step(of: str) -> Callable[[Given], float]:
+    """Return what gives a converter's step: 2ᴺ steps from −full scale to full scale."""
+    return lambda g: 2.0 * _range(of)(g) / 2**g.control.sensing.word_length
+
+
+SENSING = Declaration(
+    layout(SensingParameters),
+    section="control.sensing",
+    derived={f"{of}_range": _range(of) for of in _SCALES}
+    | {f"{of}_step": _step(of) for of in _SCALES},
+)
 
 
 @stage

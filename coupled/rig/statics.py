@@ -41,8 +41,7 @@ class Statics:
 
 def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) -> Statics:
     """Return the static line at the given δc in d, which are not to be zero."""
-    i = [str(name) for name in rig.controls].index(control)
-    packed = pack(rig)[i]
+    (packed,) = pack(rig, only=control)
     p, s = packed["parameters"], packed["state"]
     first, second = gradients(p["schedule"], pressure_Pa)
     set_gradients(p["modification"], s["modification"], first, second)

@@ -1,4 +1,4 @@
-"""Surface: from the deflection that the host believes to a command for the model.
+"""Surface: from the host's estimate of the deflection to a command for the model.
 
     u = sign·δ̂/travel, clipped to ±1            the linkage of the aircraft
     cable stretch   u/(1 + loss·q̄)              it yields to air load
@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.declaration import Declaration, first_order_gain
 
 
 class SurfaceParameters(Protocol):
@@ -36,8 +37,20 @@ class SurfaceState(Protocol):
     position: float
 
 
-SURFACE_PARAMETERS = layout(SurfaceParameters)
-SURFACE_STATE = layout(SurfaceState)
+# JSBSim's sign for nose up, right wing down, nose right, confirmed by flying each model.
+COMMAND_SIGN = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
+
+SURFACE = Declaration(
+    layout(SurfaceParameters),
+    section="control.rigging",
+    derived={
+        "gain": lambda g: COMMAND_SIGN[g.control.surface] / g.control.travel,
+        "stretch": lambda g: g.control.rigging.stretch_loss,
+        "lag_gain": lambda g: first_order_gain(g.control.rigging.lag, g.frame_s),
+        "rate_step": lambda g: g.control.rigging.rate_limit * g.frame_s,
+    },
+    state=layout(SurfaceState),
+)
 
 
 @stage

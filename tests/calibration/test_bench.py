@@ -26,8 +26,8 @@ from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
+from coupled.rig.standalone import run_control, under_supply
 from coupled.rig.statics import static_line
-from coupled.rig.told import run_told, under_supply
 from tests.support.readings import report_rig
 from tests.support.rigs import G_STIFF, K_REPORT
 from tests.support.rigs import bench as bench_rig
@@ -92,7 +92,7 @@ def test_the_bench_is_the_rig_that_flies() -> None:
     frames = scenario.frames
     times = np.arange(frames * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
     assert action.force is not None
-    told = run_told(rig, "column", action.force(times), pressure)
+    told = run_control(rig, "column", action.force(times), pressure)
     np.testing.assert_array_equal(told.computed, flown["column_computed_m"])
     np.testing.assert_array_equal(told.deflection, flown["column_deflection_m"])
     np.testing.assert_array_equal(told.estimate, flown["column_estimate_m"])
@@ -156,9 +156,9 @@ def test_scales_that_are_off_are_felt_by_the_host() -> None:
     }
     rig = bench_rig(changes)
     force = np.full(400 * rig.substeps + 1, 50.0)
-    told = run_told(rig, "column", force, np.full(400, 3000.0))
+    told = run_control(rig, "column", force, np.full(400, 3000.0))
     assert told.force[-1] == pytest.approx(55.0)
-    plain = run_told(bench_rig(), "column", force, np.full(400, 3000.0))
+    plain = run_control(bench_rig(), "column", force, np.full(400, 3000.0))
     ratio = (told.modifying[-1] / told.computed[-1]) / (plain.modifying[-1] / plain.computed[-1])
     assert ratio == pytest.approx(1.0 / 1.25, rel=1e-9)
 
@@ -262,7 +262,7 @@ def test_a_wandering_hand_parts_the_instruments_readings() -> None:
 def test_statics_and_frames_agree_on_scales_that_are_off() -> None:
     """The host's δ̂ and F_mod, breakout's term and all, in closed form and stepped to rest."""
     rig = bench_rig({**CHANGES, "controls.column.sensing.word_length_bits": 0})
-    told = run_told(rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0))
+    told = run_control(rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0))
     line = static_line(rig, "column", 3000.0, told.computed[-1:] / 0.93)
     assert line.force[0] == pytest.approx(70.0, rel=1e-9)
     assert told.estimate[-1] == pytest.approx(line.estimate[0], rel=1e-9)

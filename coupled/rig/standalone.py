@@ -1,7 +1,7 @@
-"""One control on the bench, whole: a hand's force on its grip, and a host that is told q̄.
+"""One control without an aircraft: a force on its grip, a given q̄ to its host.
 
-The frame step that flies, run over a told dynamic pressure without an aircraft; and the
-loader with its multiplier replaced by a voltage supply, as the null of eq. (14) needs it.
+The frame step that flies, run over a given dynamic pressure; and the loader with its
+multiplier replaced by a voltage supply, as the null of eq. (14) needs it.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Told:
-    """What was so at each frame, in SI; d is m, or rad for a wheel.
+class History:
+    """A control's time history, one value a frame, in SI; d is m, or rad for a wheel.
 
     `force` F and `modifying` F_mod in N, `computed` δc and `deflection` δ as read, `estimate`
     δ̂ in d, `gradient` G_T in N/d, `surface` the command about trim in ±1.
@@ -46,11 +46,11 @@ def nodes_of(rig: Rig, frames: int) -> Floats:
     return np.arange(frames * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
 
 
-def run_told(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> Told:
-    """Return what a control does from rest under a hand's force, as the host is told q̄.
+def run_control(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> History:
+    """Return what a control does from rest under a hand's force, the host reading this q̄.
 
     `nodes_N` has `rig.substeps` values a frame and one more, straight between; `pressure_Pa`
-    one a frame. No noise: what is read is what is so, but for scales and converters.
+    one a frame. Without noise: readings differ from the truth by scales and converters only.
     """
     rig = rig.only(control)
     controls = pack(rig)
@@ -60,7 +60,7 @@ def run_told(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> To
     _frames(controls, script, record, pressure_Pa)
     force, computed, deflection, estimate, gradient, modifying, _, surface = record[:, 1:9].T
     time_s = np.arange(len(pressure_Pa)) / rig.frame_rate
-    return Told(time_s, force, computed, deflection, estimate, gradient, modifying, surface)
+    return History(time_s, force, computed, deflection, estimate, gradient, modifying, surface)
 
 
 def smooth(share: Floats) -> Floats:
@@ -71,11 +71,12 @@ def smooth(share: Floats) -> Floats:
 def under_supply(
     rig: Rig, control: str, rise_s: float, rest_s: float
 ) -> Callable[[float, float], float]:
-    """Return what tells δc in d of a free control under a supply in the multiplier's place.
+    """Return δc in d at which a free control rests under a supply in the multiplier's place.
 
-    Its arguments are two forces in N that the supply's voltage v₂ stands for, v₂/S₂, positive
-    with the pilot's: it is turned to the first over `rise_s`, to the second over as long, and
-    left for `rest_s`. The control starts at rest at neutral, with no hand on it (v₃ = 0).
+    What is returned is a function of two forces in N that the supply's voltage v₂ stands for,
+    v₂/S₂, positive with the pilot's: the supply is turned to the first over `rise_s`, to the
+    second over as long, and left for `rest_s`. The control starts at rest at neutral, with no
+    hand on it (v₃ = 0).
     """
     packed = pack(rig.only(control))
     packed["parameters"]["loader"]["digital"] = 1  # F_mod is what is held, not a product

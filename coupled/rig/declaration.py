@@ -1,0 +1,83 @@
+"""How a stage declares its part of a control: its numbers, and where each comes from.
+
+A stage's kernels see two classes of numbers, its parameters and its state. A parameter that
+has the name of a field of the rig's section is that field; any other is derived by a function
+that stands beside the stage. `control` lists the declarations, once; layouts, packing and what
+else goes through all stages follow from that list.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from coupled.rig.parameters import Control
+
+
+@dataclass(frozen=True)
+class Hand:
+    """The impedance of a hand on one control; all zero is a hand that only pushes.
+
+    stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s.
+    `strongest` (0: no limit) and `lasting`, N, can be held for `endurance_s` and for any time.
+    `reach`, d (0: none), is how far it goes; `gradient`, N/d, what it then holds against.
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    integral: float = 0.0
+    lag_s: float = 0.0
+    strongest: float = 0.0
+    lasting: float = 0.0
+    endurance_s: float = 0.0
+    reach: float = 0.0
+    gradient: float = 0.0
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a control's parameters are made from; times in s, the substep being the loader's."""
+
+    control: Control
+    hand: Hand
+    frame_s: float
+    substep_s: float
+    substeps: int
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A stage's numbers and their origin.
+
+    parameters   layout of the parameters
+    section      the part of `Given` whose fields are parameters of the same name, dotted
+    derived      {parameter: its value}, for all others
+    state        layout of the state, if the stage has one
+    fixed        fields of the state that do not grow with the control's motion
+    """
+
+    parameters: np.dtype[np.void]
+    section: str = "control"
+    derived: Mapping[str, Callable[[Given], ArrayLike]] = field(default_factory=dict)
+    state: np.dtype[np.void] | None = None
+    fixed: tuple[str, ...] = ()
+
+    def value(self, name: str, given: Given) -> ArrayLike:
+        """Return the value of a parameter; AttributeError where the rig has none of that name."""
+        if name in self.derived:
+            return self.derived[name](given)
+        holder: Any = given
+        for part in self.section.split("."):
+            holder = getattr(holder, part)
+        value: ArrayLike = getattr(holder, name)
+        return value
+
+
+def first_order_gain(lag_s: float, step_s: float) -> float:
+    """Return the share of the way that a first-order lag goes in a step; 1 without lag."""
+    return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0

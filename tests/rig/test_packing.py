@@ -1,0 +1,122 @@
+"""Every number of a stage comes from the rig, and every number of the rig reaches a stage."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any, get_type_hints
+
+import numpy as np
+import pytest
+
+from coupled.rig import control as controls
+from coupled.rig.declaration import Hand
+from coupled.rig.growth import _growing
+from coupled.rig.packing import pack
+from coupled.rig.parameters import Control
+from coupled.schema import Section
+from tests.support.rigs import bench
+
+STAGES = controls.STAGES
+# What is no number of the kernels: said of the host, the airframe or a calibration.
+ELSEWHERE = {"gains", "calibration"}
+# Everything on, so that each number counts: two segments, converters, an arc.
+SCHEDULE, HOST, SENSING = (f"controls.column.{s}" for s in ("schedule", "compensation", "sensing"))
+RIG = bench(
+    {
+        "arc_geometry": True,
+        "breakaway_N": 1.0,
+        f"{SCHEDULE}.second_gradient_N_per_m": [300.0, 900.0],
+        f"{SCHEDULE}.break_deflection_m": 0.05,
+        f"{HOST}.basic_gradient_N_per_m": 500.0,
+        f"{HOST}.breakout_N": 3.0,
+        f"{SENSING}.word_length_bits": 12,
+        f"{SENSING}.s1_V_per_m": 400.0,
+        f"{SENSING}.s2_V_per_N": 0.3,
+        f"{SENSING}.s3_V_per_N": 0.2,
+    }
+)
+COLUMN = RIG.controls["column"]
+
+
+def other(value: Any) -> Any:
+    """Return another value of the same kind."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, str):
+        others = ("hybrid", "digital", "exact", "printed", "elevator", "aileron", "", "today")
+        return others[others.index(value) ^ 1]
+    if isinstance(value, list):
+        return [*value[:-1], 1.01 * value[-1] + 1.0]
+    return value + 1 if isinstance(value, int) else 1.01 * value + 1e-3
+
+
+def numbers(section: Section, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Return the path of every value of a section and those within it."""
+    found = []
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        inner = isinstance(value, Section)
+        found += numbers(value, (*path, name)) if inner else [(*path, name)]
+    return found
+
+
+def with_other(section: Section, path: tuple[str, ...]) -> Section:
+    """Return a section with the value at a path another one."""
+    values = {name: getattr(section, name) for name in type(section).model_fields}
+    first, *rest = path
+    values[first] = with_other(values[first], tuple(rest)) if rest else other(values[first])
+    return type(section)(**values)
+
+
+@pytest.mark.parametrize("path", numbers(COLUMN), ids=".".join)
+def test_every_number_of_a_control_reaches_a_stage(path: tuple[str, ...]) -> None:
+    changed = with_other(COLUMN, path)
+    assert isinstance(changed, Control)
+    # Not through `changed` of the rig: what the physics refuses is packed all the same.
+    rig = type(RIG)(**{**dict(RIG), "controls": {"column": changed}})
+    assert (pack(rig).tobytes() == pack(RIG).tobytes()) == (path[0] in ELSEWHERE)
+
+
+@pytest.mark.parametrize("field", [f.name for f in fields(Hand)])
+def test_every_number_of_a_hand_reaches_a_stage(field: str) -> None:
+    plain = pack(RIG, {"column": Hand()}).tobytes()
+    assert pack(RIG, {"column": replace(Hand(), **{field: 1.5})}).tobytes() != plain
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_derived_number_is_one_of_its_stage(stage: str) -> None:
+    declared = STAGES[stage]
+    assert set(declared.derived) <= set(declared.parameters.names or ())
+    assert set(declared.fixed) <= set((declared.state or np.dtype([])).names or ())
+
+
+def test_the_layout_is_that_of_the_declared_stages() -> None:
+    """The kernels' view of a control, for the type checker, has what memory has."""
+    for view, layout in (
+        (controls.ControlParameters, controls.CONTROL_PARAMETERS),
+        (controls.ControlState, controls.CONTROL_STATE),
+    ):
+        hints = get_type_hints(view)
+        assert tuple(hints) == layout.names
+        for name, kind in hints.items():
+            assert tuple(get_type_hints(kind)) == layout[name].names
+
+
+def test_every_state_grows_with_the_motion_or_is_said_not_to() -> None:
+    growing = np.zeros(1, controls.CONTROL)
+    growing.view(np.int64)[_growing()] = 1
+    grown = {
+        f"{stage}.{name}"
+        for stage in controls.CONTROL_STATE.names or ()
+        for name in controls.CONTROL_STATE[stage].names or ()
+        if growing["state"][stage][name].any()
+    }
+    assert {"loader.computed", "loader.rate", "loader.history", "linkage.grip"} <= grown
+    assert {"hand.force", "hand.integral", "surface.position"} <= grown
+    assert not {"loader.node", "modification.first", "hand.effort", "schedule.started"} & grown
+
+
+def test_pack_takes_one_control_alone() -> None:
+    assert len(pack(RIG, only="column")) == 1
+    with pytest.raises(KeyError):
+        pack(RIG, only="wheel")
