@@ -18,7 +18,7 @@ LIMIT_rad = 14.0 * DEGREE_rad
 
 
 def along_arc(level: Floats, length: float) -> Floats:
-    """Return the deflection along an arc of `length` from a level ruler's reading, both in m."""
+    """Return the deflection along an arc from a level ruler's reading, in m: eqs. (15) and (16)."""
     return np.asarray(length * np.arcsin(level / length))
 
 

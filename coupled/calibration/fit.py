@@ -42,7 +42,7 @@ def normal_equations(deflection: Floats, force: Floats, v1: Floats) -> tuple[flo
 
 
 def solve(design: Floats, v1: Floats) -> Floats:
-    """Return (a, b) by QR of the design's columns, each scaled to unit length."""
+    """Return (a, b) of eq. (4) by QR of the design's columns, each scaled to unit length."""
     size = np.linalg.norm(design, axis=0)
     q, r = np.linalg.qr(design / size)
     return np.asarray(np.linalg.solve(r, q.T @ v1) / size)
@@ -74,7 +74,7 @@ def error_variance(a: float, b: float, readings: Readings, instruments: Instrume
 
 
 def line_fit(a: float, b: float, errors: Sandwich, residual: Floats, variance: Floats) -> LineFit:
-    """Return S₁ and K = −b/a of a fit whose first two figures are a and b.
+    """Return S₁ and K = −b/a of a fit whose first two figures are a and b: eqs. (5a) and (5b).
 
     `residual` of v₁ in V, and the `variance` that the instruments give it in V².
     """

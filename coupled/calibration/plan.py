@@ -23,7 +23,7 @@ from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.equations import specified_gradient
+from coupled.rig.equations import specified_gradient, volts, volts_of_computed
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
@@ -181,9 +181,9 @@ def _rows(
     bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.total_gradient)
     delta = np.array([station.deflection for station in design])
     force = np.array([station.force for station in design])
-    volts = (scales.s1 * (delta - bend * force), scales.s3 * force)
+    read = (volts_of_computed(scales.s1, delta, force, bend), volts(scales.s3, force))
     rise = np.full((2, len(design)), 0.0 if looks == 2 else np.nan)
-    columns = np.stack((delta, force, *volts, *rise))
+    columns = np.stack((delta, force, *read, *rise))
     labels = [station.label for station in design]
     readings = readings_of(range(len(design)), labels, columns, [], np.empty((4, 0)))
     figures = (scales.s1, -scales.s1 * bend, scales.s3)

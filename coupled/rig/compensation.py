@@ -28,5 +28,5 @@ COMPENSATION = Declaration(
 
 @stage
 def estimate(p: CompensationParameters, computed: float, force: float) -> float:
-    """Return δ̂ in d from δc in d and F in N as read."""
+    """Return δ̂ in d from δc in d and F in N as read: eq. (1) solved for δ, with K̂."""
     return true_deflection(computed, force, p.bend)

@@ -1,10 +1,9 @@
 """The report's equations as closed forms, each in one place.
 
-    δc = δ − K·F                     eq. (1)     F = G_T·δ                  eq. (6)
-    δc = δ·(1 − K·G_T)               eq. (7)     Δδc = −δ·K·G_T             eq. (7a)
-    F_L = G_B·δc                     eq. (8)     F_mod = F − F_L            eq. (9)
-    F_mod = G_T·δ − G_B·δc           eq. (10)    F_mod = ΔG·δc              eq. (11)
-    ΔG = G_T/(1 − K·G_T) − G_B       eq. (12)
+    (1)  δc = δ − K·F              (2)  v₁ = S₁·δc           (3)  v₁ = S₁·(δ − K·F)
+    (6)  F = G_T·δ                 (7)  δc = δ·(1 − K·G_T)   (7a) Δδc = −δ·K·G_T
+    (8)  F_L = G_B·δc              (9)  F_mod = F − F_L      (10) F_mod = G_T·δ − G_B·δc
+    (11) F_mod = ΔG·δc             (12) ΔG = G_T/(1 − K·G_T) − G_B
 
 Each works on numbers and on arrays; the kernels compile the same functions (`stage`), so
 none stands anywhere else. d is m, or rad for a wheel: δ and δc in d, F in N, gradients in
@@ -73,10 +72,25 @@ def true_deflection(computed: N, force: N, bend: float) -> N:
     return computed + bend * force
 
 
+def seen_deflection(deflection: N, bend: float, gradient: float) -> N:
+    """Return δc in d where the pilot feels F = `gradient`·δ: eq. (7)."""
+    return computed_deflection(deflection, gradient * deflection, bend)
+
+
+def volts(scale: float, quantity: N) -> N:
+    """Return a quantity as a voltage, by its scale in V per unit: eq. (2)."""
+    return scale * quantity
+
+
+def volts_of_computed(scale: float, deflection: N, force: N, bend: float) -> N:
+    """Return v₁ in V at δ in d under F in N, for S₁ in V/d: eq. (3), which is (1) in (2)."""
+    return volts(scale, computed_deflection(deflection, force, bend))
+
+
 def bend_loss(bend: float, gradient: N) -> N:
     """Return the share of the deflection lost when the pilot feels `gradient`: eq. (7a).
 
-    K in d/N, G_T in N/d, without unit; the host takes δc for δ. 1 less it is eq. (7)'s factor.
+    K in d/N, G_T in N/d, without unit; the host takes δc for δ.
     """
     return bend * gradient
 
@@ -99,6 +113,11 @@ def total_to_computed(gradient: N, bend: float) -> N:
 def modifying_gradient(gradient: N, bend: float, basic: float) -> N:
     """Return ΔG in N/d for G_T and G_B in N/d: eq. (12); with K = 0 that of figure 2."""
     return total_to_computed(gradient, bend) - basic
+
+
+def modifying_force(gradient: N, bend: float, basic: float, computed: N) -> N:
+    """Return F_mod in N at δc in d for G_T and G_B in N/d: eq. (11)."""
+    return modifying_gradient(gradient, bend, basic) * computed
 
 
 def basic_force(basic: float, computed: N) -> N:

@@ -110,7 +110,7 @@ def move_linkage(
 
 @stage
 def bend(p: LinkageParameters, force: float) -> float:
-    """Return the structure's bend in d under a force in N."""
+    """Return the structure's bend in d under a force in N: K·F of eq. (1), or its saturation."""
     if p.bend_limit > 0.0:
         return p.bend_limit * math.tanh(p.bend * force / p.bend_limit)
     return p.bend * force
@@ -132,7 +132,7 @@ def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
 
 @stage
 def transducer(p: LinkageParameters, true: float) -> float:
-    """Return what the transducer at the grip reads of a true deflection, d."""
+    """Return what the transducer at the grip reads of a true deflection, d: eqs. (15), (16)."""
     if p.arc_length > 0.0:
         return p.arc_length * math.sin(true / p.arc_length)
     return true

@@ -102,7 +102,7 @@ def _delay(p: LoaderParameters, s: LoaderState, force: float) -> float:
 
 @stage
 def _elastic(p: LoaderParameters, m: ModificationState, x: float) -> float:
-    """Return the smooth part of the force that opposes δc = x, N."""
+    """Return the smooth part of the force that opposes δc = x, N: F_L of eq. (8), and F_mod."""
     force = (p.basic_gradient + p.cubic * x * x) * x
     return force + (m.held if p.digital else smooth_force(m, x))
 

@@ -82,7 +82,10 @@ MODIFICATION = Declaration(
 def set_gradients(
     p: ModificationParameters, s: ModificationState, first: float, second: float
 ) -> None:
-    """Set the modification for the gradients G₁ and G₂ that the schedule asks for, N/d."""
+    """Set the modification for the gradients G₁ and G₂ that the schedule asks for, N/d.
+
+    Eq. (12) for each segment; appendix C, with the breakout's term or as printed.
+    """
     bend = p.bend if p.compensated else 0.0
     preload = p.breakout if p.exact else 0.0
     s.break_computed = 0.0
@@ -106,7 +109,7 @@ def set_gradients(
 
 @stage
 def smooth_force(s: ModificationState, computed: float) -> float:
-    """Return F_mod in N without its breakout, at δc in d."""
+    """Return F_mod in N without its breakout, at δc in d: eq. (11), in two segments."""
     force = s.first * computed
     if s.break_computed > 0.0:
         beyond = abs(computed) - s.break_computed

@@ -67,7 +67,7 @@ def converted(value: float, step: float, full_scale: float) -> float:
 
 @stage
 def read_computed(p: SensingParameters, computed: float, noise: float) -> float:
-    """Return δc as the host reads it, d."""
+    """Return δc as the host reads it, d: v₁ of eq. (2), by the scale that it assumes."""
     return converted(p.deflection_scale * computed + noise, p.computed_step, p.computed_range)
 
 

@@ -76,7 +76,7 @@ def under_supply(
     What is returned is a function of two forces in N that the supply's voltage v₂ stands for,
     v₂/S₂, positive with the pilot's: the supply is turned to the first over `rise_s`, to the
     second over as long, and left for `rest_s`. The control starts at rest at neutral, with no
-    hand on it (v₃ = 0).
+    hand on it (v₃ = 0): appendix B.
     """
     packed = pack(rig.only(control))
     packed["parameters"]["loader"]["digital"] = 1  # F_mod is what is held, not a product

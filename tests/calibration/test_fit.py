@@ -25,12 +25,13 @@ COARSE = Instruments(2.5e-3, 3.0, 0.3, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_two_exact_readings_solve_for_two_unknowns() -> None:
-    """v₁ = 2·δ − 0.5·F, by hand."""
+    """v₁ = 2·δ − 0.5·F of eq. (4) by hand: appendix A."""
     a, b = normal_equations(np.array([1.0, 1.0]), np.array([2.0, 4.0]), np.array([1.0, 0.0]))
     assert (a, b) == (pytest.approx(2.0), pytest.approx(-0.5))
 
 
 def test_without_errors_every_way_gives_s1_and_k() -> None:
+    """Eqs. (5a) and (5b), whatever way eq. (4) is fitted."""
     r = readings(*grid())
     a, b = normal_equations(r.deflection, r.force, r.v1)
     assert a == pytest.approx(S1, rel=1e-12)

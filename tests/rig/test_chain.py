@@ -66,6 +66,38 @@ def test_eq_12_gives_the_asked_gradient_at_the_grip(share: float, gradient: floa
     assert force / (computed + bend * force) == pytest.approx(gradient, rel=1e-9)
 
 
+@given(
+    share=st.floats(0.0, 0.9),
+    gradient=st.floats(1.0, 5000.0),
+    basic=st.floats(0.0, 5000.0),
+    deflection=st.floats(-0.2, 0.2),
+)
+def test_the_steps_from_eq_6_to_12_are_one_force(
+    share: float, gradient: float, basic: float, deflection: float
+) -> None:
+    """Eqs. (6) to (12): F_mod as a difference of forces, by δ and δc, and by ΔG."""
+    bend = share / gradient
+    force = gradient * deflection
+    computed = equations.computed_deflection(deflection, force, bend)
+    assert equations.seen_deflection(deflection, bend, gradient) == computed
+    assert computed == pytest.approx(deflection * (1.0 - equations.bend_loss(bend, gradient)))
+    needed = equations.added_force(force, equations.basic_force(basic, computed))
+    assert needed == force - basic * computed
+    assert equations.needed_force(gradient, deflection, basic, computed) == needed
+    made = equations.modifying_force(gradient, bend, basic, computed)
+    assert made == pytest.approx(needed, rel=1e-9, abs=1e-9)
+    added = equations.modifying_gradient(gradient, bend, basic)
+    assert added == pytest.approx(gradient / (1.0 - bend * gradient) - basic, abs=1e-9)
+
+
+def test_eqs_1_to_3_by_hand() -> None:
+    """Eqs. (1) to (3): 0.1 m under 200 N on K = 1e-4 m/N, at 500 V/m."""
+    assert equations.computed_deflection(0.1, 200.0, 1e-4) == pytest.approx(0.08)
+    assert equations.true_deflection(0.08, 200.0, 1e-4) == pytest.approx(0.1)
+    assert equations.volts(500.0, 0.08) == pytest.approx(40.0)
+    assert equations.volts_of_computed(500.0, 0.1, 200.0, 1e-4) == pytest.approx(40.0)
+
+
 def two_segments(breakout: float, term: str) -> Rig:
     return bench(
         {
@@ -127,7 +159,7 @@ def test_under_that_break_the_grip_moves_by_the_bend_alone() -> None:
 def test_f_mod_is_the_force_specified_less_that_of_the_loader(
     bend: float, breakout: float, at: float, gradients: tuple[float, float]
 ) -> None:
-    """Eqs. (9) and (10), with breakout and either order of two segments, wherever δc moves."""
+    """Eqs. (6), (8) and (9), with breakout and two segments in either order, wherever δc moves."""
     first, second = gradients
     column = "controls.column"
     rig = bench(STIFF_737).changed(
@@ -192,7 +224,7 @@ def test_a_digital_product_is_of_what_the_host_read() -> None:
     ("deflection_in", "gradient_lb_per_in", "loss"), [(2.0, 12.5, 0.20), (7.0, 3.2, 0.0512)]
 )
 def test_the_reports_losses(deflection_in: float, gradient_lb_per_in: float, loss: float) -> None:
-    """Cleveland, p. 5: 0.4 in of 2 in lost, and 0.36 in of 7 in."""
+    """Cleveland, p. 5: 0.4 in of 2 in lost, and 0.36 in of 7 in: eqs. (7) and (7a)."""
     gradient = gradient_lb_per_in * 175.126835
     rig = bench({f"{SCHEDULE}.total_gradient_N_per_m": [gradient, gradient]})
     right = static_point(configure(rig, "gradient only"), "column", 0.0, deflection_in * 0.0254)

@@ -1,0 +1,165 @@
+"""docs/equations.md is an index of the report's equations, made from the code and its tests.
+
+A function holds an equation where its docstring names it, as `eq. (12)` or `appendix A`; a test
+likewise, or by its name. `python tests/test_equations.py` writes the index anew.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+INDEX = ROOT / "docs" / "equations.md"
+
+# What each says in today's symbols.
+EQUATIONS = {
+    "1": ("δc = δ − K·F", "the structure bends by K·F between servo and grip"),
+    "2": ("v₁ = S₁·δc", "the computed deflection in volts"),
+    "3": ("v₁ = S₁·δ − S₁·K·F", "(1) in volts: what a bench can read"),
+    "4": ("v₁ = a·δ + b·F", "the polynomial that is fitted"),
+    "5a": ("S₁ = a", "the scale from the fit"),
+    "5b": ("K = −b/S₁", "the bend coefficient from the fit"),
+    "6": ("F = G_T·δ", "the force specified"),
+    "7": ("δc = δ·(1 − K·G_T)", "what the host sees of δ when the gradient felt is right"),
+    "7a": ("Δδc = −δ·K·G_T", "the deflection lost, beside a rigid control"),
+    "8": ("F_L = G_B·δc", "the force that the loader gives of itself"),
+    "9": ("F_mod = F − F_L", "the modifying force needed"),
+    "10": ("F_mod = G_T·δ − G_B·δc", "the same, with (6) and (8)"),
+    "11": ("F_mod = (G_T/(1 − K·G_T) − G_B)·δc", "the same as a function of δc, with (7)"),
+    "12": ("ΔG = G_T/(1 − K·G_T) − G_B", "the modifying gradient, compensated for the bend"),
+    "13": ("S₃ = (1/n)·Σ v₃/F", "the force's scale, a mean of ratios"),
+    "14": ("S₂ = v₂·S₃/v₃", "the modifying force's scale, by a null"),
+    "15": ("δ = L·sin θ", "what a level ruler reads"),
+    "16": ("δ = L·θ", "the deflection along the arc"),
+    "17": ("sin θ ≈ θ − θ³/6", "by how much the two differ"),
+    "A": ("(a, b) by Cramer's rule", "the normal equations of (4)"),
+    "B": ("S₁·v₃/S₃ = S₁·v₂/S₂", "why the null of (14) gives S₂"),
+    "C": ("F = F_BO + G₁·δ, slope G₂ beyond δ₁", "two segments, with the bend compensated"),
+}
+
+HEAD = """\
+W. B. Cleveland, *Force modification and deflection loss compensation to the pilot's controls in
+an aircraft simulator*, NASA Ames, 1974. Each equation in today's symbols, the code that implements
+it and the tests that hold it. δ and δc are in m (rad for a wheel), F in N, G in N/m, K in m/N.
+
+This file is made from the docstrings by `python tests/test_equations.py`; a test fails where it is
+stale, and where an equation has no code or no test.
+
+| | equation | what it says | code | tests |
+| --- | --- | --- | --- | --- |
+"""
+
+MISPRINTS = """
+## Misprints, and what the text leaves open
+
+| where | printed | what it must be |
+| --- | --- | --- |
+| bend coefficient | 0.928 m/N (0.016 in./lb) | 0.016 in/lb is 9.14e-5 m/N |
+| worst case | 2155.2 N/m (12.5 lb/in.) | 12.5 lb/in is 2189 N/m |
+| full column | 0.788 m (7 in.) | 7 in is 0.1778 m |
+| (7a) | "differentiating" (7) | the loss beside a rigid control; beside a calibration at G₀ it is \
+δ·K·(G_T − G₀)/(1 − K·G₀) |
+| (11), appendix C | δ = δc/(1 − K·G_T) | with a breakout (δc + K·F_BO)/(1 − K·G_T): as printed, \
+the force lacks G_T·K·F_BO/(1 − K·G_T) at a δc |
+| (12) | | singular at K·G_T = 1: no gradient stiffer than the structure can be given |
+| appendix C | the flow chart itself lacks | the break lies at δc₁ = δ₁ − K·F(δ₁): this project's \
+reading, see `rig/modification.py` |
+"""
+
+CITED = re.compile(r"\b[Ee]qs?\. (\(\w+\)(?:(?:, | and | to )\(\w+\))*)")
+APPENDIX = re.compile(r"\bappendix ([ABC])\b(?!, table)", re.IGNORECASE)
+NAMED = re.compile(r"_eqs?_(\d+[ab]?)(?:_to_(\d+))?")
+
+
+def cited(text: str) -> Iterator[str]:
+    """Yield the keys of `EQUATIONS` that a text names, ranges filled."""
+    for places in CITED.findall(text):
+        parts = re.findall(r"(to )?\((\w+)\)", places)
+        for i, (to, key) in enumerate(parts):
+            if to:
+                yield from (str(n) for n in range(int(parts[i - 1][1]) + 1, int(key)))
+            yield key
+    yield from APPENDIX.findall(text)
+
+
+def functions(folder: str) -> Iterator[tuple[Path, ast.FunctionDef]]:
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                yield path.relative_to(ROOT), node
+
+
+def implemented() -> dict[str, list[str]]:
+    """Return links to the functions that hold each equation, the closed forms first."""
+    found = defaultdict(list)
+    for path, node in functions("coupled"):
+        for key in dict.fromkeys(cited(ast.get_docstring(node) or "")):
+            module = ".".join(path.with_suffix("").parts[1:])
+            link = f"[`{module}.{node.name}`](../{path.as_posix()}#L{node.lineno})"
+            found[key].append((path.stem != "equations", link))
+    return {key: [link for _, link in sorted(links)] for key, links in found.items()}
+
+
+def held_by() -> dict[str, list[str]]:
+    """Return links to the tests that hold each equation."""
+    found = defaultdict(list)
+    for path, node in functions("tests"):
+        if not node.name.startswith("test_"):
+            continue
+        keys = list(cited(ast.get_docstring(node) or ""))
+        for first, last in NAMED.findall(node.name):
+            keys += [str(n) for n in range(int(first), int(last) + 1)] if last else [first]
+        for key in dict.fromkeys(keys):
+            found[key].append(f"[`{node.name}`](../{path.as_posix()})")
+    return found
+
+
+def index() -> str:
+    """Return the text of docs/equations.md."""
+    code, tests = implemented(), held_by()
+    lines = ["# The report's equations", ""]
+    lines += HEAD.splitlines()
+    for key, (says, means) in EQUATIONS.items():
+        name = f"appendix {key}" if key in "ABC" else f"({key})"
+        where = "<br>".join(code.get(key, ["none"]))
+        held = "<br>".join(tests.get(key, ["none"]))
+        lines.append(f"| {name} | {says} | {means} | {where} | {held} |")
+    lines += MISPRINTS.splitlines()
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("key", EQUATIONS)
+def test_an_equation_has_code_and_a_test(key: str) -> None:
+    assert implemented().get(key), "no function's docstring names it"
+    assert held_by().get(key), "no test names it"
+
+
+def test_no_equation_is_named_that_the_report_lacks() -> None:
+    assert set(implemented()) | set(held_by()) <= set(EQUATIONS)
+
+
+def test_the_index_is_that_of_the_code() -> None:
+    stale = "docs/equations.md is stale: run python tests/test_equations.py"
+    assert INDEX.read_text(encoding="utf-8") == index(), stale
+
+
+def test_ranges_and_lists_are_read() -> None:
+    assert list(cited("eqs. (9), (10) to (12) and (7a); appendix C")) == [
+        "9",
+        "10",
+        "11",
+        "12",
+        "7a",
+        "C",
+    ]
+    assert list(cited("14 CFR Part 60, appendix A, table A2A")) == []
+
+
+if __name__ == "__main__":
+    INDEX.write_text(index(), encoding="utf-8")
