@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coupled.campaign.plan import Survive, SweepFile, Vary
+from coupled.campaign.sweepfile import Survive, SweepFile, Vary
 from coupled.flight.event import Event
 from coupled.flight.expectation import Expect
 from coupled.flight.manoeuvre import Measure, PressureProfile
