@@ -1,6 +1,7 @@
-"""Where the flights of a sweep are flown: here, on all cores, or on a dask cluster.
+"""Where much work is done: here, on all cores, or on a dask cluster.
 
-The three have one face, that of `concurrent.futures`.
+The three have one face, that of `concurrent.futures`. However the parent ends, its workers end
+with it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from coupled.errors import InputError
@@ -35,7 +37,8 @@ class Here(Executor):
 def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     """Give an executor of so many processes, or a cluster's where an address is given.
 
-    Work that has not begun is dropped when it is left.
+    Work that has not begun is dropped when it is left; on an error or an interruption the
+    workers end at once, within the work that they do.
     """
     if cluster:
         with _cluster(cluster) as pool:
@@ -47,27 +50,35 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     # A flight's matrices are small: threads of theirs would only take turns with the other workers.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     own = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=own, initializer=_begin_worker)
+    # The workers hold the reading end: it closes with the parent, however that ends.
+    alive, ours = own.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        workers, mp_context=own, initializer=_begin_worker, initargs=(alive,)
+    )
     try:
         yield pool
     except BrokenExecutor:
         problem = "a worker died; what is finished is kept, and the same command goes on"
         raise InputError("--workers", "", problem) from None
+    except BaseException:
+        ours.close()  # interrupted, or nothing to be done with the rest: no worker is waited for
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
+        ours.close()
+        alive.close()
 
 
-def _begin_worker() -> None:
+def _begin_worker(alive: Connection) -> None:
     """Leave interrupts to the parent, and end with it, even if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
-        def follow() -> None:
-            parent.join()
-            os._exit(1)
+    def follow() -> None:
+        wait([alive])  # it is never written to, so that this is its end
+        os._exit(1)
 
-        threading.Thread(target=follow, daemon=True).start()
+    threading.Thread(target=follow, daemon=True).start()
 
 
 @contextmanager

@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from coupled.calibration.belief import real_scales
+from coupled.calibration.assumed import real_scales
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.plan import FULL_TRAVEL, STRONGEST_N, Station
 from coupled.calibration.readings import Readings, readings_of
-from coupled.record.channels import ControlName
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 from coupled.rig.standalone import nodes_of, run_control, smooth, under_supply
 
@@ -38,15 +38,15 @@ SLOW_s = 2.0  # and so slowly where friction must not matter
 GLANCE_s = 0.6  # from one instrument to the next
 WANDER_s = 0.2  # over which a hand forgets where it was
 PAST = 5.0  # of a hand's wander: how far it pulls past where it holds
-BEYOND = 0.1  # of its force, and so far, with friction to spare, for a null from beyond
-SPARE = 3.0  # of the friction: 2 let the control come back
+BEYOND = 0.1  # of its force, and so far, with an allowance for friction, for a null from beyond
+ALLOWANCE = 3.0  # of the friction: 2 let the control come back
 TURNS = 40  # of the supply's knob at most
 MOST_VOLTS = 1e4
 NULLS = 6
 
 
 @dataclass(frozen=True)
-class Bench:
+class CalibrationBench:
     """A rig on the bench, without its converters: what to hold, when, and when to read it.
 
     `again`: ruler and scale are read a second time, after the voltmeter.
@@ -60,7 +60,7 @@ class Bench:
     again: bool = True
 
 
-def take_readings(bench: Bench, seed: int) -> Readings:
+def take_readings(bench: CalibrationBench, seed: int) -> Readings:
     """Return the readings of one bench session; the same seed gives the same ones."""
     rng = np.random.default_rng(seed)
     rig, control = _meters_rig(bench.rig, bench.control), bench.control
@@ -87,13 +87,10 @@ def take_readings(bench: Bench, seed: int) -> Readings:
 
 
 def _meters_rig(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig as a voltmeter meets it: no converters, δc and F in real volts over belief."""
-    data = rig.controls[control]
-    sensing = data.sensing.model_copy(
-        update={"word_length": 0, "deflection_scale": 1.0, "force_scale": 1.0}
-    )
-    controls = {**rig.controls, control: data.model_copy(update={"sensing": sensing})}
-    return rig.model_copy(update={"controls": controls})
+    """Return the rig as a voltmeter meets it: no converters, δc and F as they truly are."""
+    sensing = {"word_length_bits": 0, "deflection_scale": 1.0, "force_scale": 1.0}
+    place = f"controls.{control}.sensing"
+    return rig.changed({f"{place}.{key}": value for key, value in sensing.items()})
 
 
 def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
@@ -110,7 +107,7 @@ def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
 
 def _hold(
     rig: Rig,
-    bench: Bench,
+    bench: CalibrationBench,
     forces: Floats,
     peaks: Floats,
     pressures: Floats,
@@ -134,10 +131,11 @@ def _hold(
         held = held * (1.0 + bench.instruments.hand * _wander(frames, rate, rng))
     ends = np.append(np.arange(frames), frames) / rate
     nodes = np.interp(nodes_of(rig, frames), ends, np.append(held, held[-1]))
-    told = run_control(rig, bench.control, nodes, np.repeat(pressures, each))
+    response = run_control(rig, bench.control, nodes, np.repeat(pressures, each))
     first = np.arange(len(forces)) * each + math.ceil((2.0 * pull_s + settle) * rate)
     looks = [first + round(i * GLANCE_s * rate) for i in range(6)]
-    seen = (told.deflection, told.force, told.computed, told.force, told.force, told.deflection)
+    deflection, force = response.deflection, response.force
+    seen = (deflection, force, response.computed, force, force, deflection)
     return np.stack([signal[at] for signal, at in zip(seen, looks, strict=True)])
 
 
@@ -155,19 +153,19 @@ def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) 
     return np.asarray(step * np.round(seen / step) if step > 0.0 else seen)
 
 
-def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
+def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats:
     """Return v₁ as noted, v₂ that brought it back, v₃ as noted and the side, shape (4, nulls)."""
     control = bench.control
     loader = rig.controls[control].loader
     if bench.nulls == 0 or loader.basic_gradient <= 0.0:
         return np.empty((4, 0))
     plain = _without_multiplier(rig, control)
-    spare = SPARE * max(loader.friction, loader.breakaway)
-    forces, sides = _null_forces(rig, bench, spare)
+    allowance = ALLOWANCE * max(loader.friction, loader.breakaway)
+    forces, sides = _null_forces(rig, bench, allowance)
     # From rest each time, and slowly, as the supply is: then friction is the same in both.
     held = np.hstack(
         [
-            _hold(plain, bench, force, _by_way_of(force, side, spare), np.zeros(1), rng, SLOW_s)
+            _hold(plain, bench, force, _by_way_of(force, side, allowance), np.zeros(1), rng, SLOW_s)
             for force, side in zip(forces[:, None], sides, strict=True)
         ]
     )
@@ -178,7 +176,7 @@ def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
 
     def shown(v2: float, side: float) -> float:
         supply = np.array(v2 / scales.s2)
-        rest = rests_at(float(_by_way_of(supply, side, spare)), float(supply))
+        rest = rests_at(float(_by_way_of(supply, side, allowance)), float(supply))
         return float(_reading(np.array(scales.s1 * rest), tools.meter, tools.meter_step, rng))
 
     v2 = [
@@ -189,41 +187,38 @@ def _null(rig: Rig, bench: Bench, rng: np.random.Generator) -> Floats:
     return np.stack((v1, _reading(np.array(v2), tools.meter, tools.meter_step, rng), v3, sides))
 
 
-def _by_way_of(force: Floats, side: float, spare: float) -> Floats:
+def _by_way_of(force: Floats, side: float, allowance: float) -> Floats:
     """Return the force first gone to, N, before one that is approached from a side.
 
     As much of a way outward as inward, so that the hand wanders as long on both.
     """
-    return (1.0 - BEYOND * side) * force + (spare if side < 0.0 else 0.0)
+    return (1.0 - BEYOND * side) * force + (allowance if side < 0.0 else 0.0)
 
 
-def _null_forces(rig: Rig, bench: Bench, spare: float) -> tuple[Floats, Floats]:
+def _null_forces(rig: Rig, bench: CalibrationBench, allowance: float) -> tuple[Floats, Floats]:
     """Return the forces to hold for nulls in N and the sides, every other −1."""
     data = rig.controls[bench.control]
     loader = data.loader
     room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
     side = np.where(np.arange(bench.nulls) % 2 == 0, 1.0, -1.0)
-    most = np.where(side > 0.0, room, (room - spare) / (1.0 + BEYOND))
+    most = np.where(side > 0.0, room, (room - allowance) / (1.0 + BEYOND))
     if np.min(most) <= loader.breakout:  # no room to come back from beyond
         side, most = np.ones(bench.nulls), np.full(bench.nulls, room)
     return np.linspace(0.5, 1.0, bench.nulls) * most, side
 
 
 def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig with v₂ = 0: asked for the gradient that the host believes is basic."""
-    data = rig.controls[control]
-    host, table = data.compensation, data.schedule
-    flat = {
-        "total_gradient": [data.assumed_basic_gradient] * len(table.dynamic_pressure),
-        "second_gradient": None,
-        "break_deflection": 0.0,
-    }
-    changed = {
-        "schedule": table.model_copy(update=flat),
-        "compensation": host.model_copy(update={"gradient": False}),
-    }
-    controls = {**rig.controls, control: data.model_copy(update=changed)}
-    return rig.model_copy(update={"controls": controls})
+    """Return the rig with v₂ = 0: asked for the gradient that the host takes for basic."""
+    data, place, d = rig.controls[control], f"controls.{control}", unit_of(control)
+    return rig.changed(
+        {
+            f"{place}.schedule.total_gradient_N_per_{d}": [data.assumed_basic_gradient]
+            * len(data.schedule.dynamic_pressure),
+            f"{place}.schedule.second_gradient_N_per_{d}": None,
+            f"{place}.schedule.break_deflection_{d}": 0.0,
+            f"{place}.compensation.gradient": False,
+        }
+    )
 
 
 def _turn_until(shown: Callable[[float], float], wanted: float, tools: Instruments) -> float:

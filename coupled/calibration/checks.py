@@ -51,7 +51,7 @@ TOLERANCES: dict[ControlName, Tolerance] = {
 
 
 @dataclass(frozen=True)
-class Check:
+class ControlCheck:
     """One comparison: what, at which q̄ in Pa, measured and reference, allowed deviation, unit.
 
     `margin` is the share of the tolerance that is left, negative where it fails.
@@ -79,16 +79,21 @@ class Check:
         return {**self.__dict__, "margin": self.margin, "passed": self.passed}
 
 
-def legs(told: History) -> list[tuple[Floats, Floats, Floats]]:
+def legs(response: History) -> list[tuple[Floats, Floats, Floats]]:
     """Return (δ, F, surface) of a sweep's four legs, each with δ rising in size."""
-    turn = [0, int(np.argmax(told.deflection)), int(np.argmin(told.deflection)), len(told.force)]
-    neutral = turn[1] + int(np.argmax(told.deflection[turn[1] :] <= 0.0))
+    turn = [
+        0,
+        int(np.argmax(response.deflection)),
+        int(np.argmin(response.deflection)),
+        len(response.force),
+    ]
+    neutral = turn[1] + int(np.argmax(response.deflection[turn[1] :] <= 0.0))
     parts = [slice(0, turn[1]), slice(turn[1], neutral)]
     parts += [slice(neutral, turn[2]), slice(turn[2], turn[3])]
     found = []
     for i, part in enumerate(parts):
         order = slice(None) if i % 2 == 0 else slice(None, None, -1)
-        columns = (told.deflection[part], told.force[part], told.surface[part])
+        columns = (response.deflection[part], response.force[part], response.surface[part])
         found.append(tuple(column[order] for column in columns))
     return [(d, f, s) for d, f, s in found]
 
@@ -123,12 +128,8 @@ def breakout(deflection: Floats, force: Floats, travel: float, straight: float) 
 
 
 def static_checks(
-    rig: Rig,
-    control: ControlName,
-    pressure_Pa: float,
-    felt: History,
-    specified: History,
-) -> list[Check]:
+    rig: Rig, control: ControlName, pressure_Pa: float, felt: History, specified: History
+) -> list[ControlCheck]:
     """Return breakout both ways, and the force where it is nearest to its limit on each leg."""
     found = []
     travel = rig.controls[control].travel
@@ -139,22 +140,20 @@ def static_checks(
             forces = (breakout(d, f, travel, straight), breakout(d0, f0, travel, straight))
             allowed = TOLERANCES[control].breakout_N
             name = f"breakout, {leg.removeprefix('out, ')}"
-            found.append(Check(name, pressure_Pa, *forces, allowed, "N"))
+            found.append(ControlCheck(name, pressure_Pa, *forces, allowed, "N"))
     for (_, f, f0), leg in zip(judged(control, travel, felt, specified), LEGS, strict=True):
         worst = int(np.argmax(np.abs(f - f0) / band(control, f0)))
         allowed = float(band(control, f0)[worst])
-        check = Check(f"force, {leg}", pressure_Pa, float(f[worst]), float(f0[worst]), allowed, "N")
+        check = ControlCheck(
+            f"force, {leg}", pressure_Pa, float(f[worst]), float(f0[worst]), allowed, "N"
+        )
         found.append(check)
     return found
 
 
 def surface_checks(
-    control: ControlName,
-    travel: float,
-    surface_rad: float,
-    pressure_Pa: float,
-    felt: History,
-) -> list[Check]:
+    control: ControlName, travel: float, surface_rad: float, pressure_Pa: float, felt: History
+) -> list[ControlCheck]:
     """Return the surface's position where it is farthest off the deflection's, both ways.
 
     `surface_rad` is the surface's travel for the whole of the control's.
@@ -167,7 +166,7 @@ def surface_checks(
         worst = int(np.argmax(np.abs(moved - asked)))
         name = f"surface, {leg.removeprefix('out, ')}"
         pair = (float(moved[worst]), float(asked[worst]))
-        found.append(Check(name, pressure_Pa, *pair, SURFACE_rad / DEGREE_rad, "°"))
+        found.append(ControlCheck(name, pressure_Pa, *pair, SURFACE_rad / DEGREE_rad, "°"))
     return found
 
 
@@ -220,31 +219,31 @@ def _falls_to(time: Floats, share: Floats, level: float) -> float:
 
 def dynamic_checks(
     pressure_Pa: float, side: str, felt: Release, specified: Release
-) -> Iterator[Check]:
+) -> Iterator[ControlCheck]:
     """Yield the checks of a release: of an underdamped control, or else its fall."""
     now, wanted = swing_of(felt), swing_of(specified)
     if not wanted.peaks.size:
         allowed = TIME_SHARE * wanted.fall_s
         name = f"90 % to 10 %, {side}"
-        yield Check(name, pressure_Pa, now.fall_s, wanted.fall_s, allowed, "s")
+        yield ControlCheck(name, pressure_Pa, now.fall_s, wanted.fall_s, allowed, "s")
         height = 100.0 * float(np.max(now.peaks, initial=0.0))
-        yield Check(f"overshoot, {side}", pressure_Pa, height, 0.0, 100.0 * COUNTED, "%")
+        yield ControlCheck(f"overshoot, {side}", pressure_Pa, height, 0.0, 100.0 * COUNTED, "%")
         return
     first = wanted.crossings[0]
     crossed = float(now.crossings[0]) if now.crossings.size else float("inf")
     name = f"first zero crossing, {side}"
-    yield Check(name, pressure_Pa, crossed, float(first), TIME_SHARE * float(first), "s")
+    yield ControlCheck(name, pressure_Pa, crossed, float(first), TIME_SHARE * float(first), "s")
     count = (float(len(now.peaks)), float(len(wanted.peaks)))
     counted = min(len(now.crossings), len(wanted.crossings), len(wanted.peaks) + 1)
     for n in range(1, (counted + 1) // 2):
         periods = (_period(now, n), _period(wanted, n))
         allowed = TIME_SHARE * (n + 1) * periods[1]
-        yield Check(f"period {n}, {side}", pressure_Pa, *periods, allowed, "s")
+        yield ControlCheck(f"period {n}, {side}", pressure_Pa, *periods, allowed, "s")
     for n, peak in enumerate(wanted.peaks):
         height = float(now.peaks[n]) if n < len(now.peaks) else 0.0
         pair, allowed = (100.0 * height, 100.0 * float(peak)), 10.0 * float(wanted.peaks[0])
-        yield Check(f"overshoot {n + 1}, {side}", pressure_Pa, *pair, allowed, "%")
-    yield Check(f"overshoots above 5 %, {side}", pressure_Pa, *count, 1.0, "")
+        yield ControlCheck(f"overshoot {n + 1}, {side}", pressure_Pa, *pair, allowed, "%")
+    yield ControlCheck(f"overshoots above 5 %, {side}", pressure_Pa, *count, 1.0, "")
 
 
 def _period(swing: Swing, n: int) -> float:

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coupled.calibration.belief import Scales, real_scales
-from coupled.calibration.bench import Bench, take_readings
-from coupled.calibration.calibrate import Result, calibrate
-from coupled.calibration.outcome import deflection_off, felt_off
+from coupled.calibration.accuracy import deflection_off, felt_off
+from coupled.calibration.assumed import Scales, real_scales
+from coupled.calibration.bench import CalibrationBench, take_readings
+from coupled.calibration.calibrate import calibrate_control
+from coupled.calibration.result import CalibrationResult
+from coupled.parallel import executor
 from coupled.rig.parameters import Control
 
 Progress = Callable[[str, int, int], None]
 FIGURES = ("K", "S1", "S3", "S2")
 NEAR = 0.05
+DEFLECTION_WITHIN, FELT_WITHIN = 0.005, 0.01  # what a compensated rig is to reach
 _BLOCK = 25
 
 
@@ -52,83 +53,102 @@ class Coverage:
         return dict(self.__dict__)
 
 
+@dataclass(frozen=True)
+class Trial:
+    """One bench, fitted, against the truth; figures K, S1, S3 and S2 by name.
+
+    `held` whether each figure's interval holds the truth, None where it was not found;
+    `bend_off` and `ordinary_off` K's relative errors; `deflection_off` and `felt_off` how far
+    off δ̂ and the felt gradient are, as shares, where most so.
+    """
+
+    held: Mapping[str, bool | None]
+    bend_off: float
+    ordinary_off: float
+    ordinary_held: bool
+    accused: bool
+    deflection_off: float
+    felt_off: float
+
+
 def measure_coverage(
-    bench: Bench, benches: int, seed: int = 0, workers: int = 1, progress: Progress | None = None
+    bench: CalibrationBench,
+    benches: int,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Progress | None = None,
 ) -> Coverage:
     """Return how often intervals from benches with seeds `seed` and on hold the truth."""
     blocks = [
-        (bench, range(first, min(first + _BLOCK, seed + benches)))
+        range(first, min(first + _BLOCK, seed + benches))
         for first in range(seed, seed + benches, _BLOCK)
     ]
-    rows: list[list[float]] = []
-    for block in _done(blocks, workers):
-        rows += block
-        if progress is not None:
-            progress("benches", len(rows), benches)
-    table = np.array(rows)
-    held, k, plain = table[:, : len(FIGURES)], table[:, -6], table[:, -5]
-    deflection, felt = (np.abs(table[:, -2]) <= 0.005, np.abs(table[:, -1]) <= 0.01)
+    trials: list[Trial] = []
+    with executor(workers) as pool:
+        for block in pool.map(partial(_block, bench), blocks):
+            trials += block
+            if progress is not None:
+                progress("benches", len(trials), benches)
+    bend = [trial.bend_off for trial in trials]
+    plain = [trial.ordinary_off for trial in trials]
+    deflection = np.array([trial.deflection_off for trial in trials]) <= DEFLECTION_WITHIN
+    felt = np.array([trial.felt_off for trial in trials]) <= FELT_WITHIN
     return Coverage(
         benches,
-        dict(zip(FIGURES, _means(held), strict=True)),
-        float(np.mean(np.abs(k) <= NEAR)),
-        float(np.mean(k)),
-        float(np.std(k)),
-        float(np.mean(table[:, -4])),
+        {figure: _share(trial.held[figure] for trial in trials) for figure in FIGURES},
+        float(np.mean(np.abs(bend) <= NEAR)),
+        float(np.mean(bend)),
+        float(np.std(bend)),
+        _share(trial.ordinary_held for trial in trials),
         float(np.mean(plain)),
         float(np.std(plain)),
-        float(np.mean(table[:, -3])),
+        _share(trial.accused for trial in trials),
         float(np.mean(deflection)),
         float(np.mean(felt)),
         float(np.mean(deflection & felt)),
     )
 
 
-def _means(held: NDArray[np.float64]) -> list[float]:
-    """Return the mean of each column, NaN for one that was never found."""
-    return [float(np.mean(c[~np.isnan(c)])) if np.any(~np.isnan(c)) else np.nan for c in held.T]
+def _share(held: Iterable[bool | None]) -> float:
+    """Return the share that hold, of those that could be had; NaN for none."""
+    had = [one for one in held if one is not None]
+    return float(np.mean(had)) if had else float("nan")
 
 
-def _done(blocks: list[tuple[Bench, range]], workers: int) -> Iterator[list[list[float]]]:
-    if workers <= 1:
-        yield from map(_block, blocks)
-        return
-    own = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=own) as pool:
-        yield from pool.map(_block, blocks)
+def _block(bench: CalibrationBench, seeds: range) -> list[Trial]:
+    return [_trial(bench, seed) for seed in seeds]
 
 
-def _block(block: tuple[Bench, range]) -> list[list[float]]:
-    bench, seeds = block
-    return [_one(bench, seed) for seed in seeds]
-
-
-def _one(bench: Bench, seed: int) -> list[float]:
-    """Return whether each figure was covered, K's relative errors, and false accusations."""
+def _trial(bench: CalibrationBench, seed: int) -> Trial:
     data = bench.rig.controls[bench.control]
     readings = take_readings(bench, seed)
-    found = calibrate(readings, data, bench.control, bench.instruments, f"bench {seed}")
-    scales, bend = real_scales(data), data.loader.bend
-    pairs = [(found.line.bend, bend), (found.line.s1, scales.s1), (found.s3, scales.s3)]
-    held = [float(e.low <= true <= e.high) for e, true in pairs]
-    s2 = found.s2_chosen
-    held.append(float("nan") if s2 is None else float(s2.low <= scales.s2 <= s2.high))
-    plain = found.plain.bend
-    errors = [found.line.bend.value / bend - 1.0, plain.value / bend - 1.0]
-    errors += [float(plain.low <= bend <= plain.high), float(bool(found.suspects))]
-    return [*held, *errors, *_circle(found, data)]
+    found = calibrate_control(readings, data, bench.control, bench.instruments, f"bench {seed}")
+    true, bend = real_scales(data), data.loader.bend
+    s2, plain = found.s2_chosen, found.plain.bend
+    return Trial(
+        {
+            "K": found.line.bend.holds(bend),
+            "S1": found.line.s1.holds(true.s1),
+            "S3": found.s3.holds(true.s3),
+            "S2": None if s2 is None else s2.holds(true.s2),
+        },
+        found.line.bend.value / bend - 1.0,
+        plain.value / bend - 1.0,
+        plain.holds(bend),
+        bool(found.suspects),
+        *_most_off(found, data),
+    )
 
 
-def _circle(found: Result, data: Control) -> tuple[float, float]:
+def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
     """Return how far δ̂ and the felt gradient are off, as shares, where most so."""
     true, bend = real_scales(data), data.loader.bend
     k, s2 = found.line.bend.value, found.s2_chosen
-    believed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)
-    table = data.schedule.total_gradient
-    pairs = []
-    for g in np.linspace(min(table), max(table), 3):
-        off = deflection_off(believed, k, true, bend, float(g))
-        basic = data.loader.basic_gradient
-        pairs.append((off, felt_off(believed.s2 / true.s2, k, bend, (float(g), basic))))
-    deflection, felt = np.max(np.abs(pairs), axis=0)
-    return float(deflection), float(felt)
+    assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)
+    table, basic = data.schedule.total_gradient, data.loader.basic_gradient
+    gradients = [float(g) for g in np.linspace(min(table), max(table), 3)]
+    ratio = assumed.s2 / true.s2
+    return (
+        max(abs(deflection_off(assumed, k, true, bend, g)) for g in gradients),
+        max(abs(felt_off(ratio, k, bend, (g, basic))) for g in gradients),
+    )

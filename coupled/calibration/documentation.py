@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from coupled.calibration.checks import Check, dynamic_checks, static_checks, surface_checks
+from coupled.calibration.checks import ControlCheck, dynamic_checks, static_checks, surface_checks
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.manoeuvre import configure
@@ -41,7 +41,7 @@ class Documentation:
     rig: Rig
     control: ControlName
     conditions: tuple[Condition, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[ControlCheck, ...]
     surface_rad: float | None
 
 

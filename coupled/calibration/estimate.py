@@ -38,6 +38,10 @@ class Estimate:
         """Upper end of the interval."""
         return self.value + self.half_width
 
+    def holds(self, true: float) -> bool:
+        """Return whether the interval holds a value."""
+        return self.low <= true <= self.high
+
     def scaled(self, factor: float) -> Estimate:
         """Return the estimate in another unit."""
         return Estimate(factor * self.value, abs(factor) * self.error, self.freedom)

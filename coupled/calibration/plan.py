@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from coupled.calibration.belief import real_scales
+from coupled.calibration.assumed import real_scales
 from coupled.calibration.errors_in_variables import expected_design
 from coupled.calibration.estimate import Estimate, Instruments
 from coupled.calibration.readings import readings_of

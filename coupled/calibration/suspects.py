@@ -18,9 +18,9 @@ from coupled.calibration.fit import error_variance
 from coupled.calibration.readings import Readings
 
 Floats = NDArray[np.float64]
-FEWEST = 5  # readings below which nothing can be told apart
+FEWEST = 5  # readings below which no reading can be called far off
 MOST_PAIRS = 400
-APART = 0.3  # of the greatest angle between two readings' (δ, F)
+LEAST_TURN = 0.3  # of the greatest angle between two readings' (δ, F)
 BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
 TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
 SLIP = 1e-4  # of the largest value: no mistyped digit is smaller
@@ -94,7 +94,7 @@ def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
     one, two = unit[pairs[:, 0]], unit[pairs[:, 1]]
     turn = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
     turn /= np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1) + 1e-300
-    pairs = pairs[turn >= APART * turn.max()]
+    pairs = pairs[turn >= LEAST_TURN * turn.max()]
     if len(pairs) > MOST_PAIRS:
         pairs = np.random.default_rng(0).choice(pairs, MOST_PAIRS, replace=False)
     betas = np.linalg.solve(design[pairs], target[pairs][:, :, None])[:, :, 0]

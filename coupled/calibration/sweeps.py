@@ -86,14 +86,14 @@ def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> 
     nodes[:held_nodes] = force * pull[:held_nodes]
     friction = max(rig.controls[control].loader.friction, rig.controls[control].loader.breakaway)
     nodes[:held_nodes] += side * friction * pull[:held_nodes]
-    told = run_control(rig, control, nodes, np.full(frames, pressure_Pa))
-    start = float(told.deflection[last])
-    time_s = told.time_s[last:] - told.time_s[last]
-    return Release(time_s, told.deflection[last:], start)
+    response = run_control(rig, control, nodes, np.full(frames, pressure_Pa))
+    start = float(response.deflection[last])
+    time_s = response.time_s[last:] - response.time_s[last]
+    return Release(time_s, response.deflection[last:], start)
 
 
 def _finely_read(rig: Rig, control: ControlName) -> Rig:
     """Return the rig read a thousand times a second, unless its frame makes the product."""
     if rig.controls[control].loader.multiplier == "digital":
         return rig
-    return rig.model_copy(update={"frame_rate": max(rig.frame_rate, FINE_Hz)})
+    return rig.changed({"frame_rate_Hz": max(rig.frame_rate, FINE_Hz)})

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import polars as pl
 
 from coupled.authority.compare import Flight, compare
 from coupled.campaign.verdict import UnjudgedError, Verdict, judge_expectation
@@ -15,12 +18,50 @@ from coupled.flight.runfile import read_run
 Progress = Callable[[str, int, int], None]
 
 
+@dataclass(frozen=True)
+class CheckResult:
+    """The verdicts on runs, in the order of their expectations."""
+
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every expectation holds."""
+        return all(verdict.passed for verdict in self.verdicts)
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a verdict; a figure and its bounds are in the unit of what is looked at."""
+        return pl.DataFrame(
+            [verdict.as_dict() for verdict in self.verdicts], infer_schema_length=None
+        )
+
+
+def check(
+    runs: str | Path | Sequence[str | Path | Sequence[Manoeuvre]],
+    progress: Progress | None = None,
+) -> CheckResult:
+    """Fly runs and hold them against what they expect.
+
+    `runs` is a run file, the name of a shipped one, or several; a run may be given as its
+    cases, too. Only what the expectations look at is flown. `progress` is called with what is
+    flown, frames done and frames in all. Raises InputError for a run that expects nothing.
+    """
+    several = [runs] if isinstance(runs, (str, Path)) else runs
+    read = [
+        read_expecting(str(r)) if isinstance(r, (str, Path)) else _expecting(r) for r in several
+    ]
+    return CheckResult(tuple(v for scenarios in read for v in check_run(scenarios, progress)))
+
+
 def read_expecting(name: str) -> list[Manoeuvre]:
     """Return the cases of a run that expects something; to check any other says nothing."""
-    scenarios = read_run(name)
+    return _expecting(read_run(name))
+
+
+def _expecting(scenarios: Sequence[Manoeuvre]) -> list[Manoeuvre]:
     if not scenarios[0].expect:
         raise InputError(scenarios[0].file, "expect", "there is none: nothing could fail")
-    return scenarios
+    return list(scenarios)
 
 
 def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) -> list[Verdict]:

@@ -1,7 +1,8 @@
-"""The journal of a sweep's folder: a row a flight, on the disk before the next is counted.
+"""The journal of a sweep's folder: a line a flight, on the disk before the next is counted.
 
 Lines of JSON, the first of them the sweep's identity. A line cut short by a kill is dropped,
-and its flight flown again. One process at a time holds a folder; a killed one lets go.
+and its flight flown again. One process at a time holds a folder; a killed one lets go, and
+what it left half written is cleared by the next.
 """
 
 from __future__ import annotations
@@ -12,21 +13,30 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
+from coupled.campaign.entry import JournalEntry, read_entry
+from coupled.campaign.plan import SweepPlan
 from coupled.errors import InputError
+from coupled.files import clear
 
 JOURNAL = "flights.jsonl"
-Row = dict[str, Any]
+LOCK = ".lock"
+UNFINISHED = ".coupled-"  # what `files` makes begins so until it is whole
 
 
 class Journal:
-    """The rows of the flights that are done; in memory only their numbers, `done`."""
+    """The flights that are done; in memory only their numbers, `done`."""
 
-    def __init__(self, folder: Path, identity: str) -> None:
+    def __init__(self, folder: Path, plan: SweepPlan) -> None:
         self.path = folder / JOURNAL
         self.done: set[int] = set()
-        self._read(identity)
+        self._columns = plan.columns
+        self._read(plan.identity)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every flight of the sweep is done."""
+        return len(self.done) == self._columns.flights
 
     def _read(self, identity: str) -> None:
         header = json.dumps({"sweep": identity}) + "\n"
@@ -44,21 +54,29 @@ class Journal:
                 "",
                 "holds another sweep, or what this one reads has changed since; give a new folder",
             )
-        self.done = {json.loads(line)["flight"] for line in lines}
+        for number, line in enumerate(lines, 2):
+            flight = self._entry(line, number).flight
+            if flight in self.done:
+                problem = f"duplicate flight {flight}; take one of the lines out"
+                raise InputError(self.path, f"line {number}", problem)
+            self.done.add(flight)
         with self.path.open("r+b") as file:
             file.truncate(len(whole))
 
-    def add(self, row: Row) -> None:
-        """Keep a row: it is on the disk when this returns."""
-        self._write(json.dumps(row, ensure_ascii=False) + "\n", "ab")
-        self.done.add(row["flight"])
+    def add(self, entry: JournalEntry) -> None:
+        """Keep a flight: it is on the disk when this returns."""
+        self._write(entry.line(self._columns) + "\n", "ab")
+        self.done.add(entry.flight)
 
-    def rows(self) -> list[Row]:
-        """Return the rows, in the order of the flights, as they were written."""
+    def entries(self) -> list[JournalEntry]:
+        """Return the flights in the order of their numbers, as they were written."""
         with self.path.open(encoding="utf-8") as lines:
             next(lines)
-            found = [json.loads(line) for line in lines]
-        return sorted(found, key=lambda row: int(row["flight"]))
+            found = [self._entry(line, number) for number, line in enumerate(lines, 2)]
+        return sorted(found, key=lambda entry: entry.flight)
+
+    def _entry(self, line: str, number: int) -> JournalEntry:
+        return read_entry(line, self._columns, self.path, f"line {number}")
 
     def _write(self, text: str, mode: str) -> None:
         try:
@@ -72,14 +90,14 @@ class Journal:
 
 
 @contextmanager
-def opened(folder: Path, identity: str) -> Iterator[Journal]:
-    """Give the journal of a folder, made if need be, to this process alone."""
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / JOURNAL).exists():
+def opened(folder: Path, plan: SweepPlan) -> Iterator[Journal]:
+    """Give the journal of a sweep's folder, made if need be, to this process alone."""
+    if folder.is_dir() and _foreign(folder) and not (folder / JOURNAL).exists():
         raise InputError(folder, "", "is not empty, and holds no sweep; give a new folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # SQLite's lock works on every system, and is the kernel's: nothing is left by a kill.
-        lock = sqlite3.connect(folder / ".lock", timeout=0.0, isolation_level=None)
+        lock = sqlite3.connect(folder / LOCK, timeout=0.0, isolation_level=None)
     except (OSError, sqlite3.Error):
         raise InputError(folder, "", "cannot be written there") from None
     try:
@@ -87,13 +105,21 @@ def opened(folder: Path, identity: str) -> Iterator[Journal]:
             lock.execute("BEGIN EXCLUSIVE")
         except sqlite3.Error:
             raise InputError(folder, "", "another sweep is writing there") from None
-        yield _journal(folder, identity)
+        journal = _journal(folder, plan)
+        clear(folder)
+        yield journal
     finally:
         lock.close()
 
 
-def _journal(folder: Path, identity: str) -> Journal:
+def _foreign(folder: Path) -> bool:
+    """Return whether a folder holds what no sweep that was killed early has left."""
+    names = (path.name for path in folder.iterdir())
+    return any(name != LOCK and not name.startswith(UNFINISHED) for name in names)
+
+
+def _journal(folder: Path, plan: SweepPlan) -> Journal:
     try:
-        return Journal(folder, identity)
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError):
+        return Journal(folder, plan)
+    except (OSError, UnicodeDecodeError):
         raise InputError(folder / JOURNAL, "", "cannot be read back; give a new folder") from None

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
-from coupled.campaign.verdict import Verdict
-from coupled.campaign.words import finding
+from coupled.campaign.verdict import Verdict, finding
 
 _NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -33,8 +32,10 @@ def junit_xml(verdicts: Sequence[Verdict]) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
-def _element(parent: ElementTree.Element | None, tag: str, **words: str) -> ElementTree.Element:
-    allowed = {key: _NO_XML.sub("?", word) for key, word in words.items()}
+def _element(
+    parent: ElementTree.Element | None, tag: str, **attributes: str
+) -> ElementTree.Element:
+    allowed = {key: _NO_XML.sub("?", text) for key, text in attributes.items()}
     if parent is None:
         return ElementTree.Element(tag, allowed)
     return ElementTree.SubElement(parent, tag, allowed)

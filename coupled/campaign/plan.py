@@ -10,7 +10,7 @@ import copy
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -19,62 +19,23 @@ from typing import Any, Literal
 
 import numpy as np
 
+from coupled.campaign.entry import Columns
 from coupled.campaign.points import grid_size, points
+from coupled.campaign.sweepfile import MOST_FLIGHTS, Survive, SweepFile, Vary
 from coupled.errors import InputError, nearest
 from coupled.files import sha256
-from coupled.flight.expectation import Figure
 from coupled.flight.loop import input_files, make_airframe
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import manoeuvres_from_table
 from coupled.resources import find, shipped_runs
-from coupled.rig.parameters import PLAIN_NAME
 from coupled.rig.rigfile import change
-from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
+from coupled.schema import Section, build, file_keys, known_keys, load_toml
 
-MOST_FLIGHTS = 1_000_000
 _NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_properties")
-FIGURES: tuple[Figure, ...] = ("loss", "felt_ratio", "force_N", "peak_rate_rad_per_s")
-
-
-class Vary(Section):
-    """A parameter and its values: a list, or a range. `also` are keys that go with it."""
-
-    key: str = quantity("", min_length=1, max_length=200)
-    also: list[str] = []
-    values: list[Any] | None = quantity("", None, min_length=1)
-    low: float | None = None
-    high: float | None = None
-    steps: int | None = quantity("", None, ge=2, le=10_000)
-    spread: Literal["even", "log"] = "even"
-
-
-class Survive(Section):
-    """What a flight has to keep to be survived: a channel within bounds, in every row."""
-
-    channel: str = quantity("", min_length=1)
-    least: float | None = None
-    most: float | None = None
-
-
-class SweepFile(Section):
-    """The keys of a sweep file."""
-
-    name: str = quantity("", pattern=PLAIN_NAME)
-    run: str = quantity("", min_length=1)
-    case: str | None = None
-    configurations: list[Configuration] = []
-    method: Literal["grid", "sobol", "random", "sensitivity"] = "grid"
-    samples: int | None = quantity("", None, ge=1, le=MOST_FLIGHTS)
-    seed: int = quantity("", 0, ge=0)
-    reseed: bool = False
-    keep: list[Figure] = quantity("", list(FIGURES), min_length=1)
-    extremes: list[str] = []
-    survive: list[Survive] = []
-    vary: list[Vary] = quantity("", min_length=1)
 
 
 @dataclass(frozen=True)
-class Job:
+class PlannedFlight:
     """One flight of a sweep: its number, what is changed, and the run's noise seed if it has one.
 
     `configuration` is empty for the rig as its file says.
@@ -87,7 +48,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """A sweep, ready to fly: `table` are the tables of the run's file."""
 
     sweep: SweepFile
@@ -101,14 +62,29 @@ class Plan:
         """The keys that vary, one a parameter."""
         return [vary.key for vary in self.sweep.vary]
 
+    @property
+    def columns(self) -> Columns:
+        """What the sweep's journal and table hold."""
+        sweep = self.sweep
+        figures = (*sweep.keep, *extreme_names(sweep.extremes))
+        return Columns(tuple(self.keys), figures, bool(sweep.survive), flight_count(sweep))
+
     def scenario(self, changes: Mapping[str, Any]) -> Manoeuvre:
         """Return the run's case with values changed, by their dotted keys."""
         return _changed(self.table, self.run_file, self.sweep.case, changes)
 
 
-def read_plan(file: Path) -> Plan:
+def read_plan(file: Path) -> SweepPlan:
     """Return the sweep of a file, every value tried, the run's own faults blamed on the run."""
-    table = load_toml(file)
+    return plan_from_table(load_toml(file), file)
+
+
+def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
+    """Return the sweep of a file's tables; `file` is named in faults.
+
+    A run that is named by a relative path is sought beside it first.
+    """
+    table = dict(given)
     known_keys(table, file_keys(SweepFile, "m"), file, "")
     kinds: dict[str, type[Section]] = {"vary": Vary, "survive": Survive}
     for key, kind in kinds.items():
@@ -137,12 +113,12 @@ def read_plan(file: Path) -> Plan:
         if channel not in base.channels:
             hint = nearest(channel, base.channels)
             raise InputError(file, key, f"no channel {channel!r}; {hint}")
-    return Plan(sweep, file, run_file, run_table, _identity(sweep, files))
+    return SweepPlan(sweep, file, run_file, run_table, _identity(sweep, files))
 
 
-def jobs(plan: Plan) -> list[Job]:
+def planned_flights(plan: SweepPlan) -> list[PlannedFlight]:
     """Return every flight of a sweep; the same file gives the same flights."""
-    sweep, found = plan.sweep, list[Job]()
+    sweep, found = plan.sweep, list[PlannedFlight]()
     configurations: list[Any] = list(sweep.configurations) or [""]
     for i, values in enumerate(points(sweep)):
         changes = {
@@ -152,7 +128,7 @@ def jobs(plan: Plan) -> list[Job]:
         }
         seed = int(np.random.default_rng([sweep.seed, i]).integers(2**31)) if sweep.reseed else None
         for configuration in configurations:
-            found.append(Job(len(found), changes, configuration, seed))
+            found.append(PlannedFlight(len(found), changes, configuration, seed))
     return found
 
 
@@ -185,7 +161,7 @@ def _check_values(sweep: SweepFile, file: Path) -> None:
     for name, words in lists.items():
         for word in words:
             if words.count(word) > 1:
-                raise InputError(file, name, f"{word} stands there twice")
+                raise InputError(file, name, f"duplicate {word}")
     for key in keys:
         if key.partition(".")[0] in _NO_CONDITION:
             raise InputError(file, "vary", f"{key} changes no flight")
@@ -202,11 +178,20 @@ def _check_size(sweep: SweepFile, file: Path) -> None:
     if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
         near = 2 ** max(3, round(math.log2(samples)))
         raise InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
-    flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
-    if sweep.method == "sensitivity":
-        flights *= len(sweep.vary) + 2
+    flights = flight_count(sweep)
     if flights > MOST_FLIGHTS:
         raise InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
+
+
+def flight_count(sweep: SweepFile) -> int:
+    """Return how many flights a sweep has."""
+    flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
+    return flights * (len(sweep.vary) + 2) if sweep.method == "sensitivity" else flights
+
+
+def extreme_names(channels: Sequence[str]) -> list[str]:
+    """Return the figures that the least and greatest values of channels are kept as."""
+    return [f"{which}_{name}" for name in channels for which in ("least", "greatest")]
 
 
 def _check_range(sweep: SweepFile, vary: Vary, place: str, file: Path) -> None:
@@ -229,18 +214,38 @@ def _check_keys(
     for i, vary in enumerate(sweep.vary):
         values = vary.values if vary.values is not None else [vary.low, vary.high]
         for value in values:
-            changes = dict.fromkeys((vary.key, *vary.also), value)
             try:
-                scenario = try_changes(changes)
+                scenario = try_changes(dict.fromkeys((vary.key, *vary.also), value))
                 if value is values[0] and "flight.properties." in vary.key:
                     _check_property(scenario, vary.key)
             except InputError as error:
-                where = error.key.removeprefix("case[0].")
-                named = "" if where == "" or where.endswith(vary.key) else f"{where}: "
-                problem = f"{vary.key} = {value!r}: {named}{error.problem}"
-                raise InputError(file, f"vary[{i}]", problem) from None
+                raise _blamed(vary, i, value, error, file, try_changes) from None
             files |= set(input_files(scenario))
     return files
+
+
+def _blamed(
+    vary: Vary,
+    index: int,
+    value: Any,
+    error: InputError,
+    file: Path,
+    try_changes: Callable[[dict[str, Any]], Manoeuvre],
+) -> InputError:
+    """Return the fault of a value, blamed on the one of its keys that cannot have it."""
+    key = next((k for k in (vary.key, *vary.also) if error.key.endswith(k)), "")
+    if not key and vary.also:
+        for each in (vary.key, *vary.also):
+            try:
+                try_changes({each: value})
+            except InputError as own:
+                key, error = each, own
+                break
+    key = key or vary.key
+    where = error.key.removeprefix("case[0].")
+    named = "" if where == "" or where.endswith(key) else f"{where}: "
+    place = f"vary[{index}]" if key == vary.key else f"vary[{index}].also"
+    return InputError(file, place, f"{key} = {value!r}: {named}{error.problem}")
 
 
 def _check_property(scenario: Manoeuvre, key: str) -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from coupled.campaign.sensitivity import design
-
-if TYPE_CHECKING:
-    from coupled.campaign.plan import SweepFile, Vary
+from coupled.campaign.sweepfile import SweepFile, Vary
 
 Floats = NDArray[np.float64]
 

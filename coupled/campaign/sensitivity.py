@@ -31,22 +31,40 @@ _CONSTANT = 1e-9  # of the largest value: a figure that spreads by less does not
 
 
 @dataclass(frozen=True)
-class Index:
-    """What one parameter does to one figure, with 95 % intervals; None where nothing varies.
+class VarianceShare:
+    """A share of a figure's variance, with its 95 % interval."""
 
-    `points` is how many of the sampled points it is made from.
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class SobolIndex:
+    """What one parameter does to one figure: alone (`first`), and with others (`total`).
+
+    None where nothing varies. `points` is how many of the sampled points it is made from.
     """
 
     configuration: str
     figure: str
     key: str
-    first: float | None
-    first_low: float | None
-    first_high: float | None
-    total: float | None
-    total_low: float | None
-    total_high: float | None
+    first: VarianceShare | None
+    total: VarianceShare | None
     points: int
+
+    def as_dict(self) -> dict[str, str | int | float | None]:
+        """Return it as JSON and CSV take it."""
+        row: dict[str, str | int | float | None] = {
+            "configuration": self.configuration,
+            "figure": self.figure,
+            "key": self.key,
+        }
+        for name, share in (("first", self.first), ("total", self.total)):
+            row[name] = None if share is None else share.value
+            row[f"{name}_low"] = None if share is None else share.low
+            row[f"{name}_high"] = None if share is None else share.high
+        return {**row, "points": self.points}
 
 
 def design(samples: int, parameters: int, seed: int) -> Floats:
@@ -78,37 +96,44 @@ def sobol(values: Floats) -> tuple[Floats, Floats]:
 
 def sensitivity(
     found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str], samples: int
-) -> list[Index]:
+) -> list[SobolIndex]:
     """Return the indices of a sweep's table, by configuration, figure and parameter."""
-    told = []
+    indices = []
     for configuration in found["configuration"].unique(maintain_order=True):
         rows = found.filter(pl.col("configuration") == configuration).sort("flight")
         for figure in figures:
             values = rows[figure].fill_null(float("nan")).to_numpy().reshape(-1, samples)
             whole = values[:, np.isfinite(values).all(axis=0)]
-            told += _of_figure(str(configuration), figure, keys, whole)
-    return told
+            indices += _of_figure(str(configuration), figure, keys, whole)
+    return indices
 
 
-def _of_figure(configuration: str, figure: str, keys: Sequence[str], values: Floats) -> list[Index]:
+def _of_figure(
+    configuration: str, figure: str, keys: Sequence[str], values: Floats
+) -> list[SobolIndex]:
     points = values.shape[1]
     if points < _LEAST_POINTS or np.ptp(values) <= _CONSTANT * float(np.max(np.abs(values))):
-        nothing = (None, None, None)
-        return [Index(configuration, figure, key, *nothing, *nothing, points) for key in keys]
+        return [SobolIndex(configuration, figure, key, None, None, points) for key in keys]
     rng = np.random.default_rng(points)
     again = [sobol(values[:, rng.integers(points, size=points)]) for _ in range(_RESAMPLED)]
-    # For each parameter the index, its low and its high bound.
     first, total = (
-        np.vstack((whole, np.quantile([one[i] for one in again], [0.025, 0.975], axis=0))).T
-        for i, whole in enumerate(sobol(values))
+        _shares(whole, np.array([one[i] for one in again])) for i, whole in enumerate(sobol(values))
     )
-    found = np.hstack((first, total)).tolist()
     return [
-        Index(configuration, figure, key, a, a_low, a_high, b, b_low, b_high, points)
-        for key, (a, a_low, a_high, b, b_low, b_high) in zip(keys, found, strict=True)
+        SobolIndex(configuration, figure, key, alone, together, points)
+        for key, alone, together in zip(keys, first, total, strict=True)
     ]
 
 
-def write_indices(told: Sequence[Index], path: Path) -> None:
+def _shares(whole: Floats, resampled: Floats) -> list[VarianceShare]:
+    """Return each parameter's index with its interval, of (resamples, parameters)."""
+    low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
+    return [
+        VarianceShare(float(value), float(least), float(most))
+        for value, least, most in zip(whole, low, high, strict=True)
+    ]
+
+
+def write_indices(indices: Sequence[SobolIndex], path: Path) -> None:
     """Write the indices as CSV, a row an index, whole."""
-    write_whole(path, pl.DataFrame(told).write_csv)
+    write_whole(path, pl.DataFrame([index.as_dict() for index in indices]).write_csv)

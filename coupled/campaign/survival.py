@@ -7,18 +7,18 @@ the mildest flight, which stays nearest to its trim.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import polars as pl
 
-from coupled.campaign.sweep import SURVIVED
+from coupled.campaign.entry import SURVIVED
 
 RIGID, LOSS = "rigid", "loss_closed_form"
 
 
 @dataclass(frozen=True)
-class Limit:
+class SurvivalLimit:
     """What a configuration survives of the values of one key.
 
     `shares` are (value, share of its flights that are survived); `boundary` lies midway between
@@ -27,14 +27,14 @@ class Limit:
     """
 
     configuration: str
-    shares: list[tuple[float, float]]
+    shares: tuple[tuple[float, float], ...]
     flights: int
     survived: int
     boundary: float | None
     predicted: float | None = None
 
 
-def limits(found: pl.DataFrame, key: str) -> list[Limit]:
+def limits(found: pl.DataFrame, key: str) -> list[SurvivalLimit]:
     """Return the limit of each configuration against a varied key with numbers."""
     made = [_limit(found, key, name) for name in found["configuration"].unique(maintain_order=True)]
     rigid = next((limit.boundary for limit in made if limit.configuration == RIGID), None)
@@ -43,11 +43,11 @@ def limits(found: pl.DataFrame, key: str) -> list[Limit]:
     return [_with_prediction(found, key, limit, rigid) for limit in made]
 
 
-def _limit(found: pl.DataFrame, key: str, configuration: str) -> Limit:
+def _limit(found: pl.DataFrame, key: str, configuration: str) -> SurvivalLimit:
     rows = found.filter(pl.col("configuration") == configuration)
     alive = rows.with_columns(pl.col(SURVIVED).fill_null(value=False).cast(pl.Float64))
     table = alive.group_by(key).agg(pl.col(SURVIVED).mean()).sort(key)
-    shares = list(zip(table[key].to_list(), table[SURVIVED].to_list(), strict=True))
+    shares = tuple(zip(table[key].to_list(), table[SURVIVED].to_list(), strict=True))
     steps = [
         0.5 * (before[0] + after[0])
         for before, after in pairwise(shares)
@@ -55,10 +55,12 @@ def _limit(found: pl.DataFrame, key: str, configuration: str) -> Limit:
     ]
     survived = int(alive[SURVIVED].sum())
     boundary = steps[0] if len(steps) == 1 else None
-    return Limit(configuration, shares, len(rows), survived, boundary)
+    return SurvivalLimit(configuration, shares, len(rows), survived, boundary)
 
 
-def _with_prediction(found: pl.DataFrame, key: str, limit: Limit, rigid: float) -> Limit:
+def _with_prediction(
+    found: pl.DataFrame, key: str, limit: SurvivalLimit, rigid: float
+) -> SurvivalLimit:
     """Add where the closed form has the boundary."""
     if limit.boundary is None or limit.configuration == RIGID:
         return limit
@@ -67,4 +69,4 @@ def _with_prediction(found: pl.DataFrame, key: str, limit: Limit, rigid: float) 
     if not len(lost):
         return limit
     predicted = rigid * (1.0 - float(lost[-1]))
-    return Limit(**{**limit.__dict__, "predicted": predicted})
+    return replace(limit, predicted=predicted)

@@ -25,7 +25,7 @@ from coupled.errors import InputError
 from coupled.files import check_target
 
 if TYPE_CHECKING:
-    from coupled.calibration.bench import Bench
+    from coupled.calibration.bench import CalibrationBench
 
 
 @app.command(
@@ -63,7 +63,7 @@ def bench(
     json_file: JsonOption = "",
 ) -> None:
     """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does."""
-    from coupled.calibration.bench import Bench, take_readings
+    from coupled.calibration.bench import CalibrationBench, take_readings
     from coupled.calibration.estimate import perfect_instruments
     from coupled.calibration.plan import fewest, stations
     from coupled.calibration.readingsfile import write_readings
@@ -81,7 +81,9 @@ def bench(
     if precision is not None:
         planned = fewest(data, name, tools, precision / 100.0, strongest, 1 if once else 2)
         grid = [station for station, count in planned for _ in range(count)]
-    made = Bench(data, name, grid, perfect_instruments() if perfect else tools, nulls, not once)
+    made = CalibrationBench(
+        data, name, grid, perfect_instruments() if perfect else tools, nulls, not once
+    )
     if repeat:
         _repeat(made, repeat, seed, json_file)
         return
@@ -94,7 +96,7 @@ def bench(
     )
 
 
-def _repeat(made: Bench, repeat: int, seed: int, json_file: str) -> None:
+def _repeat(made: CalibrationBench, repeat: int, seed: int, json_file: str) -> None:
     from coupled.calibration.coverage import measure_coverage
     from coupled.cli.tables.calibration import print_coverage
 

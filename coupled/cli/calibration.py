@@ -90,8 +90,8 @@ def _calibrate(
     targets: tuple[Path | None, Path | None, str],
     noted: tuple[str, bool],
 ) -> None:
-    from coupled.calibration.belief import with_calibration
-    from coupled.calibration.calibrate import calibrate as fit
+    from coupled.calibration.calibrate import calibrate_control as fit
+    from coupled.calibration.calibrated import with_calibration
     from coupled.calibration.readingsfile import read_readings
     from coupled.cli.tables.calibration import print_calibration
     from coupled.rig.rigfile import rig_from_table

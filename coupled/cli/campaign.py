@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,9 +14,7 @@ from coupled.files import check_target, write_text
 from coupled.resources import find, shipped_sweeps
 
 if TYPE_CHECKING:
-    import polars as pl
-
-    from coupled.campaign.plan import Plan
+    from coupled.campaign.sweep import SweepResult
 
 
 @app.command(
@@ -31,7 +27,8 @@ def check(
     json_file: JsonOption = "",
 ) -> None:
     """Fly runs and hold them against their expectations; exit code 1 if any fails."""
-    from coupled.campaign.check import check_run, read_expecting
+    from coupled.campaign.check import check as check_runs
+    from coupled.campaign.check import read_expecting
     from coupled.campaign.junit import junit_xml
     from coupled.cli.tables.campaign import print_verdicts
     from coupled.flight.loop import input_files
@@ -46,15 +43,15 @@ def check(
         check_target(junit, inputs)
     check_json(json_file, [*inputs, *([junit] if junit else [])])
     with progress() as advance:
-        verdicts = [verdict for scenarios in found for verdict in check_run(scenarios, advance)]
+        checked = check_runs(found, advance)
     if json_file != "-":
-        print_verdicts(out, verdicts)
+        print_verdicts(out, checked.verdicts)
     if junit is not None:
-        write_text(junit, junit_xml(verdicts))
+        write_text(junit, junit_xml(checked.verdicts))
         if json_file != "-":
             say(f"JUnit XML: {junit}")
-    give_json([verdict.as_dict() for verdict in verdicts], json_file)
-    if not all(verdict.passed for verdict in verdicts):
+    give_json([verdict.as_dict() for verdict in checked.verdicts], json_file)
+    if not checked.passed:
         raise typer.Exit(1)
 
 
@@ -83,11 +80,11 @@ def sweep(
     json_file: JsonOption = "",
 ) -> None:
     """Fly a run over values of its parameters, to one table; called again, it goes on."""
-    from coupled.campaign.journal import JOURNAL, opened
+    from coupled.campaign.journal import JOURNAL
     from coupled.campaign.plan import read_plan
     from coupled.campaign.sensitivity import INDICES
-    from coupled.campaign.sweep import TABLE, fly_sweep, write_table
-    from coupled.parallel import executor
+    from coupled.campaign.sweep import TABLE
+    from coupled.campaign.sweep import sweep as fly_all
     from coupled.plots.saving import check_format
 
     file = find(name, shipped_sweeps(), "sweep")
@@ -102,24 +99,27 @@ def sweep(
     check_format(path)
     check_target(path, own)
     check_json(json_file, [*own, path])
-    pool_of = workers or os.cpu_count() or 1
     try:
-        with executor(pool_of, cluster) as pool, opened(target, plan.identity) as journal:
-            if journal.done:
-                err.print(f"{len(journal.done)} flights are there already", highlight=False)
-            with progress() as advance:
-                found = fly_sweep(plan, journal, pool, advance)
-            write_table(found, target / TABLE)
+        with progress() as advance:
+            found = fly_all(plan, target, workers, cluster, advance, _say_found)
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    _show(plan, found, target, path, json_file)
+    _show(found, target, path, json_file)
 
 
-def _show(plan: Plan, found: pl.DataFrame, target: Path, path: Path, json_file: str) -> None:
+def _say_found(found: int, flights: int) -> None:
+    """Say how many flights the folder has already."""
+    if found == flights:
+        text = f"all {flights} flights are there already; none is flown again"
+        err.print(text, highlight=False)
+    elif found:
+        err.print(f"{found} flights are there already", highlight=False)
+
+
+def _show(found: SweepResult, target: Path, path: Path, json_file: str) -> None:
     """Draw and print a sweep's table, with its indices or boundaries where they are asked for."""
-    from coupled.campaign.sensitivity import INDICES, sensitivity, write_indices
-    from coupled.campaign.survival import limits
+    from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
     from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
     from coupled.plots.campaign import draw_sweep
@@ -127,25 +127,22 @@ def _show(plan: Plan, found: pl.DataFrame, target: Path, path: Path, json_file: 
     from coupled.plots.sensitivity import draw_sensitivity
     from coupled.plots.survival import draw_survival
 
-    asked, told = plan.sweep, []
-    if asked.method == "sensitivity" and asked.samples is not None:
-        told = sensitivity(found, plan.keys, asked.keep, asked.samples)
-        write_indices(told, target / INDICES)
-    numeric = [key for key in plan.keys if found[key].dtype.is_numeric()]
-    alive = limits(found, numeric[0]) if asked.survive and numeric else []
-    if told:
-        drawn = draw_sensitivity(told)
-    elif alive:
-        drawn = draw_survival(asked.name, numeric[0], alive)
+    asked, table = found.plan.sweep, found.table
+    if found.indices:
+        write_indices(found.indices, target / INDICES)
+        drawn = draw_sensitivity(found.indices)
+    elif found.limits:
+        drawn = draw_survival(asked.name, found.numeric_keys[0], found.limits)
     else:
-        drawn = draw_sweep(found, plan.keys, asked.keep)
+        drawn = draw_sweep(table, found.plan.keys, asked.keep)
     save(drawn, path)
     if json_file != "-":
-        print_sweep(out, found, asked.keep)
-        print_survival(out, alive)
-        say(f"table: {target / TABLE}  ({len(found)} flights)")
-        if told:
-            print_indices(out, told)
+        print_sweep(out, table, asked.keep)
+        print_survival(out, found.limits)
+        say(f"table: {target / TABLE}  ({len(table)} flights)")
+        if found.indices:
+            print_indices(out, found.indices)
             say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
-    give_json([asdict(index) for index in told] if told else found.to_dicts(), json_file)
+    rows = [index.as_dict() for index in found.indices] or table.to_dicts()
+    give_json(rows, json_file)

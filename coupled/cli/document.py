@@ -16,7 +16,7 @@ from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
-    from coupled.calibration.calibrate import Result
+    from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
 
 
@@ -75,13 +75,13 @@ def document(
 
 def _fit_for(
     readings: Path | None, rig: Rig, control: ControlName, chosen: list[ControlName]
-) -> tuple[Result, str] | None:
+) -> tuple[CalibrationResult, str] | None:
     """Return the fit to draw of a control, and where its readings are from; none for one gradient.
 
     A user's readings are those of the first control chosen.
     """
-    from coupled.calibration.bench import Bench, take_readings
-    from coupled.calibration.calibrate import calibrate as fit
+    from coupled.calibration.bench import CalibrationBench, take_readings
+    from coupled.calibration.calibrate import calibrate_control as fit
     from coupled.calibration.plan import stations
     from coupled.calibration.readingsfile import read_readings
 
@@ -94,5 +94,5 @@ def _fit_for(
         grid = stations(rig, control, 5, 5)
     except InputError:
         return None
-    made = take_readings(Bench(rig, control, grid, tools), 0)
+    made = take_readings(CalibrationBench(rig, control, grid, tools), 0)
     return fit(made, data, control, tools, rig.name), "a virtual bench's readings"

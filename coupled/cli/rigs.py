@@ -58,7 +58,7 @@ def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
 
 def say_stale(rig: Rig) -> None:
     """Say on the terminal's error side what has changed since a rig's calibrations."""
-    from coupled.calibration.belief import stale
+    from coupled.calibration.assumed import stale
 
     for name, control in rig.controls.items():
         for change in stale(control):

@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from coupled.campaign.sweep import AS_FILED
-from coupled.campaign.words import parameter
+from coupled.campaign.entry import AS_FILED
+from coupled.campaign.labels import parameter_label
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_ROWS, _MOST_COLUMNS = 4, 4
@@ -45,14 +45,14 @@ def draw_sweep(found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str])
             _panel(panels[row, column], found, keys, key, _other(numeric, column), name)
         panels[row, 0].set_ylabel(FIGURES[name])
     for column, key in enumerate(numeric):
-        panels[-1, column].set_xlabel(parameter(key))
+        panels[-1, column].set_xlabel(parameter_label(key))
         other = _other(numeric, column)
         points = panels[0, column].collections
         if other and points:
             bar = drawn.colorbar(points[0], ax=list(panels[:, column]), location="top", shrink=0.9)
             bar.ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4), useMathText=True)
             bar.ax.tick_params(labelsize=8)
-            bar.set_label(parameter(other), fontsize=8)
+            bar.set_label(parameter_label(other), fontsize=8)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     if len(labels) > 1 or "ended early" in labels:
         drawn.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)

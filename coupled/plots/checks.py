@@ -32,8 +32,10 @@ def draw_static_checks(found: Documentation) -> Figure:
             axes.fill_between(
                 factor * d, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
             )
-        told = condition.felt
-        axes.plot(factor * told.deflection, told.force, color=BLUE, linewidth=1.2, label="rig")
+        response = condition.felt
+        axes.plot(
+            factor * response.deflection, response.force, color=BLUE, linewidth=1.2, label="rig"
+        )
         x = factor * condition.specified.deflection
         axes.plot(x, condition.specified.force, "k:", linewidth=1.0, label="specified")
         axes.set_title(_verdict(found, condition.pressure_Pa, ("breakout", "force")), fontsize=9)
@@ -44,9 +46,9 @@ def draw_static_checks(found: Documentation) -> Figure:
             wide = SURFACE_rad / DEGREE_rad
             x = factor * data.travel * ends
             below.fill_between(x, degrees - wide, degrees + wide, color="0.85", linewidth=0)
-            side = np.sign(np.dot(told.surface, told.deflection))
-            moved = side * told.surface * found.surface_rad / DEGREE_rad
-            below.plot(factor * told.deflection, moved, color=BLUE, linewidth=1.2)
+            side = np.sign(np.dot(response.surface, response.deflection))
+            moved = side * response.surface * found.surface_rad / DEGREE_rad
+            below.plot(factor * response.deflection, moved, color=BLUE, linewidth=1.2)
             below.plot(x, degrees, "k:", linewidth=1.0)
             below.set_title(_verdict(found, condition.pressure_Pa, ("surface",)), fontsize=9)
         for panel in grid[:, i]:

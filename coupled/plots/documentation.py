@@ -29,8 +29,8 @@ from coupled.record.channels import ControlName
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:
-    from coupled.calibration.calibrate import Result
     from coupled.calibration.documentation import Documentation
+    from coupled.calibration.result import CalibrationResult
 
 
 def _in_pounds(axes: Any) -> None:
@@ -58,9 +58,9 @@ def draw_forces(found: Documentation) -> Figure:
             ("uncompensated", condition.uncompensated, ORANGE, 1.3),
             ("compensated", condition.compensated, GREEN, 1.3),
         )
-        for name, told, color, width in sweeps:
-            x = factor * told.deflection
-            axes.plot(x, told.force, color=color, linewidth=width, label=name)
+        for name, response, color, width in sweeps:
+            x = factor * response.deflection
+            axes.plot(x, response.force, color=color, linewidth=width, label=name)
         axes.set_title(pressure(condition.pressure_Pa), fontsize=10)
         axes.set_xlabel(f"true deflection δ, {unit}")
         axes.grid(alpha=0.25)
@@ -86,10 +86,10 @@ def draw_deflections(found: Documentation) -> Figure:
             factor * bent.deflection, factor * bent.computed, color=color, linewidth=1.3, label=name
         )
         sweeps = ((condition.uncompensated, "solid", "δ̂ = δc"), (bent, "dashed", "δ̂ = δc + K̂·F"))
-        for told, style, estimate in sweeps:
-            lacks = 100.0 * (told.deflection - told.estimate) / travel
+        for response, style, estimate in sweeps:
+            lacks = 100.0 * (response.deflection - response.estimate) / travel
             right.plot(
-                factor * told.deflection,
+                factor * response.deflection,
                 lacks,
                 color=color,
                 linestyle=style,
@@ -122,7 +122,7 @@ def save_pages(figures: Sequence[Figure], path: Path) -> None:
 
 def draw_pages(
     documents: Sequence[Documentation],
-    fits: Mapping[ControlName, tuple[Result, str] | None],
+    fits: Mapping[ControlName, tuple[CalibrationResult, str] | None],
     folder: Path,
     pdf: Path,
 ) -> list[Path]:

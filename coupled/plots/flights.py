@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.campaign.words import parameter
+from coupled.campaign.labels import parameter_label
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES, channel, control_channels, unit_of
 from coupled.record.record import Record
@@ -142,7 +142,7 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
         for flight in case:
             axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight.configuration))
         axes.set_xlabel("time, s")
-        axes.set_ylabel(parameter(drawn))
+        axes.set_ylabel(parameter_label(drawn))
         return
     name = _RATE[case[0].manoeuvre.control]
     for flight in case:

@@ -12,8 +12,8 @@ from coupled.record.channels import unit_of
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:
-    from coupled.calibration.calibrate import Result
     from coupled.calibration.estimate import Estimate
+    from coupled.calibration.result import CalibrationResult
 
 _SETS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "black", "0.5")
 _MARKS = "osD^vP*X"
@@ -32,7 +32,7 @@ def plus_minus(found: Estimate) -> str:
     return f"({text})·10{str(power).translate(_RAISED)}" if power else text
 
 
-def draw_readings(found: Result, source: str) -> Figure:
+def draw_readings(found: CalibrationResult, source: str) -> Figure:
     """Draw the report's figure 4: readings at each gradient with the fit, and what is left."""
     factor, unit = scale(found.control)
     figure = Figure(figsize=(8.2, 6.8), layout="constrained")

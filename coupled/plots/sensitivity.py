@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.campaign.sensitivity import Index
-from coupled.campaign.words import parameter
+from coupled.campaign.labels import parameter_label
+from coupled.campaign.sensitivity import SobolIndex
 from coupled.plots.campaign import FIGURES
 from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
 
 _LONGEST = 44  # letters of a parameter
 
 
-def draw_sensitivity(told: Sequence[Index]) -> Figure:
+def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
     """Draw the indices: a row a figure, a column a configuration, bars a parameter.
 
     The parameters stand in the order of their greatest total index, the strongest on top.
     """
-    configurations = list(dict.fromkeys(index.configuration for index in told))
-    figures = list(dict.fromkeys(index.figure for index in told))
+    configurations = list(dict.fromkeys(index.configuration for index in indices))
+    figures = list(dict.fromkeys(index.figure for index in indices))
     keys = sorted(
-        dict.fromkeys(index.key for index in told),
-        key=lambda key: max(index.total or 0.0 for index in told if index.key == key),
+        dict.fromkeys(index.key for index in indices),
+        key=lambda key: max(i.total.value if i.total else 0.0 for i in indices if i.key == key),
     )
     height = 0.9 + len(figures) * (0.75 + 0.24 * len(keys))
     size = (4.2 + 3.4 * len(configurations), height)
@@ -37,12 +37,12 @@ def draw_sensitivity(told: Sequence[Index]) -> Figure:
         for axes, configuration in zip(row, configurations, strict=True):
             here = {
                 index.key: index
-                for index in told
+                for index in indices
                 if (index.figure, index.configuration) == (figure, configuration)
             }
             _panel(axes, [here[key] for key in keys])
             axes.set_title(f"{FIGURES[figure]}: {plain(configuration)}", fontsize=10)
-            axes.set_yticks(range(len(keys)), [_words(key) for key in keys], fontsize=8)
+            axes.set_yticks(range(len(keys)), [_label(key) for key in keys], fontsize=8)
     for axes in grid[-1]:
         axes.set_xlabel("share of the figure's variance", fontsize=9)
     handles, labels = grid[0, 0].get_legend_handles_labels()
@@ -50,28 +50,27 @@ def draw_sensitivity(told: Sequence[Index]) -> Figure:
     return drawn
 
 
-def _words(key: str) -> str:
+def _label(key: str) -> str:
     """Return a parameter without its unit, which its share does not have."""
-    return plain(parameter(key).partition(",")[0], _LONGEST)
+    return plain(parameter_label(key).partition(",")[0], _LONGEST)
 
 
-def _panel(axes: Any, indices: Sequence[Index]) -> None:
-    told = [
-        (at, (i.first, i.first_low, i.first_high), (i.total, i.total_low, i.total_high))
-        for at, i in enumerate(indices)
-        if i.total is not None
-    ]
+def _panel(axes: Any, indices: Sequence[SobolIndex]) -> None:
     axes.set_xlim(-0.03, 1.08)
     axes.grid(axis="x", alpha=0.25)
     axes.tick_params(labelsize=8)
-    if not told:
+    if all(index.total is None for index in indices):
         axes.text(0.5, 0.5, "does not vary", transform=axes.transAxes, ha="center", color=GRAY)
-    for label, color, shift, which in (
-        ("alone (first)", BLUE, 0.2, 1),
-        ("with others (total)", ORANGE, -0.2, 2),
+    alone = [(y, index.first) for y, index in enumerate(indices) if index.first is not None]
+    together = [(y, index.total) for y, index in enumerate(indices) if index.total is not None]
+    for label, color, shift, shares in (
+        ("alone (first)", BLUE, 0.2, alone),
+        ("with others (total)", ORANGE, -0.2, together),
     ):
-        places = np.array([row[0] for row in told], dtype=float) + shift
-        values = np.array([row[which] for row in told], dtype=float).reshape(-1, 3)
-        axes.barh(places, values[:, 0], 0.36, color=color, label=label)
-        bounds = np.abs(values[:, 1:] - values[:, :1]).T
-        axes.errorbar(values[:, 0], places, xerr=bounds, fmt="none", ecolor="black", elinewidth=0.8)
+        places = [y + shift for y, _ in shares]
+        values = np.array([share.value for _, share in shares])
+        axes.barh(places, values, 0.36, color=color, label=label)
+        bounds = np.abs(
+            [[s.low - s.value for _, s in shares], [s.high - s.value for _, s in shares]]
+        )
+        axes.errorbar(values, places, xerr=bounds, fmt="none", ecolor="black", elinewidth=0.8)

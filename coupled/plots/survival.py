@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from coupled.campaign.survival import Limit
-from coupled.campaign.words import parameter
+from coupled.campaign.labels import parameter_label
+from coupled.campaign.survival import SurvivalLimit
 
 _LIVES, _LOST = "#009e73", "#cc0000"
 
 
-def draw_survival(name: str, key: str, limits: Sequence[Limit]) -> Figure:
+def draw_survival(name: str, key: str, limits: Sequence[SurvivalLimit]) -> Figure:
     """Draw a row a configuration: a dot a value, whole where all its flights are survived."""
     figure = Figure(figsize=(8.0, 1.5 + 0.45 * len(limits)), layout="constrained")
     axes = figure.subplots()
@@ -42,7 +42,7 @@ def draw_survival(name: str, key: str, limits: Sequence[Limit]) -> Figure:
             axes.plot([limit.predicted] * 2, ends, color="#0072b2", linewidth=1.4, linestyle=":")
     axes.set_yticks(places, [limit.configuration for limit in limits])
     axes.set_ylim(-0.6, len(limits) - 0.3)
-    axes.set_xlabel(parameter(key))
+    axes.set_xlabel(parameter_label(key))
     axes.grid(alpha=0.25, axis="x")
     handles = [
         Line2D([], [], color=_LIVES, marker="o", linestyle="", markersize=5, label="survived"),

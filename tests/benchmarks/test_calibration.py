@@ -10,8 +10,8 @@ import time
 
 import pytest
 
-from coupled.calibration.bench import Bench, take_readings
-from coupled.calibration.calibrate import calibrate
+from coupled.calibration.bench import CalibrationBench, take_readings
+from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
@@ -22,9 +22,9 @@ pytestmark = pytest.mark.bench
 USUAL = usual_instruments("column")
 
 
-def usual_bench() -> Bench:
+def usual_bench() -> CalibrationBench:
     rig = report_rig()
-    return Bench(rig, "column", stations(rig, "column", 5, 5), USUAL)
+    return CalibrationBench(rig, "column", stations(rig, "column", 5, 5), USUAL)
 
 
 def test_1000_benches_in_30_s_whose_intervals_hold_the_truth() -> None:
@@ -56,7 +56,7 @@ def test_a_calibration_fits_in_under_50_ms() -> None:
     taken = []
     for _ in range(30):
         start = time.perf_counter()
-        calibrate(readings, data, "column", USUAL, "bench")
+        calibrate_control(readings, data, "column", USUAL, "bench")
         taken.append(time.perf_counter() - start)
     print(f"\na calibration from 25 readings and 6 nulls: {1e3 * min(taken):.1f} ms")
     assert min(taken) < 0.05

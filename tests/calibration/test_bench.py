@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from coupled.authority.compare import compare
-from coupled.calibration.belief import Scales, real_scales, with_calibration
-from coupled.calibration.bench import Bench, _meters_rig, _null, take_readings
-from coupled.calibration.calibrate import calibrate
+from coupled.calibration.accuracy import deflection_off, felt_off
+from coupled.calibration.assumed import Scales, real_scales
+from coupled.calibration.bench import CalibrationBench, _meters_rig, _null, take_readings
+from coupled.calibration.calibrate import calibrate_control
+from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
-from coupled.calibration.outcome import deflection_off, felt_off
 from coupled.calibration.plan import stations
 from coupled.errors import InputError
 from coupled.flight.loop import fly
@@ -43,9 +44,9 @@ CHANGES: dict[str, Any] = {
 
 def without_errors(rig: Rig, control: ControlName) -> tuple[Any, Any]:
     grid = stations(rig, control, 4, 4)
-    readings = take_readings(Bench(rig, control, grid, perfect_instruments()), 0)
+    readings = take_readings(CalibrationBench(rig, control, grid, perfect_instruments()), 0)
     data = rig.controls[control]
-    return calibrate(readings, data, control, perfect_instruments(), "bench"), data
+    return calibrate_control(readings, data, control, perfect_instruments(), "bench"), data
 
 
 @pytest.mark.parametrize("changes", [{}, CHANGES], ids=["as shipped", "off in every scale"])
@@ -83,7 +84,7 @@ def test_one_gradient_at_every_pressure_cannot_be_benched() -> None:
 
 
 def test_the_bench_is_the_rig_that_flies() -> None:
-    """A told run is what the frame loop gives on a rig without aircraft, to the last bit."""
+    """A run at given pressures is the frame loop's on a rig without aircraft, to the last bit."""
     scenario = read_run("appendix-c")[0]
     rig = scenario.rig
     flown = fly(scenario)
@@ -92,10 +93,10 @@ def test_the_bench_is_the_rig_that_flies() -> None:
     frames = scenario.frames
     times = np.arange(frames * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
     assert action.force is not None
-    told = run_control(rig, "column", action.force(times), pressure)
-    np.testing.assert_array_equal(told.computed, flown["column_computed_m"])
-    np.testing.assert_array_equal(told.deflection, flown["column_deflection_m"])
-    np.testing.assert_array_equal(told.estimate, flown["column_estimate_m"])
+    response = run_control(rig, "column", action.force(times), pressure)
+    np.testing.assert_array_equal(response.computed, flown["column_computed_m"])
+    np.testing.assert_array_equal(response.deflection, flown["column_deflection_m"])
+    np.testing.assert_array_equal(response.estimate, flown["column_estimate_m"])
 
 
 def test_a_supply_moves_the_control_as_the_hands_force_does() -> None:
@@ -120,7 +121,7 @@ def test_a_hand_that_eases_back_leaves_the_control_where_it_is() -> None:
     """
     rig = read_rig(shipped_rigs()["737"])
     tools = replace(perfect_instruments(), hand=0.003)
-    made = Bench(rig, "column", stations(rig, "column", 4, 4), tools, 0)
+    made = CalibrationBench(rig, "column", stations(rig, "column", 4, 4), tools, 0)
     off = []
     for seed in range(4):
         r = take_readings(made, seed)
@@ -139,7 +140,7 @@ def test_the_mean_of_both_sides_is_s2_where_one_side_is_not(
     """Friction keeps a wandering hand's extreme: outward nulls are high, inward ones low."""
     rig = read_rig(shipped_rigs()[name])
     tools = replace(perfect_instruments(), hand=0.003)
-    made = Bench(rig, control, [], tools, 50)
+    made = CalibrationBench(rig, control, [], tools, 50)
     null = _null(_meters_rig(rig, control), made, np.random.default_rng(1))
     true = real_scales(rig.controls[control])
     ratio = null[1] / null[2] * true.s3 / true.s2 - 1.0
@@ -156,16 +157,20 @@ def test_scales_that_are_off_are_felt_by_the_host() -> None:
     }
     rig = bench_rig(changes)
     force = np.full(400 * rig.substeps + 1, 50.0)
-    told = run_control(rig, "column", force, np.full(400, 3000.0))
-    assert told.force[-1] == pytest.approx(55.0)
+    response = run_control(rig, "column", force, np.full(400, 3000.0))
+    assert response.force[-1] == pytest.approx(55.0)
     plain = run_control(bench_rig(), "column", force, np.full(400, 3000.0))
-    ratio = (told.modifying[-1] / told.computed[-1]) / (plain.modifying[-1] / plain.computed[-1])
+    ratio = (response.modifying[-1] / response.computed[-1]) / (
+        plain.modifying[-1] / plain.computed[-1]
+    )
     assert ratio == pytest.approx(1.0 / 1.25, rel=1e-9)
 
 
 def test_a_seed_repeats_a_bench_and_another_does_not() -> None:
     rig = report_rig()
-    made = Bench(rig, "column", stations(rig, "column", 2, 2), usual_instruments("column"))
+    made = CalibrationBench(
+        rig, "column", stations(rig, "column", 2, 2), usual_instruments("column")
+    )
     one, two, other = (take_readings(made, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.v1, two.v1)
     assert np.any(one.v1 != other.v1)
@@ -184,7 +189,9 @@ def test_a_seed_repeats_a_bench_and_another_does_not() -> None:
 def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
     """120 benches of 25 readings; the benchmark counts 1000."""
     rig = report_rig()
-    made = Bench(rig, "column", stations(rig, "column", 5, 5), usual_instruments("column"))
+    made = CalibrationBench(
+        rig, "column", stations(rig, "column", 5, 5), usual_instruments("column")
+    )
     found = measure_coverage(made, 120, seed=5000)
     print("\n" + str(found))
     for name, share in found.covered.items():
@@ -196,8 +203,7 @@ def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
 
 def flown(rig: Rig, configuration: str) -> Any:
     base = read_run("worst-case")[0]
-    made = replace(base, rig=rig, configurations=(configuration,))
-    [flight] = compare([made])
+    [flight] = compare([replace(base, rig=rig, configurations=(configuration,))])
     return flight.outcome
 
 
@@ -207,23 +213,22 @@ def test_full_circle(tmp_path: Path) -> None:
     The rig's S₁ is 4 % off and its host knows of no bend: 1 − 0.96/1.2 = 20 % is lost.
     """
     base = read_run("worst-case")[0].rig
-    control = base.controls["column"]
-    never = control.model_copy(
-        update={
-            "compensation": control.compensation.model_copy(update={"bend": 0.0}),
-            "sensing": control.sensing.model_copy(
-                update={"deflection_scale": 0.96, "force_scale": 1.03, "modifying_scale": 0.97}
-            ),
+    rig = base.changed(
+        {
+            "controls.column.compensation.bend_m_per_N": 0.0,
+            "controls.column.sensing.deflection_scale": 0.96,
+            "controls.column.sensing.force_scale": 1.03,
+            "controls.column.sensing.modifying_scale": 0.97,
         }
     )
-    rig = base.model_copy(update={"controls": {"column": never}})
+    never = rig.controls["column"]
     assert flown(rig, "compensated").loss == pytest.approx(0.20, abs=0.012)
     tools = usual_instruments("column")
     true, bend = real_scales(never), never.loader.bend
     for seed in range(4):
         grid = stations(rig, "column", 5, 5)
-        readings = take_readings(Bench(rig, "column", grid, tools), seed)
-        found = calibrate(readings, never, "column", tools, "bench")
+        readings = take_readings(CalibrationBench(rig, "column", grid, tools), seed)
+        found = calibrate_control(readings, never, "column", tools, "bench")
         path = tmp_path / "new.toml"
         path.write_text(rig_text(with_calibration(rig, "column", found)), encoding="utf-8")
         after = flown(read_rig(path), "compensated")
@@ -232,9 +237,9 @@ def test_full_circle(tmp_path: Path) -> None:
         assert after.felt_ratio == pytest.approx(1.0, abs=0.01)
         # and it is what the closed form of the coverage's count says
         s2 = found.s2["the null, eq. (14)"]
-        believed = Scales(found.line.s1.value, s2.value, found.s3.value)
+        assumed = Scales(found.line.s1.value, s2.value, found.s3.value)
         k, stiff = found.line.bend.value, max(never.schedule.total_gradient)
-        off = deflection_off(believed, k, true, bend, stiff)
+        off = deflection_off(assumed, k, true, bend, stiff)
         felt = felt_off(s2.value / true.s2, k, bend, (stiff, never.loader.basic_gradient))
         assert after.loss == pytest.approx(-off, abs=4e-4)
         read = after.felt_ratio * found.s3.value / true.s3  # a record has the force as read
@@ -246,15 +251,19 @@ def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
     rig = report_rig()
     few = stations(rig, "column", 3, 1)
     with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
-        measure_coverage(Bench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2)
+        measure_coverage(
+            CalibrationBench(rig, "column", few, usual_instruments("column"), 0), 2, workers=2
+        )
 
 
 def test_a_wandering_hand_parts_the_instruments_readings() -> None:
     """Perfect instruments, read one after the other: what is left is the hand's 1 %."""
     rig = report_rig()
     tools = replace(perfect_instruments(), hand=0.01)
-    readings = take_readings(Bench(rig, "column", stations(rig, "column", 5, 5), tools, 0), 2)
-    found = calibrate(readings, rig.controls["column"], "column", tools, "bench")
+    readings = take_readings(
+        CalibrationBench(rig, "column", stations(rig, "column", 5, 5), tools, 0), 2
+    )
+    found = calibrate_control(readings, rig.controls["column"], "column", tools, "bench")
     assert 0.6 < found.line.excess < 1.3
     assert np.std(readings.v3 / readings.force) / 0.25 == pytest.approx(0.014, rel=0.4)
 
@@ -262,10 +271,12 @@ def test_a_wandering_hand_parts_the_instruments_readings() -> None:
 def test_statics_and_frames_agree_on_scales_that_are_off() -> None:
     """The host's δ̂ and F_mod, breakout's term and all, in closed form and stepped to rest."""
     rig = bench_rig({**CHANGES, "controls.column.sensing.word_length_bits": 0})
-    told = run_control(rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0))
-    line = static_line(rig, "column", 3000.0, told.computed[-1:] / 0.93)
+    response = run_control(
+        rig, "column", np.full(600 * rig.substeps + 1, 70.0), np.full(600, 3000.0)
+    )
+    line = static_line(rig, "column", 3000.0, response.computed[-1:] / 0.93)
     assert line.force[0] == pytest.approx(70.0, rel=1e-9)
-    assert told.estimate[-1] == pytest.approx(line.estimate[0], rel=1e-9)
+    assert response.estimate[-1] == pytest.approx(line.estimate[0], rel=1e-9)
     control = rig.controls["column"]
     asked = (line.force[0] - 8.0 - 560.0 * line.computed[0]) * 1.1
     felt = G_STIFF / (1.0 - K_REPORT * G_STIFF)

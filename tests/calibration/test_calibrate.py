@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.calibration.belief import believed_scales, real_scales, stale, with_calibration
-from coupled.calibration.calibrate import calibrate
+from coupled.calibration.assumed import assumed_scales, real_scales, stale
+from coupled.calibration.calibrate import calibrate_control
+from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.estimate import perfect_instruments, usual_instruments
 from coupled.calibration.readings import Readings
 from coupled.calibration.readingsfile import read_readings
@@ -24,13 +25,14 @@ USUAL = usual_instruments("column")
 
 
 def fit(r: Readings, control: Control | None = None, **tools: Any) -> Any:
-    return calibrate(r, control or column(), "column", tools.get("tools", USUAL), "r.csv")
+    return calibrate_control(r, control or column(), "column", tools.get("tools", USUAL), "r.csv")
 
 
-def altered(section: str, **values: Any) -> Control:
-    data = column()
-    changed = getattr(data, section).model_copy(update=values)
-    return data.model_copy(update={section: changed})
+def altered(**changes: Any) -> Control:
+    """Return the report's column with values changed, {`section__key`: value}."""
+    keys = {key.replace("__", "."): value for key, value in changes.items()}
+    place = "controls.column"
+    return report_rig().changed({f"{place}.{k}": v for k, v in keys.items()}).controls["column"]
 
 
 def test_typed_readings_give_k_in_inches_a_pound(tmp_path: Path) -> None:
@@ -143,7 +145,7 @@ def test_a_third_of_the_readings_may_be_wrong() -> None:
 
 def test_an_arc_is_corrected_and_what_is_beyond_14_degrees_named() -> None:
     length = 0.5
-    control = altered("loader", arc_geometry=True).model_copy(update={"length": length})
+    control = altered(loader__arc_geometry=True, length_m=length)
     delta, force = grid()
     level = replace(
         readings(delta, force),
@@ -155,12 +157,12 @@ def test_an_arc_is_corrected_and_what_is_beyond_14_degrees_named() -> None:
     far = np.flatnonzero(delta / length > np.radians(14.0)) + 2
     assert found.beyond == far.tolist()
     assert len(far) > 3
-    left_alone = fit(level, altered("loader").model_copy(update={"length": length}))
+    left_alone = fit(level, altered(length_m=length))
     assert left_alone.level is None
     assert left_alone.beyond
     assert abs(left_alone.line.s1.value / S1 - 1.0) > 5e-3
-    with pytest.raises(InputError, match=r"on an arc of 0\.1 m, which no ruler reads"):
-        fit(level, control.model_copy(update={"length": 0.1}))
+    with pytest.raises(InputError, match=r"on an arc of 0\.13 m, which no ruler reads"):
+        fit(level, altered(loader__arc_geometry=True, length_m=0.13))
 
 
 def test_a_calibration_carries_its_gains_and_goes_stale_with_them(tmp_path: Path) -> None:
@@ -175,18 +177,20 @@ def test_a_calibration_carries_its_gains_and_goes_stale_with_them(tmp_path: Path
     assert control.calibration.date == "1974-02-04"
     assert stale(control) == []
     assert stale(column()) == []  # there is none
-    longer = control.model_copy(update={"length": 1.0})
+
+    def with_changed(key: str, value: float) -> Control:
+        return again.changed({f"controls.column.{key}": value}).controls["column"]
+
+    longer = with_changed("length_m", 1.0)
     assert stale(longer) == ["the column's length (m) was 0.9 and is 1"]
-    gains = control.gains.model_copy(update={"s1_over_s2": 2000.0})
-    [change] = stale(control.model_copy(update={"gains": gains}))
+    [change] = stale(with_changed("gains.s1_over_s2_N_per_m", 2000.0))
     assert change.startswith("the gain S1/S2 was 2249.72")
-    host = control.compensation.model_copy(update={"bend": 1e-4})
-    [change] = stale(control.model_copy(update={"compensation": host}))
+    [change] = stale(with_changed("compensation.bend_m_per_N", 1e-4))
     assert change.startswith("the host uses K = 0.0001")
     assert fit(readings(*grid()), longer).changed
 
 
-def test_a_calibration_changes_beliefs_and_not_the_hardware() -> None:
+def test_a_calibration_changes_what_the_host_assumes_and_not_the_hardware() -> None:
     rig = report_rig()
     found = fit(with_errors(*grid(), USUAL, np.random.default_rng(1)))
     before, new = rig.controls["column"], with_calibration(rig, "column", found)
@@ -196,7 +200,7 @@ def test_a_calibration_changes_beliefs_and_not_the_hardware() -> None:
         assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-12)
     assert after.loader == before.loader
     assert after.compensation.bend == found.line.bend.value
-    assert believed_scales(after).s1 == found.line.s1.value
+    assert assumed_scales(after).s1 == found.line.s1.value
     taken = with_calibration(rig, "column", found, hardware=True).controls["column"]
     assert taken.loader.bend == found.line.bend.value
     assert taken.sensing.deflection_scale == taken.sensing.force_scale == 1.0

@@ -10,7 +10,7 @@ import pytest
 
 from coupled.calibration.checks import (
     TOLERANCES,
-    Check,
+    ControlCheck,
     band,
     dynamic_checks,
     static_checks,
@@ -153,10 +153,10 @@ def test_a_release_that_friction_stops_short_is_counted_from_there() -> None:
 
 
 def test_a_margin_is_what_is_left_of_the_tolerance() -> None:
-    assert Check("x", 0.0, 11.0, 10.0, 4.0, "N").margin == 0.75
-    assert Check("x", 0.0, 5.0, 10.0, 4.0, "N").margin == -0.25
-    assert not Check("x", 0.0, float("inf"), 10.0, 4.0, "N").passed
-    assert not Check("x", 0.0, float("nan"), 10.0, 4.0, "N").passed
+    assert ControlCheck("x", 0.0, 11.0, 10.0, 4.0, "N").margin == 0.75
+    assert ControlCheck("x", 0.0, 5.0, 10.0, 4.0, "N").margin == -0.25
+    assert not ControlCheck("x", 0.0, float("inf"), 10.0, 4.0, "N").passed
+    assert not ControlCheck("x", 0.0, float("nan"), 10.0, 4.0, "N").passed
 
 
 def test_the_wider_of_two_force_tolerances_holds() -> None:
@@ -175,16 +175,16 @@ def both(rig: Rig, configuration: Any, pressure: float = 3000.0) -> Any:
 
 
 def test_a_sweep_shows_friction_and_breakout() -> None:
-    told = both(bench(FRICTION), "rigid")
-    out = told.time_s < 25.0
-    back = (told.time_s > 28.0) & (told.time_s < 45.0)
+    response = both(bench(FRICTION), "rigid")
+    out = response.time_s < 25.0
+    back = (response.time_s > 28.0) & (response.time_s < 45.0)
     for rows, side in ((out, 1.0), (back, -1.0)):
-        moving = rows & (told.deflection > 0.02) & (told.deflection < 0.15)
-        expected = 9.0 + G_STIFF * told.deflection[moving] + side * 6.0
+        moving = rows & (response.deflection > 0.02) & (response.deflection < 0.15)
+        expected = 9.0 + G_STIFF * response.deflection[moving] + side * 6.0
         # what is left is the damping at the sweep's speed of some 8 mm/s
-        assert np.max(np.abs(told.force[moving] - expected)) < 1.0
-    assert told.deflection.max() == pytest.approx(0.1778, rel=1e-3)
-    assert told.deflection.min() == pytest.approx(-0.1778, rel=1e-3)
+        assert np.max(np.abs(response.force[moving] - expected)) < 1.0
+    assert response.deflection.max() == pytest.approx(0.1778, rel=1e-3)
+    assert response.deflection.min() == pytest.approx(-0.1778, rel=1e-3)
 
 
 def test_a_rig_that_is_as_specified_passes_with_all_of_its_margin() -> None:

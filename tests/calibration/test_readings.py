@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.calibration.bench import Bench, take_readings
+from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
 from coupled.calibration.readingsfile import read_readings, write_readings
@@ -57,7 +57,7 @@ def test_a_null_may_be_a_reading_too(tmp_path: Path) -> None:
 def test_what_the_bench_writes_is_read_back(tmp_path: Path, inches: bool) -> None:
     rig = report_rig()
     grid = stations(rig, "column", 2, 2)
-    made = take_readings(Bench(rig, "column", grid, usual_instruments("column"), 2), 3)
+    made = take_readings(CalibrationBench(rig, "column", grid, usual_instruments("column"), 2), 3)
     write_readings(tmp_path / "r.csv", made, "column", inches)
     again = read_readings(tmp_path / "r.csv", "column")
     for name, value in made.__dict__.items():

@@ -7,9 +7,10 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from coupled.campaign.plan import Job, jobs, read_plan
+from coupled.campaign.entry import SURVIVED
+from coupled.campaign.flights import fly_planned, table
+from coupled.campaign.plan import PlannedFlight, planned_flights, read_plan
 from coupled.campaign.survival import limits
-from coupled.campaign.sweep import SURVIVED, fly_job, table
 from coupled.errors import InputError
 from coupled.flight.manoeuvre import Configuration
 from coupled.plots.saving import save
@@ -51,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_flight_is_survived_within_its_bounds(folder: Path) -> None:
     plan = read_plan(folder / "s.toml")
-    found = table(plan, [fly_job(plan, job) for job in jobs(plan)])
+    found = table(plan, [fly_planned(plan, job) for job in planned_flights(plan)])
     assert found[SURVIVED].to_list() == [True, True, False]
     [limit] = limits(found, "pilot.column.force_N")
     assert (limit.survived, limit.flights, limit.boundary) == (2, 3, 50.0)
@@ -107,8 +108,10 @@ def test_each_boundary_of_the_recovery_lies_where_the_docs_have_it(
 ) -> None:
     """What lies between them, at 0.62, the run itself expects."""
     plan = read_plan(runs_folder() / "sweeps" / "recovery.toml")
-    row = fly_job(plan, Job(0, {"event.runaway.by_norm": severity}, configuration, None))
-    assert row[SURVIVED] is alive
+    row = fly_planned(
+        plan, PlannedFlight(0, {"event.runaway.by_norm": severity}, configuration, None)
+    )
+    assert row.survived is alive
 
 
 def test_a_sweep_over_an_event_misspelled_names_the_one_it_is_near(folder: Path) -> None:
@@ -125,4 +128,4 @@ def test_every_shipped_sweep_can_be_flown() -> None:
     files = sorted((runs_folder() / "sweeps").glob("*.toml"))
     assert len(files) >= 2
     for file in files:
-        assert len(jobs(read_plan(file))) > 50
+        assert len(planned_flights(read_plan(file))) > 50

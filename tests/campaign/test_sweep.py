@@ -17,10 +17,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from coupled.campaign.flights import fly_planned, fly_sweep
 from coupled.campaign.journal import JOURNAL, opened
-from coupled.campaign.plan import Plan, jobs, read_plan
-from coupled.campaign.sweep import fly_job, fly_sweep, write_table
-from coupled.campaign.words import parameter
+from coupled.campaign.labels import parameter_label
+from coupled.campaign.plan import SweepPlan, planned_flights, read_plan
+from coupled.campaign.sweep import write_table
 from coupled.errors import InputError
 from coupled.parallel import Here, executor
 from coupled.plots.campaign import draw_sweep
@@ -30,7 +31,7 @@ from tests.support.processes import begun, kill
 from tests.test_cli import SHORT, coupled, files
 
 BEND = "rig.controls.column.loader.bend_m_per_N"
-BELIEF = "rig.controls.column.compensation.bend_m_per_N"
+ASSUMED = "rig.controls.column.compensation.bend_m_per_N"
 GRID = f"""
 name = "s"
 run = "push.toml"
@@ -39,7 +40,7 @@ keep = ["loss"]
 extremes = ["column_force_N"]
 [[vary]]
 key = "{BEND}"
-also = ["{BELIEF}"]
+also = ["{ASSUMED}"]
 values = [2e-5, 4e-5, 8e-5]
 [[vary]]
 key = "pilot.column.force_N"
@@ -70,13 +71,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def plan_of(folder: Path, text: str = GRID) -> Plan:
+def plan_of(folder: Path, text: str = GRID) -> SweepPlan:
     (folder / "s.toml").write_text(text)
     return read_plan(folder / "s.toml")
 
 
-def flown(plan: Plan, folder: Path, workers: int = 1) -> pl.DataFrame:
-    with executor(workers) as pool, opened(folder, plan.identity) as journal:
+def flown(plan: SweepPlan, folder: Path, workers: int = 1) -> pl.DataFrame:
+    with executor(workers) as pool, opened(folder, plan) as journal:
         return fly_sweep(plan, journal, pool)
 
 
@@ -97,7 +98,7 @@ def test_a_grids_losses_are_those_of_the_closed_form(folder: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_points_and_another_others(folder: Path) -> None:
-    one, two = (jobs(plan_of(folder, DRAW)) for _ in range(2))
+    one, two = (planned_flights(plan_of(folder, DRAW)) for _ in range(2))
     assert one == two
     values = [job.changes[BEND] for job in one]
     assert len(values) == 12
@@ -105,9 +106,9 @@ def test_the_same_seed_gives_the_same_points_and_another_others(folder: Path) ->
     # A Sobol sequence lies evenly: of 8 points one in each eighth of the logarithm.
     eighths = np.floor(8.0 * np.log(np.array(values[:8]) / 2e-5) / np.log(4.0))
     assert sorted(eighths) == list(range(8))
-    other = jobs(plan_of(folder, DRAW.replace("seed = 5", "seed = 6")))
+    other = planned_flights(plan_of(folder, DRAW.replace("seed = 5", "seed = 6")))
     assert [job.changes for job in other] != [job.changes for job in one]
-    reseeded = jobs(plan_of(folder, DRAW.replace("seed = 5", "seed = 5\nreseed = true")))
+    reseeded = planned_flights(plan_of(folder, DRAW.replace("seed = 5", "seed = 5\nreseed = true")))
     assert len({job.seed for job in reseeded}) == 12
 
 
@@ -150,13 +151,16 @@ def test_a_killed_sweep_goes_on_and_repeats_no_flight(folder: Path) -> None:
     assert after.startswith(before)
     flights = [json.loads(line)["flight"] for line in after.splitlines()[1:]]
     assert sorted(flights) == list(range(120))
-    fresh = {job.number: fly_job(plan, job) for job in jobs(plan)[::40]}
+    fresh = {
+        job.number: fly_planned(plan, job).as_dict(plan.columns)
+        for job in planned_flights(plan)[::40]
+    }
     for number, row in fresh.items():
         assert found.row(number, named=True) == row
 
 
 def test_two_sweeps_into_one_folder_are_one_line(folder: Path) -> None:
-    with opened(folder / "o", plan_of(folder).identity):
+    with opened(folder / "o", plan_of(folder)):
         second = coupled(folder, "sweep", "s.toml", "--folder", "o")
     assert (second.returncode, second.stdout) == (2, "")
     assert second.stderr == "error: o: another sweep is writing there\n"
@@ -201,7 +205,7 @@ values = [10.0]
 def test_a_full_disk_is_one_line_and_keeps_what_is_there(folder: Path) -> None:
     plan, limits = plan_of(folder), resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
-        with opened(folder / "o", plan.identity) as journal:
+        with opened(folder / "o", plan) as journal:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1500, limits[1]))
             with pytest.raises(InputError, match=r"flights\.jsonl: cannot be written: .* are kept"):
                 fly_sweep(plan, journal, Here())
@@ -226,7 +230,7 @@ def changed(old: str, new: str) -> str:
         (changed("pilot.column.force_N", "nothing"), "vary[1]: nothing = 20.0: unknown key"),
         (changed("pilot.column.force_N", "event.gust.to"), "has no event 'gust'; it has none"),
         (changed("pilot.column.force_N", "expect.most"), "vary: expect.most changes no flight"),
-        (changed("pilot.column.force_N", BEND), f"vary: {BEND} stands there twice"),
+        (changed("pilot.column.force_N", BEND), f"vary: duplicate {BEND}"),
         (changed("high = 60.0", "high = 10.0"), "vary[1].high: must be above low"),
         (changed("high = 60.0", ""), "vary[1]: give values, or low and high"),
         (changed("steps = 3", ""), "vary[1].steps: is given for a range in a grid"),
@@ -296,11 +300,11 @@ def test_a_column_of_words_and_lists_is_a_column_of_text(folder: Path) -> None:
 
 
 def test_a_parameter_is_drawn_with_its_unit() -> None:
-    assert parameter(BEND) == "column loader bend, m/N"
-    assert parameter("rig.flight.calibrated_airspeed_m_per_s") == "calibrated airspeed, m/s"
-    assert parameter("pilot.column.force_N") == "pilot column force, N"
-    assert parameter("seed") == "seed"
-    assert parameter("rig.controls.column.rigging.stretch_loss_per_Pa").endswith("loss, 1/Pa")
+    assert parameter_label(BEND) == "column loader bend, m/N"
+    assert parameter_label("rig.flight.calibrated_airspeed_m_per_s") == "calibrated airspeed, m/s"
+    assert parameter_label("pilot.column.force_N") == "pilot column force, N"
+    assert parameter_label("seed") == "seed"
+    assert parameter_label("rig.controls.column.rigging.stretch_loss_per_Pa").endswith("loss, 1/Pa")
 
 
 CLUSTER = """
@@ -338,7 +342,7 @@ def test_a_cluster_of_two_workers_makes_the_same_table(folder: Path) -> None:
     with (
         cluster(folder, 2) as address,
         executor(1, address) as pool,
-        opened(folder / "o", plan.identity) as journal,
+        opened(folder / "o", plan) as journal,
     ):
         found = fly_sweep(plan, journal, pool)
     assert found.equals(flown(plan, folder / "here"))

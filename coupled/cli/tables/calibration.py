@@ -13,17 +13,17 @@ from coupled.record.channels import unit_of
 from coupled.units import POUND_N, DEGREE_rad, INCH_PER_POUND_m_per_N
 
 if TYPE_CHECKING:
-    from coupled.calibration.calibrate import Result
-    from coupled.calibration.checks import Check
+    from coupled.calibration.checks import ControlCheck
     from coupled.calibration.coverage import Coverage
     from coupled.calibration.estimate import Estimate
     from coupled.calibration.plan import Precision, Station
+    from coupled.calibration.result import CalibrationResult
 
 CREEP = 3.0  # standard errors of the mean rise that are no chance
 LARGE, SMALL = 2.0, 0.4  # residuals over the instruments' errors that call for a word
 
 
-def print_calibration(console: Console, found: Result) -> None:
+def print_calibration(console: Console, found: CalibrationResult) -> None:
     """Print what readings tell: the figures, how far to trust them, and which to use."""
     d = unit_of(found.control)
     bend = found.line.bend
@@ -57,7 +57,7 @@ def print_calibration(console: Console, found: Result) -> None:
     console.print()
     console.print(table)
     console.print()
-    for line in _words(found):
+    for line in _remarks(found):
         console.print(line, highlight=False, markup=False)
 
 
@@ -77,42 +77,42 @@ def _number(value: float, error: float) -> str:
     return f"{value:#.{min(max(figures, 2), 9)}g}".rstrip(".")
 
 
-def _words(found: Result) -> list[str]:
+def _remarks(found: CalibrationResult) -> list[str]:
     line, plain = found.line, found.plain
     size = np.abs(line.residual)
     row = found.readings.row[int(np.argmax(size))]
-    words = [
+    lines = [
         f"residuals of v1: {float(np.sqrt(np.mean(size**2))):.3g} V rms,"
         f" largest {size.max():.3g} V in row {row}",
         f"condition number {found.condition:.3g}; errors of S1 and K correlate by"
         f" {line.correlation:+.2f}",
     ]
     if np.isfinite(line.excess):
-        words[0] += f"; {line.excess:.2f} of what the instruments explain"
+        lines[0] += f"; {line.excess:.2f} of what the instruments explain"
         if line.excess > LARGE:
-            words.append("They are larger: an instrument errs more, or the bend is not straight.")
+            lines.append("They are larger: an instrument errs more, or the bend is not straight.")
         elif line.excess < SMALL:
-            words.append("They are smaller: the instruments are better than stated.")
+            lines.append("They are smaller: the instruments are better than stated.")
     if line.bend.error > 0.0:
         off = (plain.bend.value - line.bend.value) / line.bend.error
-        words.append(
+        lines.append(
             f"Ordinary least squares takes ruler and scale as exact, which biases it: its K is"
             f" {off:+.2f} standard errors off. Use the figures with errors in all variables;"
             " the ordinary ones only where the voltmeter alone errs, or beside an old fit."
         )
     for s in found.suspects:
-        words.append(
+        lines.append(
             f"row {s.row} is left out: {s.columns} is {s.deviations:.0f} standard deviations"
             " off, mistyped?"
         )
-    words += _creep_words(found) + _outcome_words(found) + _arc_words(found)
-    words += [f"stale calibration in the rig file: {change}" for change in found.changed]
-    return words
+    lines += _creep_lines(found) + _accuracy_lines(found) + _arc_lines(found)
+    lines += [f"stale calibration in the rig file: {change}" for change in found.changed]
+    return lines
 
 
-def _creep_words(found: Result) -> list[str]:
+def _creep_lines(found: CalibrationResult) -> list[str]:
     """Return what the second looks show of a control that crept, and a null from one side."""
-    words = []
+    lines = []
     d, factor, unit = unit_of(found.control), 1000.0, "mm"
     if d == "rad":
         factor, unit = 1.0 / DEGREE_rad, "°"
@@ -125,21 +125,21 @@ def _creep_words(found: Result) -> list[str]:
         text += f" (std. error {factor * error:.1g})"
         if abs(mean) > CREEP * error > 0.0:
             text += "; the control creeps while it is read, their mean allows for it"
-        words.append(text)
+        lines.append(text)
     if found.one_sided:
-        words.append(
+        lines.append(
             "The nulls are not four or more from both sides, and the control has friction: S2 is"
             " widened for what a wandering hand does then. Take more from beyond (approach: in)."
         )
-    return words
+    return lines
 
 
-def _outcome_words(found: Result) -> list[str]:
+def _accuracy_lines(found: CalibrationResult) -> list[str]:
     """Return what the figures give to those who fly with them."""
-    if found.outcome is None or found.outcome.deflection.error == 0.0:
+    if found.accuracy is None or found.accuracy.deflection.error == 0.0:
         return []
-    off, felt = found.outcome.deflection, found.outcome.felt
-    gradient = f"{found.outcome.gradient:.4g} N/{unit_of(found.control)}"
+    off, felt = found.accuracy.deflection, found.accuracy.felt
+    gradient = f"{found.accuracy.gradient:.4g} N/{unit_of(found.control)}"
     text = f"compensated with these, at {gradient} the aircraft gets the deflection to within"
     text += f" {100 * off.half_width:.2g} %"
     if felt is not None:
@@ -147,7 +147,7 @@ def _outcome_words(found: Result) -> list[str]:
     return [f"{text} (95 %)"]
 
 
-def _arc_words(found: Result) -> list[str]:
+def _arc_lines(found: CalibrationResult) -> list[str]:
     if found.angle_rad is None or not found.beyond:
         return []
     most = float(np.max(np.abs(found.angle_rad)))
@@ -222,7 +222,9 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     console.print(table)
 
 
-def print_checks(console: Console, control: str, checks: Sequence[Check], every: bool) -> None:
+def print_checks(
+    console: Console, control: str, checks: Sequence[ControlCheck], every: bool
+) -> None:
     """Print a control's checks: those that fail and each kind's narrowest, or every one."""
     shown = list(checks) if every else _narrowest(checks)
     table = Table(box=None, pad_edge=False)
@@ -245,9 +247,9 @@ def _short(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
 
 
-def _narrowest(checks: Sequence[Check]) -> list[Check]:
+def _narrowest(checks: Sequence[ControlCheck]) -> list[ControlCheck]:
     """Return every check that fails, and of each kind the one with the least margin."""
-    least: dict[str, Check] = {}
+    least: dict[str, ControlCheck] = {}
     for check in checks:
         kind = check.name.split(",")[0]
         if kind not in least or check.margin < least[kind].margin:

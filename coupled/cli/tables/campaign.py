@@ -11,11 +11,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from coupled.campaign.words import parameter, wanted
+from coupled.campaign.labels import parameter_label
+from coupled.campaign.verdict import wanted
 
 if TYPE_CHECKING:
-    from coupled.campaign.sensitivity import Index
-    from coupled.campaign.survival import Limit
+    from coupled.campaign.sensitivity import SobolIndex
+    from coupled.campaign.survival import SurvivalLimit
     from coupled.campaign.verdict import Verdict
 
 _SHOWN = 6  # parameters of a figure, the strongest
@@ -67,34 +68,33 @@ def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -
         console.print(f"[yellow]{len(ended)} of {len(found)} ended early[/]; {escape(why)}")
 
 
-def print_indices(console: Console, told: Sequence[Index]) -> None:
+def print_indices(console: Console, indices: Sequence[SobolIndex]) -> None:
     """Print of each figure the parameters that matter most, by their total index."""
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("shares of the variance", overflow="fold")
     for head in ("alone", "95 %", "with others", "95 %"):
         table.add_column(head, justify="right", no_wrap=True)
-    for (configuration, figure), group in groupby(told, key=lambda i: (i.configuration, i.figure)):
-        ordered = sorted(group, key=lambda index: -(index.total or 0.0))
+    groups = groupby(indices, key=lambda index: (index.configuration, index.figure))
+    for (configuration, figure), group in groups:
+        ordered = sorted(group, key=lambda i: -(i.total.value if i.total else 0.0))
         table.add_row(f"[bold]{escape(configuration)}: {figure}[/]", *[""] * 4)
         for index in ordered[:_SHOWN]:
-            table.add_row(f" {escape(parameter(index.key).partition(',')[0])}", *_shares(index))
+            label = parameter_label(index.key).partition(",")[0]
+            table.add_row(f" {escape(label)}", *_shares(index))
     console.print(table, highlight=False)
 
 
-def _shares(index: Index) -> tuple[str, ...]:
+def _shares(index: SobolIndex) -> tuple[str, ...]:
     cells: list[str] = []
-    for value, low, high in (
-        (index.first, index.first_low, index.first_high),
-        (index.total, index.total_low, index.total_high),
-    ):
-        if value is None or low is None or high is None:
+    for share in (index.first, index.total):
+        if share is None:
             cells += ["–", ""]
         else:
-            cells += [f"{value:.3f}", f"{low:.3f} to {high:.3f}"]
+            cells += [f"{share.value:.3f}", f"{share.low:.3f} to {share.high:.3f}"]
     return tuple(cells)
 
 
-def print_survival(console: Console, limits: Sequence[Limit]) -> None:
+def print_survival(console: Console, limits: Sequence[SurvivalLimit]) -> None:
     """Print what each configuration survives, and its boundary beside the closed form's."""
     if not limits:
         return

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupled.calibration.belief import Scales
+from coupled.calibration.assumed import Scales
 from coupled.calibration.errors_in_variables import JointFit
 from coupled.calibration.estimate import Estimate, total
 from coupled.rig.equations import bend_loss, felt_gradient, modifying_gradient
@@ -22,7 +22,7 @@ from coupled.rig.parameters import Control
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Accuracy:
     """How far off δ̂ and the felt gradient may be, as shares, and at which gradient in N/d.
 
     `felt` is None where S₂ was not found.
@@ -32,9 +32,17 @@ class Outcome:
     deflection: Estimate
     felt: Estimate | None
 
+    def as_dict(self, d: str) -> dict[str, float]:
+        """Return it as JSON takes it; `d` is the unit of deflection."""
+        table = {f"gradient_N_per_{d}": self.gradient}
+        table["deflection_half_width"] = self.deflection.half_width
+        if self.felt is not None:
+            table["felt_half_width"] = self.felt.half_width
+        return table
+
 
 def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g: float) -> float:
-    """Return δ̂/δ − 1 at a gradient in N/d, for scales and K (d/N) believed and true."""
+    """Return δ̂/δ − 1 at a gradient in N/d, for scales and K (d/N) assumed and true."""
     seen = true.s1 / found.s1 * (1.0 - bend_loss(true_bend, g))
     return seen + bend_loss(bend, g) * true.s3 / found.s3 - 1.0
 
@@ -44,14 +52,14 @@ def felt_off(
 ) -> float:
     """Return felt over specified gradient less 1.
 
-    `s2_ratio` is S₂ believed over true, `gradients` (G, G_B) in N/d.
+    `s2_ratio` is S₂ assumed over true, `gradients` (G, G_B) in N/d.
     """
     g, basic = gradients
     held = basic + modifying_gradient(g, bend, basic) * s2_ratio
     return felt_gradient(held, true_bend) / g - 1.0
 
 
-def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | None:
+def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Accuracy | None:
     """Return how far off deflection and feel may be at the gradient where that is most.
 
     None where the structure is no stiffer than the gradient, which no compensation can give.
@@ -65,13 +73,13 @@ def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Outcome | 
     return max(found, key=lambda one: one.deflection.half_width, default=None)
 
 
-def _at(fit: JointFit, s2: Estimate | None, g: float, basic: float) -> Outcome:
+def _at(fit: JointFit, s2: Estimate | None, g: float, basic: float) -> Accuracy:
     s1, bend, s3 = fit.line.s1.value, fit.line.bend.value, fit.s3.value
     lost = bend_loss(bend, g)
     off = fit.estimate(0.0, -(1.0 - lost) / s1, g, -lost / s3)
     if s2 is None:
-        return Outcome(g, off, None)
+        return Accuracy(g, off, None)
     by_bend = fit.estimate(0.0, 0.0, g, 0.0)
     by_s2 = (1.0 - lost) * (1.0 - basic / g * (1.0 - lost)) / s2.value
     scaled = Estimate(0.0, abs(by_s2) * s2.error, s2.freedom)
-    return Outcome(g, off, total(by_bend, scaled))
+    return Accuracy(g, off, total(by_bend, scaled))

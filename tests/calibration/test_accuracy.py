@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.calibration.belief import Scales
+from coupled.calibration.accuracy import deflection_off, expected, felt_off
+from coupled.calibration.assumed import Scales
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Estimate, usual_instruments
-from coupled.calibration.outcome import deflection_off, expected, felt_off
 from coupled.rig.statics import static_line
-from tests.support.readings import S1, S2, S3, K, column, grid, with_errors
+from tests.support.readings import S1, S2, S3, K, column, grid, report_rig, with_errors
 from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def test_closed_forms_are_the_rigs_statics() -> None:
-    """A host that believes 1.1·K, with S₁ real 0.93, S₂ 1.05 and S₃ 1.04 of what it believes."""
+    """A host that assumes 1.1·K, with S₁ real 0.93, S₂ 1.05 and S₃ 1.04 of what it assumes."""
     changes = {
         "sensing.deflection_scale": 0.93,
         "sensing.modifying_scale": 1.05,
@@ -27,9 +27,9 @@ def test_closed_forms_are_the_rigs_statics() -> None:
     felt = felt_off(1.0 / 1.05, 1.1 * K_REPORT, K_REPORT, (G_STIFF, 560.0))
     assert line.force[0] / line.deflection[0] / G_STIFF - 1.0 == pytest.approx(felt, rel=1e-9)
     # δ̂ at the gradient that is felt, which is not quite the one asked for
-    true, believed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
+    true, assumed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
     gradient = line.force[0] / line.deflection[0]
-    off = deflection_off(believed, 1.1 * K_REPORT, true, K_REPORT, float(gradient))
+    off = deflection_off(assumed, 1.1 * K_REPORT, true, K_REPORT, float(gradient))
     assert line.estimate[0] / line.deflection[0] - 1.0 == pytest.approx(off, rel=1e-9)
 
 
@@ -39,24 +39,26 @@ def test_what_is_promised_is_the_scatter_that_comes() -> None:
     for _ in range(400):
         fit = errors_in_variables(with_errors(*grid(), tools, rng), tools)
         s2 = Estimate(S2 * (1.0 + 0.002 * rng.standard_normal()), 0.002 * S2, 4.0)
-        outcome = expected(fit, s2, control)
-        assert outcome is not None
-        assert outcome.felt is not None
-        g, bend = outcome.gradient, fit.line.bend.value
-        believed = Scales(fit.line.s1.value, s2.value, fit.s3.value)
-        offs.append(deflection_off(believed, bend, true, K, g))
+        found = expected(fit, s2, control)
+        assert found is not None
+        assert found.felt is not None
+        g, bend = found.gradient, fit.line.bend.value
+        assumed = Scales(fit.line.s1.value, s2.value, fit.s3.value)
+        offs.append(deflection_off(assumed, bend, true, K, g))
         felts.append(felt_off(s2.value / S2, bend, K, (g, control.loader.basic_gradient)))
-        errors.append((outcome.deflection.error, outcome.felt.error))
+        errors.append((found.deflection.error, found.felt.error))
     promised = np.sqrt(np.mean(np.square(errors), axis=0))
     assert promised[0] == pytest.approx(np.std(offs), rel=0.12)
     assert promised[1] == pytest.approx(np.std(felts), rel=0.12)
 
 
-def test_without_s2_the_feel_is_not_told_and_a_soft_structure_tells_nothing() -> None:
+def test_without_s2_the_feel_is_not_known_and_a_soft_structure_tells_nothing() -> None:
     rng, tools = np.random.default_rng(2), usual_instruments("column")
     fit = errors_in_variables(with_errors(*grid(), tools, rng), tools)
-    outcome = expected(fit, None, column())
-    assert outcome is not None
-    assert outcome.felt is None
-    stiff = column().schedule.model_copy(update={"total_gradient": [560.4] * 3 + [1.1 / K]})
-    assert expected(fit, None, column().model_copy(update={"schedule": stiff})) is None
+    found = expected(fit, None, column())
+    assert found is not None
+    assert found.felt is None
+    place = "controls.column"
+    stiff = {f"{place}.schedule.total_gradient_N_per_m": [560.4] * 3 + [1.1 / K]}
+    stiff |= {f"{place}.{which}.bend_m_per_N": 0.0 for which in ("loader", "compensation")}
+    assert expected(fit, None, report_rig().changed(stiff).controls["column"]) is None

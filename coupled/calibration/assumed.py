@@ -1,0 +1,76 @@
+"""The scales that the host assumes, those that the hardware has, and a calibration gone stale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coupled.rig.parameters import Control
+
+# What a calibration was made under, and its unit; another value makes it stale.
+GAINS = {"mechanical_advantage": "", "s1_over_s2": "N_per_{d}", "s3_over_s2": ""}
+
+
+@dataclass(frozen=True)
+class Scales:
+    """S₁ in V/d, S₂ and S₃ in V/N."""
+
+    s1: float
+    s2: float
+    s3: float
+
+
+def assumed_scales(control: Control) -> Scales:
+    """Return the scales of the rig file, which the host assumes.
+
+    One that is left out puts the converters' full scale at full travel, or at the force that
+    full travel takes at the stiffest gradient (the report's 100-V scale factors).
+    """
+    sensing = control.sensing
+    most = max(control.schedule.total_gradient) * control.travel + control.loader.breakout
+    volts = sensing.full_scale
+    force_scale = volts / most if most > 0.0 else 1.0
+    s1 = sensing.s1 or volts / control.travel
+    return Scales(s1, sensing.s2 or force_scale, sensing.s3 or force_scale)
+
+
+def real_scales(control: Control) -> Scales:
+    """Return the scales that the hardware really has."""
+    assumed, factor = assumed_scales(control), control.sensing
+    return Scales(
+        assumed.s1 * factor.deflection_scale,
+        assumed.s2 * factor.modifying_scale,
+        assumed.s3 * factor.force_scale,
+    )
+
+
+def stale(control: Control) -> list[str]:
+    """Return what has changed since a control's calibration, a phrase each; empty if nothing."""
+    then = control.calibration
+    if then.readings == 0:
+        return []
+    now = {"length": control.length, **{n: getattr(control.gains, n) for n in GAINS}}
+    named = {
+        "length": "the column's length (m)",
+        "mechanical_advantage": "the mechanical advantage",
+        "s1_over_s2": "the gain S1/S2",
+        "s3_over_s2": "the gain S3/S2",
+    }
+    changes = [
+        f"{named[name]} was {getattr(then, name):.6g} and is {value:.6g}"
+        for name, value in now.items()
+        if not _same(getattr(then, name), value)
+    ]
+    used = {"S1": (then.s1, control.sensing.s1), "S3": (then.s3, control.sensing.s3)}
+    used["K"] = (max(then.bend, 0.0), control.compensation.bend)
+    if then.s2 > 0.0:
+        used["S2"] = (then.s2, control.sensing.s2)
+    changes += [
+        f"the host uses {name} = {value:.6g}, not the calibrated {found:.6g}"
+        for name, (found, value) in used.items()
+        if not _same(found, value)
+    ]
+    return changes
+
+
+def _same(one: float, other: float) -> bool:
+    return abs(one - other) <= 1e-9 * max(abs(one), abs(other))

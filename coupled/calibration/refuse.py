@@ -1,0 +1,99 @@
+"""Readings that cannot be fitted, or tell too little: refused, with what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from coupled.calibration.estimate import Instruments
+from coupled.calibration.readings import Readings
+from coupled.errors import InputError
+from coupled.record.channels import unit_of
+from coupled.rig.parameters import Control
+
+FEWEST = 4  # a line of two unknowns, and something left to tell their errors by
+FAR = 0.1  # of the largest: what lies nearer to neutral may have any sign
+BEYOND_TRAVEL = 1.5  # that much more travel than there is, and the unit is wrong
+SURELY = 0.999  # how sure it must be that the gradients differ
+
+
+def refuse_poor(
+    readings: Readings, control: Control, name: str, instruments: Instruments, file: Path | str
+) -> None:
+    """Raise InputError for readings too few, of one force or gradient, of a wrong sign or unit."""
+    n, force, deflection = len(readings.row), readings.force, readings.deflection
+    if n < FEWEST:
+        raise InputError(
+            file, "", f"has deflection and force in {n} rows; {FEWEST} readings are the least"
+        )
+    if np.count_nonzero(force) < FEWEST:
+        raise InputError(
+            file, "force", f"is not 0 in {np.count_nonzero(force)} rows; {FEWEST} at least"
+        )
+    rows = f"rows {readings.row[0]} to {readings.row[-1]}"
+    for quantity, values in (("force", force), ("v1", readings.v1), ("v3", readings.v3)):
+        if np.ptp(values) <= 1e-12 * np.max(np.abs(values)):
+            problem = f"every {quantity} is the same; S1 and K need readings that differ"
+            raise InputError(file, rows, problem)
+    _refuse_signs(readings, control, name, file)
+    if len(set(readings.label)) == 1:
+        why = f"all readings are of one gradient set, {readings.label[0]!r}"
+    elif not _gradients_differ(readings, instruments):
+        why = "all gradients F/deflection are the same to within the instruments' errors"
+    else:
+        return
+    slope = float(force @ deflection / (deflection @ deflection))
+    separating = _separating(control, slope, float(np.max(np.abs(force))), unit_of(name))
+    problem = (
+        f"{why}: with one gradient v1 = (S1 - S1*K*G)*deflection, and S1 and K are inseparable"
+    )
+    raise InputError(file, rows, f"{problem}; {separating}")
+
+
+def _refuse_signs(readings: Readings, control: Control, name: str, file: Path | str) -> None:
+    """Refuse what a wrong sign or unit gives, by its row."""
+    deflection, force = readings.deflection, readings.force
+    far = np.abs(deflection) > FAR * np.max(np.abs(deflection))
+    far &= np.abs(force) > FAR * np.max(np.abs(force))  # friction may turn a small force
+    against = far & (deflection * force < 0.0)
+    if against.any():
+        row = int(readings.row[np.argmax(against)])
+        problem = "force and deflection have different signs; a pull moves the control with it"
+        raise InputError(file, f"row {row}", problem)
+    if force @ readings.v3 < 0.0:
+        raise InputError(file, "v3_V", "falls as the force grows; check its sign")
+    wrong = readings.null_v2 * readings.null_v3 < 0.0
+    if wrong.any():
+        row = int(readings.null_row[np.argmax(wrong)])
+        problem = "has another sign than v3; the supply takes the hand's place"
+        raise InputError(file, f"row {row}: v2_V", problem)
+    if np.median(np.abs(deflection)) > BEYOND_TRAVEL * control.travel:
+        d = unit_of(name)
+        problem = f"is {deflection[0]:.4g} {d}, the {name}'s travel is {control.travel:g} {d}"
+        raise InputError(file, f"row {readings.row[0]}: deflection", f"{problem}; another unit?")
+
+
+def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
+    """Return whether F = G·δ with one G is surely wrong."""
+    deflection, force = readings.deflection, readings.force
+    slope = float(force @ deflection / (deflection @ deflection))
+    ruler = instruments.deflection_variance(deflection, readings.deflection_looks)
+    variance = instruments.force_variance(force, readings.force_looks) + slope**2 * ruler
+    variance += (1e-7 * np.max(np.abs(force))) ** 2
+    excess = float(np.sum((force - slope * deflection) ** 2 / variance))
+    return excess > float(chi2.ppf(SURELY, len(force) - 1))
+
+
+def _separating(control: Control, slope: float, strongest: float, d: str) -> str:
+    """Return, for a message, the reading that would separate S₁ and K best."""
+    gradients = np.array(control.schedule.total_gradient)
+    other = float(gradients[np.argmax(np.abs(gradients - slope))])
+    if abs(other - slope) < 0.02 * abs(slope):
+        return f"the rig's schedule has no other gradient than {slope:.4g} N/{d}: give it one"
+    held = min(0.95 * control.travel, strongest / other) if other > 0.0 else 0.95 * control.travel
+    return (
+        f"add a reading at {other:.4g} N/{d}, at {held:.3g} {d} ({held * other:.3g} N),"
+        f" where these are at {slope:.4g} N/{d}"
+    )

@@ -1,0 +1,107 @@
+"""What readings tell of a control: S₁, S₂, S₃ and K, their errors, and what they are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.calibration import arc
+from coupled.calibration.accuracy import Accuracy
+from coupled.calibration.errors_in_variables import JointFit
+from coupled.calibration.estimate import Estimate
+from coupled.calibration.fit import LineFit
+from coupled.calibration.readings import Readings
+from coupled.calibration.suspects import Suspect
+from coupled.record.channels import unit_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """What readings tell of a control.
+
+    `fit` allows for errors in all variables, `plain` is ordinary least squares, `printed`
+    (a, b) of the normal equations; `s3_mean` is eq. (13); `s2` each way to it; `accuracy` what
+    that makes of deflection and feel, None where no compensation can be given. `one_sided`:
+    nulls from one side only, on a control with friction. `readings` are those used, along the
+    arc; `level` as a level ruler read them, where they were corrected, and else None.
+    """
+
+    control: str
+    fit: JointFit
+    plain: LineFit
+    printed: tuple[float, float]
+    condition: float
+    s3_mean: Estimate
+    s2: dict[str, Estimate]
+    one_sided: bool
+    accuracy: Accuracy | None
+    suspects: tuple[Suspect, ...]
+    readings: Readings
+    level: Floats | None
+    angle_rad: Floats | None
+    changed: tuple[str, ...]
+
+    @property
+    def line(self) -> LineFit:
+        """S₁ and K with errors in all variables."""
+        return self.fit.line
+
+    @property
+    def s3(self) -> Estimate:
+        """S₃ in V/N with errors in all variables."""
+        return self.fit.s3
+
+    @property
+    def count(self) -> int:
+        """Readings used."""
+        return len(self.readings.row)
+
+    @property
+    def s2_chosen(self) -> Estimate | None:
+        """S₂ as measured by the null, or else from a gain, or none."""
+        return next(reversed(self.s2.values()), None)
+
+    @property
+    def beyond(self) -> list[int]:
+        """Rows beyond 14° of arc."""
+        if self.angle_rad is None:
+            return []
+        return [int(r) for r in self.readings.row[np.abs(self.angle_rad) > arc.LIMIT_rad]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON takes them, units in the names."""
+        d = unit_of(self.control)
+        fits = {"errors_in_variables": self.line, "ordinary_least_squares": self.plain}
+        table: dict[str, Any] = {"control": self.control, "readings": self.count}
+        for name, fit in fits.items():
+            table[name] = {
+                f"s1_V_per_{d}": fit.s1.as_dict(),
+                f"bend_{d}_per_N": fit.bend.as_dict(),
+                "correlation": fit.correlation,
+                "residuals_over_instruments": None if np.isnan(fit.excess) else fit.excess,
+                "residual_V": fit.residual.tolist(),
+            }
+        a, b = self.printed
+        table["normal_equations"] = {f"a_V_per_{d}": a, "b_V_per_N": b}
+        table["condition"] = self.condition
+        table["s3_V_per_N"] = {
+            "eq_13": self.s3_mean.as_dict(),
+            "errors_in_variables": self.s3.as_dict(),
+        }
+        table["correlation_of_s1_bend_s3"] = self.fit.correlation.tolist()
+        table["s2_V_per_N"] = {way: estimate.as_dict() for way, estimate in self.s2.items()}
+        if self.accuracy is not None:
+            table["outcome"] = self.accuracy.as_dict(d)
+        table["rows"] = self.readings.row.tolist()
+        table["left_out"] = [
+            {"row": s.row, "columns": s.columns, "deviations": s.deviations} for s in self.suspects
+        ]
+        table["rows_beyond_14_deg"] = self.beyond
+        table["corrected_to_the_arc"] = self.level is not None
+        table["stale"] = list(self.changed)
+        return table

@@ -1,0 +1,145 @@
+"""A sweep's flights, flown: a row a flight, kept as soon as it is done, and one table at the end.
+
+The rows depend on the sweep's file alone, not on who flew them or in which order.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, as_completed, wait
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.authority.compare import judge
+from coupled.campaign.entry import AS_FILED, SURVIVED, Cell, JournalEntry
+from coupled.campaign.journal import Journal
+from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, planned_flights
+from coupled.campaign.sweepfile import Survive
+from coupled.errors import InputError
+from coupled.flight.loop import fly
+from coupled.record.record import Record
+
+Progress = Callable[[str, int, int], None]
+_AHEAD = 64  # flights that wait for a worker
+
+
+def fly_planned(plan: SweepPlan, flight: PlannedFlight) -> JournalEntry:
+    """Return what came of one flight; why it ended early, or could not be flown, is in it."""
+    sweep, columns = plan.sweep, plan.columns
+    entry = JournalEntry(
+        flight.number,
+        {key: _cell(flight.changes[key]) for key in plan.keys},
+        flight.configuration or AS_FILED,
+        dict.fromkeys(columns.figures),
+        None,
+        None,
+        "",
+    )
+    try:
+        scenario = plan.scenario(flight.changes)
+        if flight.seed is not None:
+            scenario = replace(scenario, seed=flight.seed)
+        entry = replace(entry, seed=scenario.seed)
+        if flight.configuration:
+            scenario = scenario.configured(flight.configuration)
+        record = fly(scenario)
+    except InputError as error:
+        return replace(entry, ended_early=f"not flown: {error.problem}")
+    ended = record.manifest["ended_early"]
+    if ended and ended["reason"] == "interrupted":
+        raise KeyboardInterrupt
+    outcome = judge(scenario, entry.configuration, record).as_dict()
+    figures = {name: outcome[name] for name in sweep.keep} | _extremes(record, sweep.extremes)
+    survived = None
+    if sweep.survive:
+        survived = not ended and all(_kept(record[s.channel], s) for s in sweep.survive)
+    why = outcome["ended_early"]
+    return replace(entry, figures=figures, survived=survived, ended_early=why)
+
+
+def fly_sweep(
+    plan: SweepPlan, journal: Journal, pool: Executor, progress: Progress | None = None
+) -> pl.DataFrame:
+    """Fly what the journal lacks, and return the table, a row a flight in their order.
+
+    `progress` is called with flights done and to do since this began, so that the time left
+    is judged by what is flown now.
+    """
+    todo = [flight for flight in planned_flights(plan) if flight.number not in journal.done]
+    every = len(journal.done) + len(todo)
+    for done, entry in enumerate(_entries(plan, todo, pool), 1):
+        journal.add(entry)
+        if progress is not None:
+            progress(f"{len(journal.done)} of {every} flights", done, len(todo))
+    return table(plan, journal.entries())
+
+
+def _entries(
+    plan: SweepPlan, todo: Sequence[PlannedFlight], pool: Executor
+) -> Iterator[JournalEntry]:
+    """Yield each flight as soon as it is done; a bounded number of them waits."""
+    waiting: set[Future[JournalEntry]] = set()
+    packed = pickle.dumps(plan)
+    for flight in todo:
+        waiting.add(pool.submit(_fly_packed, packed, flight))
+        patience_s = None if len(waiting) >= _AHEAD else 0.0
+        done, waiting = wait(waiting, patience_s, FIRST_COMPLETED)
+        yield from (future.result() for future in done)
+    yield from (future.result() for future in as_completed(waiting))
+
+
+def _fly_packed(packed: bytes, flight: PlannedFlight) -> JournalEntry:
+    """Fly one of a plan that is sent as bytes, which costs nothing to send again."""
+    return fly_planned(_unpacked(packed), flight)
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> SweepPlan:
+    plan: SweepPlan = pickle.loads(packed)
+    return plan
+
+
+def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:
+    """Return the table of flights, as they stand; numbers as doubles."""
+    columns = plan.columns
+    rows = [entry.as_dict(columns) for entry in entries]
+    kinds = dict.fromkeys(columns.figures, pl.Float64)
+    made: dict[str, pl.Series] = {}
+    for name in columns.names:
+        values = [row[name] for row in rows]
+        kind: Any = kinds.get(name, pl.Int64)
+        if name in columns.keys:
+            real = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values)
+            kind = pl.Float64 if real else pl.String
+            values = [v if v is None or real else str(v) for v in values]
+        elif name in ("configuration", "ended_early"):
+            kind = pl.String
+        elif name == SURVIVED:
+            kind = pl.Boolean
+        made[name] = pl.Series(name, values, dtype=kind, strict=False)
+    return pl.DataFrame(made)
+
+
+def _cell(value: Any) -> Cell:
+    """Return a varied value as a cell takes it: a number or word as it is, else as JSON."""
+    return value if isinstance(value, (int, float, str)) else json.dumps(value, default=str)
+
+
+def _kept(values: NDArray[np.float64], survive: Survive) -> bool:
+    low = -np.inf if survive.least is None else survive.least
+    high = np.inf if survive.most is None else survive.most
+    return bool(np.all((values >= low) & (values <= high)))
+
+
+def _extremes(record: Record, channels: Sequence[str]) -> dict[str, float | None]:
+    if not len(record):
+        return dict.fromkeys(extreme_names(channels))
+    found = [f(record[name]) for name in channels for f in (np.min, np.max)]
+    return dict(zip(extreme_names(channels), map(float, found), strict=True))
