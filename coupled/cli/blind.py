@@ -26,16 +26,29 @@ def make(
         int | None, typer.Option(min=0, help="For the same bytes again.  [default: drawn]")
     ] = None,
     records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
-    rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the shipped ones.")] = 24,
+    rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,
+    trials: Annotated[int, typer.Option(min=1, help="Version of the trials.")] = 1,
+    workers: Annotated[
+        int, typer.Option("--workers", "-j", min=0, max=512, help="Processes; 0: one a core.")
+    ] = 0,
 ) -> None:
-    """Write sealed records of an independent twin, with and without effects; the key apart."""
+    """Write sealed records of an independent twin, with and without effects; the key elsewhere."""
     from coupled.blind.trials.make import make as make_trials
 
     path = key or folder.with_name(folder.name + ".key.json")
     if folder.is_file():
         raise InputError(folder, "", "is a file; give a new folder")
-    with progress() as advance:
-        make_trials(folder, path, seed, records, rigs, advance)
+    try:
+        with progress() as advance:
+            made = make_trials(
+                folder, path, seed, records, rigs, advance, version=trials, workers=workers
+            )
+    except KeyboardInterrupt:
+        if folder.is_dir():
+            say(f"what is made is kept in {folder}: the same command goes on")
+        raise
+    if made.before:
+        say(f"{folder} is finished already, by these numbers: nothing was made")
     say(f"records: {folder / 'records'}  ({records}, with their rigs in {folder / 'records.toml'})")
     say(f"seal: {folder / 'seal.toml'}")
     say(f"key: {path}  (not to be opened before the diagnoses are made)")
@@ -81,4 +94,4 @@ def score(
         save(draw_score(found), figure)
         if json_file != "-":
             say(f"figure: {figure}")
-    give_json(found, json_file)
+    give_json(found.as_dict(), json_file)

@@ -2,41 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from coupled.blind.trials.result import Score, Share
 
 _BLUE, _ORANGE = "#0072b2", "#d55e00"
 
 
-def draw_score(score: dict[str, Any]) -> Figure:
-    """Draw the share named against the size of the effect, and told against true probability.
+def draw_score(score: Score) -> Figure:
+    """Draw the share named against the size of the effect, and stated against true probability.
 
     Bars are 95 % intervals after Clopper and Pearson.
     """
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     power, reliability = figure.subplots(1, 2)
-    _points(power, [row["ratio"] for row in score["power"]], score["power"], _BLUE, "named")
-    wrong = [row["wrong"] / row["of"] for row in score["power"]]
-    power.plot([row["ratio"] for row in score["power"]], wrong, "x--", color=_ORANGE, label="wrong")
+    ratios = [row.ratio for row in score.power]
+    _points(power, ratios, [row.named for row in score.power], _BLUE, "named")
+    wrong = [row.wrong / row.named.of for row in score.power]
+    power.plot(ratios, wrong, "x--", color=_ORANGE, label="wrong")
     power.set(xscale="log", ylim=(-0.03, 1.03), ylabel="share of single effects")
     power.set_xlabel("stage's residual, with the effect over without")
     power.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     power.minorticks_off()
     power.legend(frameon=False)
-    bins = score["probabilities"]["bins"]
-    _points(reliability, [row["told"] for row in bins], bins, _BLUE, "")
+    bins = score.probabilities.bins
+    _points(reliability, [row.stated for row in bins], [row.true for row in bins], _BLUE, "")
     reliability.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=(0, (1, 1)))
     reliability.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03))
-    reliability.set(xlabel="probability told", ylabel="share that is true")
+    reliability.set(xlabel="stated probability", ylabel="share that is true")
     for axes in (power, reliability):
         axes.grid(alpha=0.25)
     return figure
 
 
-def _points(axes: Any, at: list[float], rows: list[dict[str, Any]], color: str, label: str) -> None:
-    shares = np.array([row["share"] for row in rows])
-    below = shares - np.array([row["low"] for row in rows])
-    above = np.array([row["high"] for row in rows]) - shares
-    axes.errorbar(at, shares, [below, above], fmt="o-", color=color, capsize=3, label=label)
+def _points(axes: Axes, at: list[float], rows: Sequence[Share], color: str, label: str) -> None:
+    shares, low, high = (
+        np.array([(row.share, row.low, row.high) for row in rows], dtype=float).reshape(-1, 3).T
+    )
+    bars = [shares - low, high - shares]
+    axes.errorbar(at, shares, bars, fmt="o-", color=color, capsize=3, label=label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from collections import Counter
@@ -10,15 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.blind.trials.key import check_seal, read_key
+from coupled.blind.trials import deck as decks
+from coupled.blind.trials.deck import KNOWN, VERSIONS, read_deck
+from coupled.blind.trials.key import Seal, check_seal, digest, read_key, read_seal
 from coupled.blind.trials.make import make
 from coupled.blind.trials.measure import stage_gaps
-from coupled.blind.trials.trial import SHARES, plans
+from coupled.blind.trials.rigs import rig_pool
+from coupled.blind.trials.trial import SHARES, Plan, plans
+from coupled.blind.trials.truth import truth_from
 from coupled.blind.twin.effects import EFFECTS
+from coupled.blind.twin.kinds import Kind
+from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.errors import InputError
+from coupled.gap.effects import BY_NAME
 from coupled.record.record import read_record
+from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.rigfile import read_rig
+from coupled.rig.rigwrite import rig_text
 from coupled.schema import load_toml
+from tests.support.processes import begun, kill
 from tests.test_cli import coupled, files
 
 RECORDS, SEED = 3, 3
@@ -31,26 +42,61 @@ def quiet(label: str, done: int, total: int) -> None:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("trials") / "set"
-    make(folder, folder.with_name("set.key.json"), SEED, RECORDS, 2, quiet)
+    make(folder, folder.with_name("set.key.json"), SEED, RECORDS, 2, quiet, workers=2)
     return folder
 
 
-def test_a_set_is_whole_and_tells_nothing(made: Path) -> None:
+@pytest.fixture
+def grown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ship one more rig, and know one more effect and one more outsider than now."""
+    shipped = tmp_path / "grown" / "aircraft"
+    shutil.copytree(aircraft_folder(), shipped)
+    text = (shipped / "bench" / "bench.toml").read_text()
+    (shipped / "bench" / "another.toml").write_text(text.replace('"bench"', '"another"', 1))
+    monkeypatch.setattr("coupled.resources._shipped", lambda kind: shipped.parent / kind)
+    assert "another" in shipped_rigs()
+    first, other = EFFECTS[0], OUTSIDERS[0]
+    more = Kind("another", first.stage, first.least, first.most, first.install)
+    beyond = Kind("beyond", other.stage, other.least, other.most, other.install)
+    monkeypatch.setattr(decks, "EFFECTS", (more, *EFFECTS))
+    monkeypatch.setattr(decks, "OUTSIDERS", (beyond, *OUTSIDERS))
+
+
+def drawn(version: int, seed: int, records: int, rigs: int) -> tuple[list[Plan], list[str]]:
+    """Return what a set of a version draws before anything is flown."""
+    deck = read_deck(version)
+    pool = rig_pool(deck.rigs, seed, rigs)
+    planned = plans(np.random.default_rng([seed, 1]), records, deck)
+    return planned, [rig_text(rig) for rig in pool.values()]
+
+
+def test_a_set_is_whole_and_gives_nothing_away(made: Path) -> None:
     listed = load_toml(made / "records.toml")
     key = read_key(made.with_name("set.key.json"))
-    assert list(listed) == [f"r{i + 1:03d}" for i in range(RECORDS)] == sorted(key["records"])
+    assert list(listed) == [f"r{i + 1:03d}" for i in range(RECORDS)] == sorted(key.records)
     for name, rig in listed.items():
-        truth = key["records"][name]
+        truth = key.records[name]
         record = read_record(made / "records" / f"{name}.csv")
         nominal = read_rig(made / "rigs" / f"{rig}.toml")
-        assert truth["rig"] == rig == nominal.name
-        assert 20.0 <= len(record) / nominal.frame_rate <= 60.0
-        if not truth["missing"]:  # the key's gaps are those of the file
+        assert truth.rig == rig == nominal.name
+        assert truth.conditions is not None
+        assert len(record) / nominal.frame_rate == pytest.approx(truth.conditions.duration_s)
+        assert 20.0 <= truth.conditions.duration_s <= 60.0
+        if not truth.missing:  # the key's gaps are those of the file
             gaps = stage_gaps(nominal, record)
-            assert gaps == pytest.approx(truth["gap"], rel=1e-9)
-    told = "".join(path.read_text() for path in made.rglob("*.toml"))
-    assert str(key["salt"]) not in told
+            assert gaps == pytest.approx(truth.gap, rel=1e-9)
+    public = "".join(path.read_text() for path in made.rglob("*.toml"))
+    assert key.salt not in public
     assert not made.with_name("set.key.json.parts").exists()
+
+
+def test_a_key_reads_back_as_it_was_written(made: Path) -> None:
+    path = made.with_name("set.key.json")
+    key = read_key(path)
+    assert (key.version, key.seed) == (1, SEED)
+    assert key.text() == path.read_text()
+    for truth in key.records.values():
+        assert truth_from(json.loads(json.dumps(truth.as_dict()))) == truth
 
 
 def test_the_seal_knows_its_key(made: Path, tmp_path: Path) -> None:
@@ -62,7 +108,9 @@ def test_the_seal_knows_its_key(made: Path, tmp_path: Path) -> None:
         check_seal(other, made / "seal.toml")
 
 
-def test_the_same_seed_gives_the_same_bytes_also_after_a_stop(made: Path, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_bytes_whatever_is_shipped_and_after_a_stop(
+    made: Path, tmp_path: Path, grown: None
+) -> None:
     again, key = tmp_path / "set", tmp_path / "set.key.json"
 
     def stop(label: str, done: int, total: int) -> None:
@@ -70,47 +118,144 @@ def test_the_same_seed_gives_the_same_bytes_also_after_a_stop(made: Path, tmp_pa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        make(again, key, SEED, RECORDS, 2, stop)
+        make(again, key, SEED, RECORDS, 2, stop, workers=1)
     assert not key.exists()
-    with pytest.raises(InputError, match="unfinished make"):
-        make(again, key, SEED + 1, RECORDS, 2, quiet)
-    make(again, key, None, RECORDS, 2, quiet)  # takes up the seed too
+    for seed, records, rigs in ((SEED + 1, RECORDS, 2), (SEED, RECORDS, 3), (SEED, 4, 2)):
+        with pytest.raises(InputError, match="unfinished make of 3 records and 2 rigs"):
+            make(again, key, seed, records, rigs, quiet)
+    make(again, key, None, RECORDS, 2, quiet, workers=1)  # takes up the seed too
     assert key.read_bytes() == made.with_name("set.key.json").read_bytes()
     assert files(again) == files(made)
     for name in files(made):
         assert (again / name).read_bytes() == (made / name).read_bytes(), name
 
 
+def test_a_version_draws_what_it_drew(grown: None) -> None:
+    # Of the draws of seed 8 by the sources that the score in docs/blind-score.json is of.
+    planned, texts = drawn(1, 8, 400, 3)
+    told = repr([(plan.category, plan.names) for plan in planned])
+    assert hashlib.sha256(told.encode()).hexdigest() == (
+        "310f811c6c9ca4106aa41d0d99bb831d61abb29f17bd157e11afe68abc58eaaf"
+    )
+    assert len(texts) == 24
+    digest_of_rigs = hashlib.sha256("".join(texts).encode()).hexdigest()
+    assert digest_of_rigs == "b0317ea8e786518566b1668128427498092f356912d0812fddc91123d174eb3a"
+
+
+@pytest.mark.parametrize("version", KNOWN)
+def test_a_deck_is_whole(version: int) -> None:
+    deck = read_deck(version)
+    files_of_rigs = {p.stem for p in (VERSIONS / f"v{version}" / "rigs").glob("*.toml")}
+    assert set(deck.rigs) == files_of_rigs
+    for name, rig in deck.rigs.items():
+        assert rig.name == name
+        assert set(rig.controls) == {"column"}
+    names = [kind.name for kind in (*deck.effects, *deck.outsiders)]
+    assert len(names) == len(set(names))
+
+
+def test_the_newest_deck_has_every_effect_of_the_library() -> None:
+    assert set(BY_NAME) <= {kind.name for kind in read_deck(max(KNOWN)).effects}
+
+
+def test_a_finished_make_may_be_called_again(made: Path) -> None:
+    key = made.with_name("set.key.json")
+    before = {name: (made / name).read_bytes() for name in files(made)}
+    words = ("blind", "make", str(made), "--seed", str(SEED), "--records", str(RECORDS))
+    parts = made.with_name("set.key.json.parts")
+    parts.mkdir()  # as one that was killed while it cleared up
+    (parts / "make.json").write_text("{}")
+    done = coupled(made.parent, *words, "--rigs", "2")
+    assert done.returncode == 0, done.stderr
+    assert "finished already" in done.stdout
+    assert not parts.exists()
+    for seed, records, rigs, version in (
+        (SEED + 1, RECORDS, 2, 1),
+        (SEED, RECORDS + 1, 2, 1),
+        (SEED, RECORDS, 1, 1),
+        *((SEED, RECORDS, 2, other) for other in KNOWN if other != 1),
+    ):
+        with pytest.raises(InputError, match="a finished set of 3 records and 2 rigs of version 1"):
+            make(made, key, seed, records, rigs, quiet, version=version)
+    with pytest.raises(InputError, match="whose key is not"):
+        make(made, made / "another.json", SEED, RECORDS, 2, quiet)
+    assert {name: (made / name).read_bytes() for name in files(made)} == before
+    again = make(made, key, None, RECORDS, 2, quiet)
+    assert again.before
+    assert again.numbers.seed == SEED
+
+
+@pytest.mark.slow
+def test_a_killed_make_goes_on(made: Path, tmp_path: Path) -> None:
+    words = ("blind", "make", "set", "--seed", str(SEED), "--records", str(RECORDS), "--rigs", "2")
+    folder = tmp_path / "set" / "records"
+    process = begun(tmp_path, *words, until=lambda: any(folder.glob("r*.csv")))
+    kill(process)
+    assert not (tmp_path / "set" / "seal.toml").exists()
+    done = coupled(tmp_path, *words, "-j", "2")
+    assert done.returncode == 0, done.stderr
+    assert files(tmp_path / "set") == files(made)
+    for name in files(made):
+        assert (tmp_path / "set" / name).read_bytes() == (made / name).read_bytes(), name
+
+
+def test_a_version_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    done = coupled(tmp_path, "blind", "make", "set", "--trials", "99")
+    assert done.returncode == 2
+    assert "there is no version 99" in done.stderr
+    assert files(tmp_path) == set()
+
+
+def test_a_seal_of_another_format_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "seal.toml"
+    sealed = Seal(digest("{}"), 1, 3, 2)
+    path.write_text(sealed.text())
+    assert read_seal(path) == sealed
+    path.write_text(sealed.text().replace("format = 1", "format = 9"))
+    with pytest.raises(InputError, match="format"):
+        read_seal(path)
+    path.write_text(sealed.text().replace("trials = 1", "trials = 99"))
+    with pytest.raises(InputError, match="trials"):
+        read_seal(path)
+    path.write_text(f'key_sha256 = "{digest("{}")}"\n')  # as coupled 0.1.0 wrote it
+    assert read_seal(path) == Seal(digest("{}"), 1, None, None)
+
+
 def test_plans_keep_the_shares() -> None:
-    drawn = plans(np.random.default_rng(1), 300)
-    counts = Counter(plan.kind for plan in drawn)
-    assert len(drawn) == 300
+    planned = plans(np.random.default_rng(1), 300, read_deck(1))
+    counts = Counter(plan.category for plan in planned)
+    assert len(planned) == 300
     for kind, share in SHARES.items():
         assert counts[kind] == pytest.approx(300 * share, abs=2)
-    singles = Counter(plan.names[0] for plan in drawn if plan.kind == "single")
-    assert set(singles) == {kind.name for kind in EFFECTS}
+    singles = Counter(plan.names[0] for plan in planned if plan.category == "single")
+    assert set(singles) == {kind.name for kind in read_deck(1).effects}
     assert max(singles.values()) - min(singles.values()) <= 2
-    assert all(len(set(plan.names)) == 2 for plan in drawn if plan.kind == "pair")
+    assert all(len(set(plan.names)) == 2 for plan in planned if plan.category == "pair")
 
 
 def test_a_folder_or_key_that_is_there_is_refused(made: Path, tmp_path: Path) -> None:
     key = made.with_name("set.key.json")
     before = key.read_bytes()
-    done = coupled(tmp_path, "blind", "make", str(made), "--seed", "1", "--records", "1")
-    assert done.returncode == 2
-    assert "is not empty" in done.stderr
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("")
+    for folder in (str(made), "full"):
+        done = coupled(tmp_path, "blind", "make", folder, "--seed", "1", "--records", "1")
+        assert done.returncode == 2
+        assert "is not empty" in done.stderr
     done = coupled(tmp_path, "blind", "make", "new", "--key", str(key), "--records", "1")
     assert done.returncode == 2
     assert "never overwritten" in " ".join(done.stderr.split())
     assert key.read_bytes() == before
-    assert files(tmp_path) == set()
+    assert files(tmp_path) == {"full/mine.txt"}
 
 
 def test_a_key_that_is_none_is_refused(made: Path, tmp_path: Path) -> None:
     for text, word in (
         ("{", "not JSON"),
         ("{}", "format"),
+        ('{"format": "coupled blind key 99", "records": {}}', "coupled blind key 1"),
         ('{"format": "coupled blind key 1"}', "records"),
+        ('{"format": "coupled blind key 1", "records": {"r001": {}}}', "r001"),
     ):
         path = tmp_path / "key.json"
         path.write_text(text)

@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from coupled.blind.trials.answers import read_answers
-from coupled.blind.trials.key import key_text, seal_text
+from coupled.blind.trials.key import Key, Seal, digest, read_key
+from coupled.blind.trials.result import Share
 from coupled.blind.trials.score import score, share
+from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
 from coupled.errors import InputError
 from tests.test_cli import coupled, files
 
@@ -24,14 +26,18 @@ FACTOR = {
 STAGE = {"inertia": "loader", "viscous_damping": "loader", "bend": "linkage", "cogging": "loader"}
 
 
-def truth(kind: str, *names: str, ratio: float = 5.0, missing: tuple[str, ...] = ()) -> Table:
-    effects = [{"name": n, "stage": STAGE[n], "parameters": FACTOR.get(n, {})} for n in names]
-    stages = sorted({STAGE[n] for n in names})
-    found = {"class": kind, "rig": "x", "effects": effects, "stages": stages, "gap": {}}
-    return {**found, "missing": list(missing), **({"ratio": ratio} if names else {})}
+def truth(category: str, *names: str, ratio: float = 5.0, missing: tuple[str, ...] = ()) -> Truth:
+    return Truth(
+        category,
+        "x",
+        effects=tuple(TrueEffect(n, STAGE[n], FACTOR.get(n, {})) for n in names),
+        stages=tuple(sorted({STAGE[n] for n in names})),
+        missing=missing,
+        sizes=Sizes({}, (ratio,), ratio) if names else None,
+    )
 
 
-def told(verdict: str, *names: str, off: float = 0.0, rivals: Any = (), **more: Any) -> Table:
+def diagnosis(verdict: str, *names: str, off: float = 0.0, rivals: Any = (), **more: Any) -> Table:
     effects = []
     for name in names:
         values = {
@@ -57,30 +63,30 @@ def told(verdict: str, *names: str, off: float = 0.0, rivals: Any = (), **more: 
     }
 
 
-CASES: list[tuple[Table, Table | None]] = [
-    (truth("single", "inertia"), told("effect", "inertia")),
-    (truth("single", "inertia"), told("effect", "inertia", off=0.1, closed=0.9)),
+CASES: list[tuple[Truth, Table | None]] = [
+    (truth("single", "inertia"), diagnosis("effect", "inertia")),
+    (truth("single", "inertia"), diagnosis("effect", "inertia", off=0.1, closed=0.9)),
     (
         truth("single", "inertia"),
-        told("ambiguous", "viscous_damping", rivals=[["viscous_damping", "inertia"]]),
+        diagnosis("ambiguous", "viscous_damping", rivals=[["viscous_damping", "inertia"]]),
     ),
-    (truth("single", "inertia"), told("effect", "viscous_damping")),
-    (truth("single", "bend", ratio=1.2), told("no_gap")),
-    (truth("single", "bend", ratio=1.2), told("effect", "inertia")),
-    (truth("single", "bend", ratio=1.2), told("unexplained", guilty=["linkage"])),
+    (truth("single", "inertia"), diagnosis("effect", "viscous_damping")),
+    (truth("single", "bend", ratio=1.2), diagnosis("no_gap")),
+    (truth("single", "bend", ratio=1.2), diagnosis("effect", "inertia")),
+    (truth("single", "bend", ratio=1.2), diagnosis("unexplained", guilty=["linkage"])),
     (truth("single", "bend"), None),
-    (truth("none"), told("no_gap")),
-    (truth("none"), told("effect", "bend")),
-    (truth("outsider", "cogging"), told("unexplained", guilty=["loader"])),
-    (truth("outsider", "cogging"), told("effect", "inertia")),
-    (truth("pair", "inertia", "bend"), told("effect", "bend", "inertia")),
-    (truth("pair", "inertia", "bend"), told("effect", "bend")),
-    (truth("pair", "inertia", "bend"), told("unexplained", "bend", "inertia")),
+    (truth("none"), diagnosis("no_gap")),
+    (truth("none"), diagnosis("effect", "bend")),
+    (truth("outsider", "cogging"), diagnosis("unexplained", guilty=["loader"])),
+    (truth("outsider", "cogging"), diagnosis("effect", "inertia")),
+    (truth("pair", "inertia", "bend"), diagnosis("effect", "bend", "inertia")),
+    (truth("pair", "inertia", "bend"), diagnosis("effect", "bend")),
+    (truth("pair", "inertia", "bend"), diagnosis("unexplained", "bend", "inertia")),
     (
         truth("lacking", "bend", missing=("elevator_rad",)),
-        told("effect", "bend", missing=["elevator_rad"]),
+        diagnosis("effect", "bend", missing=["elevator_rad"]),
     ),
-    (truth("lacking", "bend", missing=("elevator_rad",)), told("effect", "bend")),
+    (truth("lacking", "bend", missing=("elevator_rad",)), diagnosis("effect", "bend")),
 ]
 
 
@@ -88,20 +94,19 @@ CASES: list[tuple[Table, Table | None]] = [
 def trials(tmp_path: Path) -> Path:
     """Return a folder with key, seal and diagnoses."""
     names = [f"r{i + 1:03d}" for i in range(len(CASES))]
-    text = key_text("salt", 1, {n: t for n, (t, _) in zip(names, CASES, strict=True)})
+    text = Key(1, 1, "salt", {n: t for n, (t, _) in zip(names, CASES, strict=True)}).text()
     (tmp_path / "set.key.json").write_text(text)
     (tmp_path / "set").mkdir()
-    (tmp_path / "set" / "seal.toml").write_text(seal_text(text))
-    (tmp_path / "told").mkdir()
-    for name, (_, diagnosis) in zip(names, CASES, strict=True):
-        if diagnosis is not None:
-            (tmp_path / "told" / f"{name}.json").write_text(json.dumps(diagnosis))
+    (tmp_path / "set" / "seal.toml").write_text(Seal(digest(text), 1, len(CASES), 0).text())
+    (tmp_path / "answers").mkdir()
+    for name, (_, found) in zip(names, CASES, strict=True):
+        if found is not None:
+            (tmp_path / "answers" / f"{name}.json").write_text(json.dumps(found))
     return tmp_path
 
 
 def test_every_share_is_the_one_made(trials: Path) -> None:
-    key = json.loads((trials / "set.key.json").read_text())
-    found = score(read_answers(trials / "told", key))
+    found = score(read_answers(trials / "answers", read_key(trials / "set.key.json"))).as_dict()
     shares = {
         (group, name): (value["right"], value["of"])
         for group in found
@@ -142,32 +147,31 @@ def test_every_share_is_the_one_made(trials: Path) -> None:
 
 
 def test_brier_and_reliability_by_hand(tmp_path: Path) -> None:
-    key = {"records": {"r001": truth("single", "inertia"), "r002": truth("none")}}
-    for name in key["records"]:
-        (tmp_path / f"{name}.json").write_text(json.dumps(told("effect", "inertia")))
-    found = score(read_answers(tmp_path, key))["probabilities"]
-    assert found["brier"] == pytest.approx(0.5 * (0.1**2 + 0.9**2))
-    [only] = found["bins"]
-    assert (only["told"], only["share"]) == (pytest.approx(0.9), 0.5)
+    key = Key(1, 1, "", {"r001": truth("single", "inertia"), "r002": truth("none")})
+    for name in key.records:
+        (tmp_path / f"{name}.json").write_text(json.dumps(diagnosis("effect", "inertia")))
+    found = score(read_answers(tmp_path, key)).probabilities
+    assert found.brier == pytest.approx(0.5 * (0.1**2 + 0.9**2))
+    [only] = found.bins
+    assert only.stated == pytest.approx(0.9)
+    assert only.true.share == 0.5
 
 
 def test_intervals_of_shares_are_exact() -> None:
     # Clopper and Pearson, Biometrika 26, 1934: 0 of n leaves 1 − (α/2)^(1/n).
-    assert share(0, 60)["high"] == pytest.approx(1 - 0.025 ** (1 / 60))
-    assert share(60, 60)["low"] == pytest.approx(0.025 ** (1 / 60))
+    assert share(0, 60).high == pytest.approx(1 - 0.025 ** (1 / 60))
+    assert share(60, 60).low == pytest.approx(0.025 ** (1 / 60))
     half = share(5, 10)
-    assert (half["low"], half["high"]) == (
-        pytest.approx(0.1871, abs=1e-4),
-        pytest.approx(0.8129, abs=1e-4),
-    )
-    assert share(0, 0)["share"] is None
+    assert half.low == pytest.approx(0.1871, abs=1e-4)
+    assert half.high == pytest.approx(0.8129, abs=1e-4)
+    assert share(0, 0) == Share(0, 0, None, None, None)
 
 
 def test_the_command_prints_draws_and_writes(trials: Path) -> None:
     words = [
         "blind",
         "score",
-        "told",
+        "answers",
         "--key",
         "set.key.json",
         "--json",
@@ -186,8 +190,8 @@ def test_the_command_prints_draws_and_writes(trials: Path) -> None:
 
 def test_a_changed_key_or_a_bad_diagnosis_scores_nothing(trials: Path) -> None:
     before = files(trials)
-    words = ["blind", "score", "told", "--key", "set.key.json", "--json", "s.json"]
-    (trials / "told" / "r001.json").write_text('{"verdict": "perhaps"}')
+    words = ["blind", "score", "answers", "--key", "set.key.json", "--json", "s.json"]
+    (trials / "answers" / "r001.json").write_text('{"verdict": "perhaps"}')
     done = coupled(trials, *words)
     assert done.returncode == 2
     assert "verdict" in done.stderr
@@ -200,7 +204,7 @@ def test_a_changed_key_or_a_bad_diagnosis_scores_nothing(trials: Path) -> None:
 
 
 def test_other_faults_of_diagnoses(trials: Path, tmp_path: Path) -> None:
-    key = json.loads((trials / "set.key.json").read_text())
+    key = read_key(trials / "set.key.json")
     (tmp_path / "empty").mkdir()
     for folder, word in ((tmp_path / "none", "no folder"), (tmp_path / "empty", "no diagnosis")):
         with pytest.raises(InputError, match=word):
@@ -209,12 +213,13 @@ def test_other_faults_of_diagnoses(trials: Path, tmp_path: Path) -> None:
         "{",
         '{"verdict": "effect", "effects": [{}], "stages": {}}',
         '{"verdict": "effect"}',
+        '{"verdict": "no_gap", "format": 3, "effects": [], "stages": {}}',
     ):
-        (trials / "told" / "r001.json").write_text(text)
+        (trials / "answers" / "r001.json").write_text(text)
         with pytest.raises(InputError):
-            read_answers(trials / "told", key)
+            read_answers(trials / "answers", key)
 
 
 def test_the_seal_is_the_hash_of_the_key() -> None:
-    text = key_text("s", 1, {})
-    assert hashlib.sha256(text.encode()).hexdigest() in seal_text(text)
+    text = Key(1, 1, "s", {}).text()
+    assert hashlib.sha256(text.encode()).hexdigest() in Seal(digest(text)).text()

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.measure import stage_gaps
-from coupled.blind.trials.rigs import random_rig, shipped_pool
+from coupled.blind.trials.rigs import random_rig
 from coupled.blind.twin.effects import EFFECTS, dryden
 from coupled.blind.twin.excitation import SHAPES, pilot_force, pilot_shape
 from coupled.blind.twin.kernel import NODES
-from coupled.blind.twin.kinds import Clean, Draw
+from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
-from coupled.blind.twin.setting import NOISE, draw_setting, fly_clean
+from coupled.blind.twin.setting import NOISE, Installed, Setting, draw_setting, fly_clean
 from coupled.blind.twin.twin import Twin, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
@@ -26,22 +27,22 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-POOL = shipped_pool()
+POOL = read_deck(1).rigs
 STEP_N = 20.0
 
 
 def alone(rig: Rig, twin: Twin, force: Floats, pressure_Pa: float = 0.0) -> Record:
     """Return a noiseless bench record."""
     frames = (len(force) - 1) // NODES
-    told = np.full(frames, pressure_Pa)
-    return fly_twin(rig, twin, force, frames, told, np.zeros((frames, 7)))
+    pressures = np.full(frames, pressure_Pa)
+    return fly_twin(rig, twin, force, frames, pressures, np.zeros((frames, 7)))
 
 
 def plain() -> tuple[Rig, Twin]:
     """Return a rigid bench, q̄ = 0: mass, spring and damper, and no preload."""
     rig = POOL["bench-rigid"]
     twin = nominal_twin(rig)
-    twin.set(breakout=0.0, believed_breakout=0.0)
+    twin.set(breakout=0.0, host_breakout=0.0)
     return rig, twin
 
 
@@ -175,7 +176,7 @@ def test_shapes_are_smooth_and_bounded() -> None:
 
 def test_drawn_rigs_can_be_flown_and_written() -> None:
     for seed in range(6):
-        rig = random_rig(np.random.default_rng(seed), "rig-01")
+        rig = random_rig(np.random.default_rng(seed), "rig-01", POOL)
         loader = rig.controls["column"].loader
         most = max(rig.controls["column"].schedule.total_gradient)
         assert loader.bend * most <= 0.61
@@ -193,7 +194,7 @@ def test_every_effect_of_the_library_has_its_twin() -> None:
 
 
 @pytest.mark.parametrize("kind", [*EFFECTS, *OUTSIDERS], ids=lambda kind: kind.name)
-def test_a_kind_acts_and_says_what_it_put_in(kind) -> None:
+def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     name = "c172p-compensated" if kind.flown else "bench-compensated"
     rig = POOL[name]
     begun = fly_clean(_short(rig))
@@ -201,16 +202,17 @@ def test_a_kind_acts_and_says_what_it_put_in(kind) -> None:
     setting, clean = begun
     size = (kind.least * kind.most) ** 0.5 if kind.least < kind.most else kind.most
     draw = Draw(1.0, (0.5, 0.5, 0.5), 5)
-    record, [values] = setting.fly(clean, [(kind, size, draw)])
+    flown = setting.fly(clean, [Installed(kind, size, draw)])
+    record, [values] = flown.record, flown.parameters
     assert any(np.any(record[c] != clean.record[c]) for c in record.channels)
     assert all(np.isfinite(v) for v in values.values())
     if kind.name in BY_NAME:
         wanted = {p.name.format(d="m") for p in BY_NAME[kind.name].free}
-        assert wanted - set(values) <= {"stribeck_m_per_s"}  # fitted too, told by no key
+        assert wanted - set(values) <= {"stribeck_m_per_s"}  # fitted too, in no key
     assert np.all(np.isfinite(record.data))
 
 
-def _short(rig: Rig):
+def _short(rig: Rig) -> Setting:
     for seed in itertools.count():
         setting = draw_setting(np.random.default_rng(seed), rig)
         if setting.frames < 2800:

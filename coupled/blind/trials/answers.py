@@ -2,39 +2,65 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from coupled.blind.trials.key import Key
+from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
+from coupled.files import check_format, read_json
 
 VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained", "refused")
+MISSING = "missing"  # the verdict of a record without a diagnosis
+FORMAT = 2  # the newest of a diagnosis that is read
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A 95 % interval of a parameter, SI; None at an end that the record leaves open."""
+
+    low: float | None
+    high: float | None
+
+    @property
+    def whole(self) -> bool:
+        """Whether it has both ends."""
+        return self.low is not None and self.high is not None
+
+    def holds(self, value: float) -> bool:
+        """Tell whether a value lies within; an open end holds none."""
+        return self.low is not None and self.high is not None and self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that a diagnosis found, its probability in 0 to 1, and its parameters."""
+
+    probability: float
+    intervals: Mapping[str, Interval]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A record's truth, and what a diagnosis made of it; verdict `missing` where there is none."""
+    """A record's truth, and what a diagnosis made of it.
+
+    found     the effects of the diagnosis by name
+    possible  every name that the diagnosis leaves possible
+    guilty    the stages that it finds a gap in
+    lacking   channels whose lack it says
+    closed    share of the gap that it closed, where it says so
+    """
 
     record: str
-    truth: Mapping[str, Any]
+    truth: Truth
     verdict: str
-    found: Mapping[str, Mapping[str, Any]]  # the effects of the diagnosis by name
-    sets: frozenset[str]  # every name that the diagnosis leaves possible
+    found: Mapping[str, FoundEffect]
+    possible: frozenset[str]
     guilty: frozenset[str]
-    lacking: frozenset[str]  # channels whose lack it says
+    lacking: frozenset[str]
     closed: float | None
-
-    @property
-    def kind(self) -> str:
-        """The class of the trial."""
-        return str(self.truth["class"])
-
-    @property
-    def named(self) -> frozenset[str]:
-        """The names of what the rig has."""
-        return frozenset(effect["name"] for effect in self.truth["effects"])
 
     @property
     def exact(self) -> bool:
@@ -43,17 +69,17 @@ class Answer:
         Where another effect is the same law on this record, naming just these two is exact.
         """
         if self.verdict == "effect":
-            return frozenset(self.found) == self.named
-        twins = frozenset(self.truth.get("alike", []))
-        return bool(twins) and self.contains and self.sets == self.named | twins
+            return frozenset(self.found) == self.truth.names
+        alike = frozenset(self.truth.alike)
+        return bool(alike) and self.contains and self.possible == self.truth.names | alike
 
     @property
     def contains(self) -> bool:
         """Whether it is exact, or names no more than it holds possible, the truth among them."""
         if self.verdict == "effect":
-            return frozenset(self.found) == self.named
-        ambiguous = self.verdict == "ambiguous" and self.named <= self.sets
-        return ambiguous and len(self.found) == len(self.named)
+            return frozenset(self.found) == self.truth.names
+        ambiguous = self.verdict == "ambiguous" and self.truth.names <= self.possible
+        return ambiguous and len(self.found) == len(self.truth.names)
 
     @property
     def wrong(self) -> bool:
@@ -63,49 +89,57 @@ class Answer:
     @property
     def stage_right(self) -> bool:
         """Whether just the stages that have something are guilty."""
-        return self.guilty == frozenset(self.truth["stages"])
+        return self.guilty == frozenset(self.truth.stages)
 
 
-def read_answers(folder: Path, key: Mapping[str, Any]) -> list[Answer]:
+def read_answers(folder: Path, key: Key) -> list[Answer]:
     """Return an answer for each record of the key. Raises InputError."""
     if not folder.is_dir():
         raise InputError(folder, "", "is no folder; give that of the diagnoses, rNNN.json each")
-    answers = [_read(folder / f"{name}.json", truth) for name, truth in key["records"].items()]
-    if all(answer.verdict == "missing" for answer in answers):
+    answers = [_read(folder / f"{name}.json", truth) for name, truth in key.records.items()]
+    if all(answer.verdict == MISSING for answer in answers):
         raise InputError(folder, "", "holds no diagnosis of any record of the key (rNNN.json)")
     return answers
 
 
-def _read(path: Path, truth: Mapping[str, Any]) -> Answer:
+def _read(path: Path, truth: Truth) -> Answer:
     nothing: frozenset[str] = frozenset()
     if not path.is_file():
-        return Answer(path.stem, truth, "missing", {}, nothing, nothing, nothing, None)
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        raise InputError(path, "", "is not JSON; a diagnosis is wanted") from None
-    if not isinstance(told, dict) or told.get("verdict") not in VERDICTS:
+        return Answer(path.stem, truth, MISSING, {}, nothing, nothing, nothing, None)
+    table = read_json(path, "a diagnosis is wanted")
+    if not isinstance(table, dict) or table.get("verdict") not in VERDICTS:
         raise InputError(path, "verdict", f"is missing or not one of {', '.join(VERDICTS)}")
+    check_format(table.get("format"), FORMAT, path, "diagnosis")
     try:
-        return _answer(path.stem, truth, told)
+        return _answer(path.stem, truth, table)
     except (KeyError, TypeError, AttributeError, ValueError):
         raise InputError(path, "", "is no diagnosis as coupled diagnose writes it") from None
 
 
-def _answer(name: str, truth: Mapping[str, Any], told: Mapping[str, Any]) -> Answer:
-    found = {str(effect["name"]): dict(effect) for effect in told["effects"]}
-    for effect in found.values():
-        effect["probability"] = min(max(float(effect["probability"]), 0.0), 1.0)
-    rivals = {str(rival) for group in told.get("rivals", []) for rival in group}
-    stages = told["stages"].items()
-    closed = told.get("shrink", {}).get("closed")
+def _answer(name: str, truth: Truth, table: Mapping[str, Any]) -> Answer:
+    found = {str(effect["name"]): _found(effect) for effect in table["effects"]}
+    rivals = {str(rival) for group in table.get("rivals", []) for rival in group}
+    stages = table["stages"].items()
+    closed = table.get("shrink", {}).get("closed")
     return Answer(
         name,
         truth,
-        told["verdict"],
+        table["verdict"],
         found,
         frozenset(found) | rivals,
         frozenset(stage for stage, judged in stages if judged.get("guilty")),
         frozenset(c for _, judged in stages for c in judged.get("missing", [])),
         None if closed is None else float(closed),
     )
+
+
+def _found(effect: Mapping[str, Any]) -> FoundEffect:
+    intervals = {
+        str(name): Interval(_number(values.get("low")), _number(values.get("high")))
+        for name, values in effect.get("parameters", {}).items()
+    }
+    return FoundEffect(min(max(float(effect["probability"]), 0.0), 1.0), intervals)
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else float(value)

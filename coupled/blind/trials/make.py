@@ -1,111 +1,233 @@
-"""A folder of sealed trials: records, nominal rigs, the seal; and the key apart."""
+"""A folder of sealed trials: records, nominal rigs, the seal; and the key, elsewhere."""
 
 from __future__ import annotations
 
 import json
+import os
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from coupled.blind.trials.key import SEAL, key_text, seal_text
-from coupled.blind.trials.rigs import DRAWN, random_rig, shipped_pool
+from coupled.blind.trials.deck import DEFAULT, Deck, read_deck
+from coupled.blind.trials.key import SEAL, Key, Seal, digest, read_key, read_seal
+from coupled.blind.trials.rigs import rig_pool
 from coupled.blind.trials.trial import Plan, draw_trial, plans
+from coupled.blind.trials.truth import Truth, truth_from
 from coupled.blind.twin.setting import csv_text
 from coupled.errors import InputError
-from coupled.files import check_target, write_text
+from coupled.files import check_targets, read_json, read_text, write_text
+from coupled.parallel import executor
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
 
 Progress = Callable[[str, int, int], None]
-RECORDS = "records"
+RECORDS, RIGS, LIST, NOTE = "records", "rigs", "records.toml", "make.json"
+UNREADABLE = "is no note of an unfinished make; delete its folder, and make anew"
+AHEAD = 4  # records that wait for each worker
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What a set is made by: the same numbers give the same bytes."""
+
+    seed: int
+    records: int
+    rigs: int
+    version: int = DEFAULT
+
+    def like(self, other: Numbers) -> bool:
+        """Tell whether the other differs in its seed at most."""
+        return replace(self, seed=other.seed) == other
+
+    def __str__(self) -> str:
+        """Return what of them is no secret."""
+        return f"{self.records} records and {self.rigs} rigs of version {self.version}"
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where a set goes: the folder of its records, and the file of its key."""
+
+    folder: Path
+    key: Path
+
+    @property
+    def parts(self) -> Path:
+        """Where an unfinished make keeps what it knows."""
+        return self.key.with_name(self.key.name + ".parts")
+
+
+@dataclass(frozen=True)
+class Made:
+    """A set that is finished; `before` says that a former call had finished it."""
+
+    numbers: Numbers
+    before: bool
 
 
 def make(
-    folder: Path, key: Path, seed: int | None, records: int, rigs: int, progress: Progress
-) -> None:
+    folder: Path,
+    key: Path,
+    seed: int | None,
+    records: int,
+    rigs: int,
+    progress: Progress,
+    *,
+    version: int = DEFAULT,
+    workers: int = 0,
+) -> Made:
     """Write a set of trials into `folder` and their key to `key`.
 
     What an interrupted make of the same numbers has written is kept, and the rest is made. The
-    same seed gives the same bytes; without one it is drawn, and stands in the key alone.
+    same seed gives the same bytes from any number of workers (0: one a core); without a seed it
+    is drawn, and stands in the key alone. Raises InputError for a folder that holds anything
+    else, a set of other numbers included.
     """
-    parts = key.with_name(key.name + ".parts")
-    seed = _begin(folder, key, parts, seed, records, rigs)
-    pool = rig_pool(seed, rigs)
+    places = Places(folder, key)
+    read_deck(version)
+    asked = Numbers(secrets.randbits(62) if seed is None else seed, records, rigs, version)
+    done = _finished(places, asked, seed is None)
+    if done is not None:
+        _clear(places)
+        return Made(done, before=True)
+    numbers = _begin(places, asked, seed is None)
+    _make(places, numbers, progress, workers)
+    return Made(numbers, before=False)
+
+
+def _make(places: Places, numbers: Numbers, progress: Progress, workers: int) -> None:
+    deck, pool = _drawn(numbers)
     for name, rig in pool.items():
         remark = "The nominal rig: what a record's real one is held against"
-        write_text(folder / "rigs" / f"{name}.toml", rig_text(rig, remark))
-    names = [f"r{i + 1:03d}" for i in range(records)]
-    todo = plans(np.random.default_rng([seed, 1]), records)
-    truths = {}
-    for i, (name, plan) in enumerate(zip(names, todo, strict=True)):
-        progress(f"{name} of {names[-1]}", i, records)
-        truths[name] = _one(folder, parts, name, [seed, 3, i], plan, pool)
-    listed = "".join(f'{name} = "{truths[name]["rig"]}"\n' for name in names)
-    write_text(folder / "records.toml", "# record = rig file (rigs/NAME.toml)\n" + listed)
-    salt = np.random.default_rng([seed, 2]).bytes(32).hex()
-    text = key_text(salt, seed, truths)
-    write_text(key, text)
-    write_text(folder / SEAL, seal_text(text))
-    for part in parts.iterdir():
-        part.unlink()
-    parts.rmdir()
+        write_text(places.folder / RIGS / f"{name}.toml", rig_text(rig, remark))
+    todo = plans(np.random.default_rng([numbers.seed, 1]), numbers.records, deck)
+    names = [f"r{i + 1:03d}" for i in range(numbers.records)]
+    truths: dict[str, Truth] = {}
+    progress("records", 0, numbers.records)
+    with executor(workers or os.cpu_count() or 1) as pool_of_workers:
+        ahead = AHEAD * workers if workers else AHEAD * (os.cpu_count() or 1)
+        for name, truth in _trials(places, numbers, todo, pool_of_workers, ahead):
+            truths[name] = truth
+            progress(f"{name} made", len(truths), numbers.records)
+    listed = "".join(f'{name} = "{truths[name].rig}"\n' for name in names)
+    write_text(places.folder / LIST, "# record = rig file (rigs/NAME.toml)\n" + listed)
+    salt = np.random.default_rng([numbers.seed, 2]).bytes(32).hex()
+    text = Key(numbers.version, numbers.seed, salt, truths).text()
+    write_text(places.key, text)
+    seal = Seal(digest(text), numbers.version, numbers.records, numbers.rigs)
+    write_text(places.folder / SEAL, seal.text())
+    _clear(places)
 
 
-def rig_pool(seed: int, rigs: int) -> dict[str, Rig]:
-    """Return the shipped rigs in their variants and `rigs` others drawn from the seed."""
-    pool = shipped_pool()
-    rng = np.random.default_rng([seed, 0])
-    for i in range(rigs):
-        name = f"{DRAWN}{i + 1:02d}"
-        pool[name] = random_rig(rng, name)
-    return pool
+def _trials(
+    places: Places, numbers: Numbers, todo: list[Plan], workers: Executor, ahead: int
+) -> Iterator[tuple[str, Truth]]:
+    """Yield each record's name and truth as it is made; a bounded number waits for a worker."""
+    waiting: set[Future[tuple[str, Truth]]] = set()
+    for i, plan in enumerate(todo):
+        waiting.add(workers.submit(make_one, places, numbers, i, plan))
+        done, waiting = wait(waiting, None if len(waiting) >= ahead else 0.0, FIRST_COMPLETED)
+        yield from (future.result() for future in done)
+    while waiting:
+        done, waiting = wait(waiting, None, FIRST_COMPLETED)
+        yield from (future.result() for future in done)
 
 
-def _begin(folder: Path, key: Path, parts: Path, seed: int | None, records: int, rigs: int) -> int:
-    """Check the target and return the seed: that of an interrupted make, given, or drawn."""
-    note = parts / "make.json"
-    if note.is_file():
-        begun = _read(note)
-        wanted = (begun["seed"] if seed is None else seed, records, rigs)
-        if wanted != (begun["seed"], begun["records"], begun["rigs"]):
-            raise InputError(
-                folder,
-                "",
-                f"holds an unfinished make of {begun['records']} records and {begun['rigs']}"
-                " rigs; finish it with the same numbers, or give another folder",
-            )
-        return int(begun["seed"])
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(folder, "", "is not empty; give a new folder")
-    if key.exists():
-        raise InputError(key, "--key", "is there already; a key is never overwritten")
-    check_target(key)
-    check_target(folder / SEAL)
-    chosen = secrets.randbits(62) if seed is None else seed
-    write_text(note, json.dumps({"seed": chosen, "records": records, "rigs": rigs}))
-    return chosen
-
-
-def _one(
-    folder: Path, parts: Path, name: str, seed: list[int], plan: Plan, pool: Mapping[str, Rig]
-) -> dict[str, Any]:
-    """Return a record's truth, once record and truth are written; those that are, are kept."""
-    path, note = folder / RECORDS / f"{name}.csv", parts / f"{name}.json"
+def make_one(places: Places, numbers: Numbers, i: int, plan: Plan) -> tuple[str, Truth]:
+    """Return a record's name and truth, once both are written; those that are, are kept."""
+    name = f"r{i + 1:03d}"
+    path, note = places.folder / RECORDS / f"{name}.csv", places.parts / f"{name}.json"
     if path.is_file() and note.is_file():
-        return _read(note)
-    trial = draw_trial(np.random.default_rng(seed), plan, pool)
-    truth = {**trial.truth, "seed": seed}
+        return name, _read_truth(note)
+    deck, pool = _drawn(numbers)
+    seed = (numbers.seed, 3, i)
+    trial = draw_trial(np.random.default_rng(seed), plan, deck, pool)
+    truth = replace(trial.truth, seed=seed)
     write_text(path, csv_text(trial.record))
-    write_text(note, json.dumps(truth, sort_keys=True))
-    return truth
+    write_text(note, json.dumps(truth.as_dict(), sort_keys=True))
+    return name, truth
 
 
-def _read(note: Path) -> dict[str, Any]:
+@lru_cache(maxsize=1)
+def _drawn(numbers: Numbers) -> tuple[Deck, Mapping[str, Rig]]:
+    """Return the deck of a set and its rigs; a worker reads and draws them once."""
+    deck = read_deck(numbers.version)
+    return deck, rig_pool(deck.rigs, numbers.seed, numbers.rigs)
+
+
+def _finished(places: Places, asked: Numbers, any_seed: bool) -> Numbers | None:
+    """Return the numbers of a finished set in these places, None where there is none.
+
+    Refuses a finished set of other numbers, and one whose key is not there.
+    """
+    seal_file = places.folder / SEAL
+    if not seal_file.is_file():
+        return None
+    seal = read_seal(seal_file)
+    if seal.records is None or seal.rigs is None:
+        problem = "holds a set of an older coupled, which does not say its numbers"
+        raise InputError(places.folder, "", f"{problem}; give a new folder")
+    if not places.key.is_file():
+        problem = f"holds a finished set, whose key is not {places.key}"
+        raise InputError(places.folder, "", f"{problem}; say --key, or give a new folder")
+    if digest(read_text(places.key, "the key of coupled blind make is wanted")) != seal.key_sha256:
+        raise InputError(places.key, "", f"is not the key that {seal_file} seals")
+    made = Numbers(read_key(places.key).seed, seal.records, seal.rigs, seal.version)
+    if not made.like(asked) or not (any_seed or made == asked):
+        other = f"{made}" if not made.like(asked) else f"{made}, by another seed"
+        raise InputError(
+            places.folder, "", f"is not empty: it holds a finished set of {other}; give a new one"
+        )
+    return made
+
+
+def _begin(places: Places, asked: Numbers, any_seed: bool) -> Numbers:
+    """Check the places, and return the numbers: those of an unfinished make, or those asked."""
+    note = places.parts / NOTE
+    if note.is_file():
+        begun = _read_numbers(note)
+        if not begun.like(asked) or not (any_seed or begun == asked):
+            raise InputError(
+                places.folder,
+                "",
+                f"holds an unfinished make of {begun}; finish it with the same numbers,"
+                " or give another folder",
+            )
+        return begun
+    if places.folder.is_dir() and any(places.folder.iterdir()):
+        raise InputError(places.folder, "", "is not empty; give a new folder")
+    if places.key.exists():
+        raise InputError(places.key, "--key", "is there already; a key is never overwritten")
+    check_targets([places.key, places.folder / SEAL])
+    write_text(note, json.dumps(asdict(asked)))
+    return asked
+
+
+def _clear(places: Places) -> None:
+    """Remove the notes of an unfinished make, the one that says so last."""
+    if not places.parts.is_dir():
+        return
+    for part in sorted(places.parts.iterdir(), key=lambda part: part.name == NOTE):
+        part.unlink()
+    places.parts.rmdir()
+
+
+def _read_numbers(note: Path) -> Numbers:
+    table = read_json(note, UNREADABLE)
     try:
-        found: dict[str, Any] = json.loads(note.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise InputError(note, "", "cannot be read back; delete it, and make anew") from None
-    return found
+        return Numbers(**table)
+    except TypeError:
+        raise InputError(note, "", UNREADABLE) from None
+
+
+def _read_truth(note: Path) -> Truth:
+    table = read_json(note, UNREADABLE)
+    try:
+        return truth_from(table)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(note, "", UNREADABLE) from None

@@ -30,18 +30,18 @@ def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, flo
 
 
 # Two effects that are one law wherever the gradient rises in proportion to q̄.
-TWINS = {"pressure_scale": "schedule_slope", "schedule_slope": "pressure_scale"}
-ALIKE = 0.02  # floors: what a twin may leave more than the true effect
+SAME_LAW = {"pressure_scale": "schedule_slope", "schedule_slope": "pressure_scale"}
+ALIKE = 0.02  # floors: what the other may leave more than the true effect
 
 
-def alike(rig: Rig, record: Record, effect: str) -> list[str]:
+def alike(rig: Rig, record: Record, effect: str) -> tuple[str, ...]:
     """Return the effect that no record of this rig at these pressures could tell from `effect`."""
-    if effect not in TWINS:
-        return []
+    if effect not in SAME_LAW:
+        return ()
     outputs = Reader(rig, record, "column", surface_points).outputs()
     ours = [output for output in outputs if output.stage == "schedule"]
     left = {}
-    for name in (effect, TWINS[effect]):
+    for name in (effect, SAME_LAW[effect]):
         found = fit(rig, "column", ours, [BY_NAME[name]])
         left[name] = max(output.gap(found.rig) for output in ours)
-    return [TWINS[effect]] if left[TWINS[effect]] - left[effect] < ALIKE else []
+    return (SAME_LAW[effect],) if left[SAME_LAW[effect]] - left[effect] < ALIKE else ()

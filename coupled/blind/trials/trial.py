@@ -1,26 +1,24 @@
-"""One trial drawn: its class, what is wrong with its rig and how much, and its record."""
+"""One trial drawn: its category, what is wrong with its rig and how much, and its record."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from coupled.blind.trials.deck import Deck
 from coupled.blind.trials.measure import alike, stage_gaps
 from coupled.blind.trials.rigs import DRAWN
-from coupled.blind.twin.effects import EFFECTS
+from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.outsiders import OUTSIDERS
-from coupled.blind.twin.setting import Setting, draw_setting, fly_clean
+from coupled.blind.twin.setting import Installed, Setting, draw_setting, fly_clean
 from coupled.blind.twin.twin import LostError
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Rng = np.random.Generator
-KINDS = {kind.name: kind for kind in (*EFFECTS, *OUTSIDERS)}
 SHARES = {"none": 0.20, "single": 0.50, "pair": 0.12, "outsider": 0.15, "lacking": 0.03}
 TOLERANCE = 0.007  # standard deviation of a nominal number's setting
 FAINTEST, WIDEST = 0.5, 30.0  # of a single's excess residual, in floors
@@ -37,72 +35,71 @@ GROUPS = (
 
 @dataclass(frozen=True)
 class Plan:
-    """What a record is to be: its class, and the names of what its rig has."""
+    """What a record is to be: its category, and the names of what its rig has."""
 
-    kind: str
+    category: str
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A record, its nominal rig, and the truth of it as the key has it."""
+    """A record, its nominal rig, and its truth."""
 
     rig: Rig
     record: Record
-    truth: dict[str, Any]
+    truth: Truth
 
 
 @dataclass(frozen=True)
 class _Sized:
     """A kind at the size it was given, and the gap that it makes alone."""
 
-    kind: Kind
-    size: float
-    draw: Draw
+    put: Installed
     gap: float
 
 
-def plans(rng: Rng, records: int) -> list[Plan]:
+def plans(rng: Rng, records: int, deck: Deck) -> list[Plan]:
     """Return what each record is to be, in random order, every kind about equally often."""
-    counts = {kind: math.floor(share * records) for kind, share in SHARES.items()}
+    counts = {category: math.floor(share * records) for category, share in SHARES.items()}
     counts["single"] += records - sum(counts.values())
-    effects = _deck(rng, [kind.name for kind in EFFECTS], records)
-    others = _deck(rng, [kind.name for kind in OUTSIDERS], records)
+    known = [kind.name for kind in deck.effects]
+    effects = _shuffled(rng, known, records)
+    others = _shuffled(rng, [kind.name for kind in deck.outsiders], records)
     made = []
-    for kind, count in counts.items():
+    for category, count in counts.items():
         for _ in range(count):
             names: tuple[str, ...] = ()
-            if kind in ("single", "lacking"):
+            if category in ("single", "lacking"):
                 names = (effects.pop(),)
-            elif kind == "outsider":
+            elif category == "outsider":
                 names = (others.pop(),)
-            elif kind == "pair":
-                first, second = rng.choice([e.name for e in EFFECTS], 2, replace=False).tolist()
+            elif category == "pair":
+                first, second = rng.choice(known, 2, replace=False).tolist()
                 names = (first, second)
-            made.append(Plan(kind, names))
+            made.append(Plan(category, names))
     order = rng.permutation(len(made))
     return [made[i] for i in order]
 
 
-def _deck(rng: Rng, names: Sequence[str], least: int) -> list[str]:
-    """Return shuffled decks of the names, one after the other, at least so many."""
-    deck: list[str] = []
-    while len(deck) < least:
-        deck = [str(name) for name in rng.permutation(list(names))] + deck
-    return deck
+def _shuffled(rng: Rng, names: Sequence[str], least: int) -> list[str]:
+    """Return the names shuffled, again and again, at least so many."""
+    dealt: list[str] = []
+    while len(dealt) < least:
+        dealt = [str(name) for name in rng.permutation(list(names))] + dealt
+    return dealt
 
 
-def draw_trial(rng: Rng, plan: Plan, pool: Mapping[str, Rig]) -> Trial:
+def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Trial:
     """Return a trial of a plan, on a rig of the pool that can have it.
 
     What cannot be made clear on one rig is drawn anew on another; after many, the kinds
     themselves are drawn anew, so that the work always ends.
     """
-    kinds = [KINDS[name] for name in plan.names]
+    kinds = [deck.kind(plan.category, name) for name in plan.names]
     for attempt in range(60):
-        if attempt and attempt % 12 == 0 and plan.kind in ("pair", "outsider"):
-            of = EFFECTS if plan.kind == "pair" else OUTSIDERS
-            kinds = [of[i] for i in rng.choice(len(of), len(kinds), replace=False)]
+        if attempt and attempt % 12 == 0 and plan.category in ("pair", "outsider"):
+            known = deck.kinds(plan.category)
+            kinds = [known[i] for i in rng.choice(len(known), len(kinds), replace=False)]
         rig = _choose_rig(rng, kinds, pool)
         begun = fly_clean(draw_setting(rng, rig)) if rig else None
         if begun is None:
@@ -114,11 +111,11 @@ def draw_trial(rng: Rng, plan: Plan, pool: Mapping[str, Rig]) -> Trial:
 
 
 def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig | None:
-    """Return a rig that suits: one of the shipped in two of three draws; a bench in one of four."""
+    """Return a rig that suits: a drawn one in one of three draws; a bench in one of four."""
     suited = [name for name, rig in pool.items() if all(kind.suits(rig) for kind in kinds)]
-    shipped = rng.uniform() < 2.0 / 3.0
+    drawn = not rng.uniform() < 2.0 / 3.0
     benches = rng.uniform() < 0.25
-    of_kind = [name for name in suited if name.startswith(DRAWN) != shipped] or suited
+    of_kind = [name for name in suited if name.startswith(DRAWN) == drawn] or suited
     found = [name for name in of_kind if (pool[name].flight is None) == benches] or of_kind
     return pool[str(rng.choice(found))] if found else None
 
@@ -127,7 +124,7 @@ def _flown(
     rng: Rng, plan: Plan, kinds: Sequence[Kind], setting: Setting, clean: Clean
 ) -> Trial | None:
     """Return the trial in its setting, or None where its kinds cannot be made as wide as wanted."""
-    if plan.kind == "none":
+    if plan.category == "none":
         return _without(rng, setting)
     bare = stage_gaps(clean.rig, clean.record, any(k.stage == "airframe" for k in kinds))
     parts = []
@@ -137,32 +134,40 @@ def _flown(
             return None
         parts.append(part)
     try:
-        record, found = setting.fly(clean, [(p.kind, p.size, p.draw) for p in parts])
+        flown = setting.fly(clean, [part.put for part in parts])
     except LostError:
         return None
-    truth = _truth(setting, plan.kind, stage_gaps(setting.rig, record)) | {
-        "effects": [
-            {"name": part.kind.name, "stage": part.kind.stage, "parameters": values}
-            for part, values in zip(parts, found, strict=True)
-        ],
-        "stages": sorted({kind.stage for kind in kinds}),
-        "clean_gap": {kind.stage: bare[kind.stage] for kind in kinds},
-        "alone": [part.gap for part in parts],
-        "ratio": min(part.gap / bare[part.kind.stage] for part in parts),
-    }
-    if plan.kind == "single":
-        truth["alike"] = alike(setting.rig, record, kinds[0].name)
-    trial = Trial(setting.rig, record, truth)
-    return _lacking(rng, trial) if plan.kind == "lacking" else trial
+    sizes = Sizes(
+        clean_gap={kind.stage: bare[kind.stage] for kind in kinds},
+        alone=tuple(part.gap for part in parts),
+        ratio=min(part.gap / bare[part.put.kind.stage] for part in parts),
+    )
+    truth = Truth(
+        plan.category,
+        setting.rig.name,
+        effects=tuple(
+            TrueEffect(kind.name, kind.stage, values)
+            for kind, values in zip(kinds, flown.parameters, strict=True)
+        ),
+        stages=tuple(sorted({kind.stage for kind in kinds})),
+        gap=stage_gaps(setting.rig, flown.record),
+        sizes=sizes,
+        conditions=setting.conditions,
+    )
+    if plan.category == "single":
+        others = alike(setting.rig, flown.record, kinds[0].name)
+        truth = replace(truth, alike=others)
+    trial = Trial(setting.rig, flown.record, truth)
+    return _lacking(rng, trial) if plan.category == "lacking" else trial
 
 
 def _part(
     rng: Rng, plan: Plan, kind: Kind, setting: Setting, clean: Clean, bare: Mapping[str, float]
 ) -> _Sized | None:
-    """Return a kind at a size that makes it as wide as its class wants, or None."""
-    if kind.stage not in bare:  # a gradient that never changes tells nothing of its schedule
+    """Return a kind at a size that makes it as wide as its category wants, or None."""
+    if kind.stage not in bare:  # a gradient that never changes shows nothing of its schedule
         return None
-    clear = plan.kind in ("pair", "outsider")
+    clear = plan.category in ("pair", "outsider")
     low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
     wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     shares = (float(rng.uniform()), float(rng.uniform()), float(rng.uniform()))
@@ -175,21 +180,22 @@ def _part(
 
 def _without(rng: Rng, setting: Setting) -> Trial | None:
     """Return a trial without an effect; in one of three, numbers are off as their setting lets."""
-    off = {}
+    tolerance = {}
     if rng.uniform() < 1.0 / 3.0:
         names = ("mass", "damping", "servo_rate")
-        off = {name: 1.0 + float(rng.normal(0.0, TOLERANCE)) for name in names}
+        tolerance = {name: 1.0 + float(rng.normal(0.0, TOLERANCE)) for name in names}
     try:
-        record, _ = setting.fly(off=off)
+        record = setting.fly(tolerance=tolerance).record
     except LostError:
         return None
-    truth = _truth(setting, "none", stage_gaps(setting.rig, record))
-    return Trial(setting.rig, record, truth | {"effects": [], "stages": [], "tolerance": off})
-
-
-def _truth(setting: Setting, kind: str, gaps: dict[str, float]) -> dict[str, Any]:
-    about = {**setting.about, "level_N": setting.level_N}
-    return {"class": kind, "rig": setting.rig.name, "gap": gaps, "missing": [], **about}
+    truth = Truth(
+        "none",
+        setting.rig.name,
+        gap=stage_gaps(setting.rig, record),
+        tolerance=tolerance,
+        conditions=setting.conditions,
+    )
+    return Trial(setting.rig, record, truth)
 
 
 def _lacking(rng: Rng, trial: Trial) -> Trial:
@@ -197,7 +203,7 @@ def _lacking(rng: Rng, trial: Trial) -> Trial:
     group = groups[int(rng.integers(len(groups)))]
     kept = [name for name in trial.record.channels if name not in group]
     data = np.column_stack([trial.record[name] for name in kept])
-    truth = trial.truth | {"missing": list(group)}
+    truth = replace(trial.truth, missing=tuple(group))
     return replace(trial, record=Record(tuple(kept), data), truth=truth)
 
 
@@ -210,8 +216,9 @@ def _sized(
     """
     size, best, miss = math.sqrt(kind.least * kind.most), None, math.inf
     for _ in range(SIZINGS):
+        put = Installed(kind, size, draw)
         try:
-            record, _ = setting.fly(clean, [(kind, size, draw)])
+            record = setting.fly(clean, [put]).record
         except LostError:
             size = max(kind.least, 0.4 * size)
             continue
@@ -219,11 +226,10 @@ def _sized(
         excess = math.sqrt(max(gap**2 - bare**2, 0.01))
         off = abs(math.log(wanted / excess))
         if off < miss:
-            best, miss = _Sized(kind, size, draw, gap), off
-        last, size = (
-            size,
-            min(max(size * min(max(wanted / excess, 0.02), 50.0), kind.least), kind.most),
-        )
+            best, miss = _Sized(put, gap), off
+        last = size
+        size *= min(max(wanted / excess, 0.02), 50.0)
+        size = min(max(size, kind.least), kind.most)
         if off < 0.4 or size == last:
             break
     return best

@@ -149,7 +149,7 @@ def dryden(
     blown = lfilter(up, down, rng.standard_normal(frames + warm))[warm:]
     # Unit density gives ∫|H|²df = 1/T over both sides; per sample of a second's 1/rate.
     blown *= rms * math.sqrt(frame_rate_Hz * time_s)
-    rise = np.clip(np.arange(frames) / frame_rate_Hz, 0.0, 1.0)  # calm at trim
+    rise = np.clip(np.arange(frames) / frame_rate_Hz, 0.0, 1.0)  # still air at trim
     return np.asarray(blown * rise)
 
 

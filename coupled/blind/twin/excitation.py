@@ -1,4 +1,4 @@
-"""What the pilot does in a trial, and what a bench is told.
+"""What the pilot does in a trial, and the dynamic pressure that a bench's host gets.
 
 A force is `level` times a shape in ±1, and what friction and breakout hold is added on the
 shape's side, so that the control moves. All is smooth on the scale of a frame.
@@ -119,8 +119,8 @@ def pilot_force(rig: Rig, shape: Floats, level_N: float) -> Floats:
     return level_N * shape + held * np.tanh(4.0 * shape)
 
 
-def told_pressure(rng: Rng, rig: Rig, frames: int) -> Floats:
-    """Return the q̄ that a bench's host is told, shape (frames,), Pa: holds, steps and ramps."""
+def bench_pressure(rng: Rng, rig: Rig, frames: int) -> Floats:
+    """Return the q̄ that a bench's host gets, shape (frames,), Pa: holds, steps and ramps."""
     table = rig.controls["column"].schedule.dynamic_pressure
     low, high = table[0] + 0.05 * (table[-1] - table[0]), table[-1]
     t = np.arange(frames) / rig.frame_rate

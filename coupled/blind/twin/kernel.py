@@ -71,16 +71,16 @@ def _host(p: TwinParameters, s: TwinState, pressure: float, read: float) -> floa
     s.held_pressure = min(max(s.held_pressure, s.pressure - half), s.pressure + half)
     total = _gradient(p, p.first, s.held_pressure)
     beyond = _gradient(p, p.second, s.held_pressure)
-    k, preload = p.gradient_bend, p.believed_breakout * p.exact
+    k, preload = p.gradient_bend, p.host_breakout * p.exact
     s.break_at, first = p.break_deflection, total
     if s.break_at > 0.0:
         s.break_at -= k * (preload + total * p.break_deflection)
         if s.break_at <= 0.0:  # the grip has passed the break before the loader leaves neutral
             preload += (total - beyond) * p.break_deflection
             s.break_at, first = 0.0, beyond
-    s.first = first / (1.0 - k * first) - p.believed_gradient
-    s.second = beyond / (1.0 - k * beyond) - p.believed_gradient
-    extra = (preload / (1.0 - k * first) - p.believed_breakout) * p.exact
+    s.first = first / (1.0 - k * first) - p.host_gradient
+    s.second = beyond / (1.0 - k * beyond) - p.host_gradient
+    extra = (preload / (1.0 - k * first) - p.host_breakout) * p.exact
     s.preload = 0.0 if p.digital else extra
     if p.digital:
         s.product = _product(s, read) + extra * np.sign(read)

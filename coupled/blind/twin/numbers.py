@@ -27,8 +27,8 @@ class TwinParameters(Protocol):
     tent_width: float
     gradient_step: float  # outsider: quantised
     pressure_play: float  # outsider: hysteresis of q̄, full width
-    believed_gradient: float  # G_B
-    believed_breakout: float
+    host_gradient: float  # the host's G_B
+    host_breakout: float
     gradient_bend: float  # K̂ in ΔG; 0 without gradient compensation
     exact: float
     break_deflection: float

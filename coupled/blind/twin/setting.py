@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.blind.twin.excitation import pilot_force, pilot_shape, told_pressure
+from coupled.blind.twin.excitation import bench_pressure, pilot_force, pilot_shape
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
 from coupled.record.channels import LONGITUDINAL
@@ -41,50 +41,98 @@ TRIES = 8
 
 
 @dataclass(frozen=True)
+class Conditions:
+    """What a record was made with, as its key says it.
+
+    level_N    of the pilot's force
+    noise      standard deviation of each channel's noise, SI
+    bristle_J  friction times the bristles' length: what a reversal gives back
+    """
+
+    duration_s: float
+    excitation: tuple[str, ...]
+    level_N: float
+    noise: Mapping[str, float]
+    bristle_J: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the conditions as the key has them."""
+        return {
+            "duration_s": self.duration_s,
+            "excitation": list(self.excitation),
+            "level_N": self.level_N,
+            "noise": dict(self.noise),
+            "bristle_J": self.bristle_J,
+        }
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A kind put into a twin: its size, what was drawn for it, and so its parameters."""
+
+    kind: Kind
+    size: float
+    draw: Draw
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A record as a logger writes it, and the parameters of each kind put into its rig."""
+
+    record: Record
+    parameters: tuple[Mapping[str, float], ...]
+
+
+@dataclass(frozen=True)
 class Setting:
-    """All of a trial but what is wrong with its rig; `about` is what its key says of it."""
+    """All of a trial but what is wrong with its rig.
+
+    shape      of the pilot's force, in ±1, shape (frames·NODES + 1,)
+    pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
+    noise      shape (frames, channels without time), SI
+    """
 
     rig: Rig
     shape: Floats
-    level_N: float
     frames: int
-    told: Floats | None
+    pressures: Floats | None
     noise: Floats
-    bristle_J: float
-    about: Mapping[str, Any]
+    conditions: Conditions
 
     def gentler(self) -> Setting:
         """Return the setting with less force."""
-        return replace(self, level_N=self.level_N * GENTLER)
+        level_N = self.conditions.level_N * GENTLER
+        return replace(self, conditions=replace(self.conditions, level_N=level_N))
 
     def fly(
         self,
         clean: Clean | None = None,
-        kinds: Sequence[tuple[Kind, float, Draw]] = (),
-        off: Mapping[str, float] | None = None,
-    ) -> tuple[Record, list[dict[str, float]]]:
-        """Return the record as a logger writes it, and the parameters of the kinds put in.
+        kinds: Sequence[Installed] = (),
+        tolerance: Mapping[str, float] | None = None,
+    ) -> Flown:
+        """Return the record of a rig that has these kinds.
 
-        `kinds` are put in with their sizes; `off` are factors on the twin's own numbers, which
-        are a setting's tolerance and no effect. Raises LostError where the aircraft is.
+        `clean` is the record of the rig without any, which sizes are held against; `tolerance`
+        are factors on the twin's own numbers within their setting, which is no effect. Raises
+        LostError where the aircraft leaves the envelope.
         """
-        twin = nominal_twin(self.rig, self.bristle_J)
-        for name, factor in (off or {}).items():
+        twin = nominal_twin(self.rig, self.conditions.bristle_J)
+        for name, factor in (tolerance or {}).items():
             twin.set(**{name: twin.get(name) * factor})
         found = []
-        for kind, size, draw in kinds:
+        for put in kinds:
             assert clean is not None
-            found.append(kind.install(twin, clean, size, draw))
-        nodes = pilot_force(self.rig, self.shape, self.level_N)
-        record = fly_twin(self.rig, twin, nodes, self.frames, self.told, self.noise)
-        return _logged(record), found
+            found.append(put.kind.install(twin, clean, put.size, put.draw))
+        nodes = pilot_force(self.rig, self.shape, self.conditions.level_N)
+        record = fly_twin(self.rig, twin, nodes, self.frames, self.pressures, self.noise)
+        return Flown(_logged(record), tuple(found))
 
 
 def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
     """Return a setting drawn for a rig: 20 to 60 s of a pilot's work, and noise."""
     frames = round(rng.uniform(20.0, 60.0) * rig.frame_rate)
     shape, shapes = pilot_shape(rng, frames, rig.frame_rate)
-    told = told_pressure(rng, rig, frames) if rig.flight is None else None
+    pressures = bench_pressure(rng, rig, frames) if rig.flight is None else None
     reach = (0.1, 0.7) if rig.flight is None else (0.03, 0.25)
     share = float(np.exp(rng.uniform(*np.log(reach))))
     column = rig.controls["column"]
@@ -99,13 +147,14 @@ def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
     sigma = np.array([NOISE[name][0] for name in names]) * factors
     noise = rng.standard_normal((frames, len(names))) * sigma
     bristle = float(np.exp(rng.uniform(np.log(3e-7), np.log(1.5e-6))))
-    about = {
-        "duration_s": frames / rig.frame_rate,
-        "excitation": shapes,
-        "bristle_J": bristle,
-        "noise": {n: float(s) for n, s in zip(names, sigma, strict=True) if s > 0.0},
-    }
-    return Setting(rig, shape, level, frames, told, noise, bristle, about)
+    conditions = Conditions(
+        duration_s=frames / rig.frame_rate,
+        excitation=tuple(shapes),
+        level_N=level,
+        noise={n: float(s) for n, s in zip(names, sigma, strict=True) if s > 0.0},
+        bristle_J=bristle,
+    )
+    return Setting(rig, shape, frames, pressures, noise, conditions)
 
 
 def channels(rig: Rig) -> tuple[str, ...]:
@@ -117,11 +166,11 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
     """Return the setting, gentle enough for the aircraft to stay, and its clean record."""
     for _ in range(TRIES):
         try:
-            record, _ = setting.fly()
+            record = setting.fly().record
         except LostError:
             setting = setting.gentler()
             continue
-        return setting, Clean(setting.rig, record, setting.bristle_J)
+        return setting, Clean(setting.rig, record, setting.conditions.bristle_J)
     return None
 
 

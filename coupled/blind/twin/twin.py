@@ -72,7 +72,7 @@ def first_order(lag_s: float, step_s: float) -> float:
 
 
 def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
-    """Return a twin of the rig's column without any effect; K̂, G_B and F_BO are believed right.
+    """Return a twin of the rig's column without any effect; the host's K̂, G_B and F_BO as filed.
 
     `bristle_J` is friction times the bristles' length: what a reversal gives back, J.
     """
@@ -90,8 +90,8 @@ def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
     twin.set(frame_s=frame_s, pressure_scale=table.pressure_scale, slope=table.slope)
     twin.set(pressure_gain=first_order(table.pressure_lag, frame_s), tent_width=1.0)
     twin.set(
-        believed_gradient=column.assumed_basic_gradient,
-        believed_breakout=column.assumed_breakout,
+        host_gradient=column.assumed_basic_gradient,
+        host_breakout=column.assumed_breakout,
         gradient_bend=host.bend if host.gradient else 0.0,
         exact=float(host.breakout_term == "exact"),
         break_deflection=table.break_deflection,
@@ -130,23 +130,23 @@ class LostError(RuntimeError):
 
 
 def fly_twin(
-    rig: Rig, twin: Twin, nodes: Floats, frames: int, told: Floats | None, noise: Floats
+    rig: Rig, twin: Twin, nodes: Floats, frames: int, pressures: Floats | None, noise: Floats
 ) -> Record:
     """Return the record of a twin, SI, one row a frame.
 
-    rig     the nominal rig: its aircraft and frame rate
-    nodes   the pilot's force, shape (frames·NODES + 1,), N
-    told    q̄ of a bench, shape (frames,), Pa; None where the rig flies
-    noise   shape (frames, channels without time), standard deviations applied
+    rig        the nominal rig: its aircraft and frame rate
+    nodes      the pilot's force, shape (frames·NODES + 1,), N
+    pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
+    noise      shape (frames, channels without time), SI
     Raises LostError where the aircraft leaves the envelope.
     """
     rows = noise[:, :7].copy()
     state = np.zeros(1, TWIN_STATE)
     time = np.arange(frames) / rig.frame_rate
     kernel = bound(twin_frame, twin.numbers, state, nodes, rows[0], 0, 1.0, 1.0)
-    if told is not None:
+    if pressures is not None:
         for k in range(frames):
-            kernel(twin.numbers, state, nodes, rows[k], k, float(told[k]), 1.0)
+            kernel(twin.numbers, state, nodes, rows[k], k, float(pressures[k]), 1.0)
         return Record(("time_s", *RIG_CHANNELS), np.column_stack((time, rows)))
     assert rig.flight is not None
     motions = _fly(rig, twin, nodes, rows, kernel, state)
@@ -171,12 +171,14 @@ def _fly(
 ) -> Floats:
     """Fly the twin's aircraft; fill the rig's rows and return the motion, one row a frame."""
     assert rig.flight is not None
-    factors = {
-        "elevator_effectiveness": rig.flight.elevator_effectiveness * twin.air.effectiveness,
-        "pitch_damping": rig.flight.pitch_damping * twin.air.damping,
-    }
     frame_s = 1.0 / rig.frame_rate
-    craft = airframe(rig.flight.model_copy(update=factors), frame_s)
+    factors = {
+        "flight.elevator_effectiveness": rig.flight.elevator_effectiveness * twin.air.effectiveness,
+        "flight.pitch_damping": rig.flight.pitch_damping * twin.air.damping,
+    }
+    real = rig.changed(factors).flight
+    assert real is not None
+    craft = airframe(real, frame_s)
     moment, gust = twin.air.moment, twin.air.gust
     motions, commands = [], np.zeros(len(rows))
     start = craft.motion()

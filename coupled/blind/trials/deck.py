@@ -1,0 +1,71 @@
+"""What the trials of a version are drawn from: effects, outsiders and rigs, frozen with it.
+
+A published score is of a version and a seed. So what a version draws from is data of its own,
+`versions/vN/`, and not what the package ships or its twin can do: those grow. The order of the
+lists counts, since a draw is a place in a list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from coupled.blind.twin.effects import EFFECTS
+from coupled.blind.twin.kinds import Kind
+from coupled.blind.twin.outsiders import OUTSIDERS
+from coupled.errors import InputError, nearest
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
+from coupled.schema import load_toml
+
+VERSIONS = Path(__file__).parent / "versions"
+KNOWN = (1,)
+DEFAULT = 1  # the version that scores are of
+
+
+@dataclass(frozen=True)
+class Deck:
+    """What the trials of a version are drawn from."""
+
+    version: int
+    effects: tuple[Kind, ...]
+    outsiders: tuple[Kind, ...]
+    rigs: Mapping[str, Rig]
+
+    def kinds(self, category: str) -> tuple[Kind, ...]:
+        """Return what a trial of a category may have."""
+        return self.outsiders if category == "outsider" else self.effects
+
+    def kind(self, category: str, name: str) -> Kind:
+        """Return one of them by name."""
+        return next(kind for kind in self.kinds(category) if kind.name == name)
+
+
+def read_deck(version: int) -> Deck:
+    """Return the deck of a version. Raises InputError for one that there is not."""
+    if version not in KNOWN:
+        known = ", ".join(map(str, KNOWN))
+        raise InputError("--trials", "", f"there is no version {version}; known: {known}")
+    folder = VERSIONS / f"v{version}"
+    path = folder / "deck.toml"
+    table = load_toml(path)
+    rigs = {str(name): read_rig(folder / "rigs" / f"{name}.toml") for name in table["rigs"]}
+    return Deck(
+        version,
+        _chosen(path, "effects", table, EFFECTS),
+        _chosen(path, "outsiders", table, OUTSIDERS),
+        rigs,
+    )
+
+
+def _chosen(
+    path: Path, key: str, table: Mapping[str, Any], kinds: Iterable[Kind]
+) -> tuple[Kind, ...]:
+    """Return the kinds that a list of the deck names, in its order."""
+    by_name = {kind.name: kind for kind in kinds}
+    for name in table[key]:
+        if name not in by_name:
+            raise InputError(path, key, f"the twin has no {name}; {nearest(name, by_name)}")
+    return tuple(by_name[name] for name in table[key])

@@ -1,0 +1,145 @@
+"""The score of a set of diagnoses as data, and as JSON has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of so many, and its exact 95 % interval; None where of nothing."""
+
+    right: int
+    of: int
+    share: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class ClearSingles:
+    """Single effects that at least double their stage's residual."""
+
+    named: Share
+    named_or_in_the_set: Share
+    stage: Share
+    wrong: Share
+
+
+@dataclass(frozen=True)
+class FaintSingles:
+    """Single effects that show less."""
+
+    right: Share
+    no_gap: Share
+    undecided: Share
+    wrong: Share
+
+
+@dataclass(frozen=True)
+class Outsiders:
+    """What the library does not have."""
+
+    unexplained: Share
+    stage: Share
+    false_attributions: Share
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Two effects at once."""
+
+    whole: Share
+    whole_or_in_the_set: Share
+    stages: Share
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """How often a parameter's interval holds the truth, and how many lack an end."""
+
+    covered: Share
+    without_interval: int
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """Effects of about the same stated probability, and the share of them that is true."""
+
+    stated: float
+    true: Share
+
+
+@dataclass(frozen=True)
+class Probabilities:
+    """Brier score and reliability of the stated probabilities; None without an effect found."""
+
+    brier: float | None
+    effects: int
+    bins: tuple[Reliability, ...]
+
+
+@dataclass(frozen=True)
+class Power:
+    """Single effects of about the same size: from which ratio, their median, and how many named."""
+
+    least: float
+    ratio: float
+    wrong: int
+    named: Share
+
+
+@dataclass(frozen=True)
+class ByEffect:
+    """How often an effect or outsider was answered rightly, and what was said instead."""
+
+    right: int
+    of: int
+    instead: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Score:
+    """The whole score."""
+
+    records: int
+    missing: int
+    clear_singles: ClearSingles
+    faint_singles: FaintSingles
+    false_alarms: Share
+    outsiders: Outsiders
+    pairs: Pairs
+    lack_said: Share
+    intervals: Intervals
+    closed: Share
+    probabilities: Probabilities
+    power: tuple[Power, ...]
+    effects: Mapping[str, ByEffect]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the score as JSON has it."""
+        stated = self.probabilities
+        return {
+            "records": self.records,
+            "missing": self.missing,
+            "clear_singles": asdict(self.clear_singles),
+            "faint_singles": asdict(self.faint_singles),
+            "no_gap": {"false_alarms": asdict(self.false_alarms)},
+            "outsiders": asdict(self.outsiders),
+            "pairs": asdict(self.pairs),
+            "lacking": {"lack_said": asdict(self.lack_said)},
+            "intervals": asdict(self.intervals),
+            "closed": asdict(self.closed),
+            "probabilities": {
+                "brier": stated.brier,
+                "effects": stated.effects,
+                "bins": [{"told": row.stated, **asdict(row.true)} for row in stated.bins],
+            },
+            "power": [
+                {"from": row.least, "ratio": row.ratio, "wrong": row.wrong, **asdict(row.named)}
+                for row in self.power
+            ],
+            "effects": {name: asdict(row) for name, row in self.effects.items()},
+        }

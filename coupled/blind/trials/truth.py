@@ -1,0 +1,133 @@
+"""The truth of a trial: what its real rig has, how wide it shows, and how the record was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from coupled.blind.twin.setting import Conditions
+
+
+@dataclass(frozen=True)
+class TrueEffect:
+    """What a real rig has and its nominal model lacks, as a diagnosis names it."""
+
+    name: str
+    stage: str
+    parameters: Mapping[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the effect as the key has it."""
+        return {"name": self.name, "stage": self.stage, "parameters": dict(self.parameters)}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How wide the effects of a trial show, residual over floor under the nominal rig.
+
+    clean_gap  at each effect's stage, on the same rig without any effect
+    alone      of each effect alone, in the order of the effects
+    ratio      the least of `alone` over `clean_gap`: 2 doubles the stage's residual
+    """
+
+    clean_gap: Mapping[str, float]
+    alone: tuple[float, ...]
+    ratio: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the sizes as the key has them."""
+        return {
+            "clean_gap": dict(self.clean_gap),
+            "alone": list(self.alone),
+            "ratio": self.ratio,
+        }
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The truth of a record, an entry of the key.
+
+    category    the key's `class`: none, single, pair, outsider or lacking
+    rig         name of the nominal rig
+    stages      where something is, sorted
+    gap         each stage's residual over its floor under the nominal rig
+    missing     channels that were taken out
+    alike       effects that are the same law on this record; of a single
+    tolerance   factors on numbers that are off within their setting, which is no effect
+    sizes       None where the rig has nothing
+    conditions  what the record was made with
+    seed        of the trial's draws
+    """
+
+    category: str
+    rig: str
+    effects: tuple[TrueEffect, ...] = ()
+    stages: tuple[str, ...] = ()
+    gap: Mapping[str, float] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+    alike: tuple[str, ...] = ()
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    sizes: Sizes | None = None
+    conditions: Conditions | None = None
+    seed: tuple[int, ...] = ()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of what the rig has."""
+        return frozenset(effect.name for effect in self.effects)
+
+    @property
+    def ratio(self) -> float:
+        """How many times the effects widen their stages' residuals; 1 where there is none."""
+        return 1.0 if self.sizes is None else self.sizes.ratio
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the truth as the key has it."""
+        table: dict[str, Any] = {
+            "class": self.category,
+            "rig": self.rig,
+            "effects": [effect.as_dict() for effect in self.effects],
+            "stages": list(self.stages),
+            "gap": dict(self.gap),
+            "missing": list(self.missing),
+            "seed": list(self.seed),
+        }
+        if self.category == "single":
+            table["alike"] = list(self.alike)
+        if self.category == "none":
+            table["tolerance"] = dict(self.tolerance)
+        if self.sizes is not None:
+            table |= self.sizes.as_dict()
+        if self.conditions is not None:
+            table |= self.conditions.as_dict()
+        return table
+
+
+def truth_from(table: Mapping[str, Any]) -> Truth:
+    """Return the truth that `Truth.as_dict` wrote. Raises KeyError, TypeError or ValueError."""
+    sizes = None
+    if "ratio" in table:
+        alone = tuple(map(float, table["alone"]))
+        sizes = Sizes(dict(table["clean_gap"]), alone, float(table["ratio"]))
+    known = {item.name for item in fields(Conditions)}
+    conditions = None
+    if "duration_s" in table:
+        given = {key: value for key, value in table.items() if key in known}
+        conditions = Conditions(**given | {"excitation": tuple(table["excitation"])})
+    return Truth(
+        category=str(table["class"]),
+        rig=str(table["rig"]),
+        effects=tuple(
+            TrueEffect(str(e["name"]), str(e["stage"]), dict(e["parameters"]))
+            for e in table["effects"]
+        ),
+        stages=tuple(map(str, table["stages"])),
+        gap=dict(table["gap"]),
+        missing=tuple(map(str, table["missing"])),
+        alike=tuple(map(str, table.get("alike", ()))),
+        tolerance=dict(table.get("tolerance", {})),
+        sizes=sizes,
+        conditions=conditions,
+        seed=tuple(map(int, table.get("seed", ()))),
+    )
