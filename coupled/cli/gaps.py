@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,7 +15,7 @@ from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
-    from coupled.gap.diagnose import Diagnosis
+    from coupled.gap.diagnosis import Diagnosis
     from coupled.record.record import Record
 
 
@@ -41,7 +41,7 @@ def diagnose(
         Path | None, typer.Option(metavar="DIR", help="Draw ladder, stages and signature there.")
     ] = None,
     power: Annotated[
-        bool, typer.Option("--power", help="Tell what size of each effect would have shown.")
+        bool, typer.Option("--power", help="Say what size of each effect would have shown.")
     ] = False,
     output: Annotated[
         Path | None,
@@ -49,20 +49,20 @@ def diagnose(
     ] = None,
     json_file: JsonOption = "",
 ) -> None:
-    """Tell where records depart from their rig, which effect causes it, and how far it shrinks."""
+    """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
+    name = _control(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--json": json_file}
         for option, value in asked.items():
             if value:
                 raise InputError(records[0], option, "is for records of one rig, not for a folder")
-        _diagnose_folder(records, rig, output)
+        _diagnose_folder(records, rig, output, name)
         return
     if output is not None:
         raise InputError(output, "--output", "is for a folder of records; give --json FILE")
     if not rig:
         raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
     rig_file = find(rig, shipped_rigs(), "rig")
-    name = _control(control, records[0])
     inputs = [*records, rig_file]
     if improve is not None and improve.suffix != ".toml":
         raise InputError(improve, "--improve", "is a rig file: its name ends in .toml")
@@ -74,15 +74,13 @@ def diagnose(
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name)
-    if power:
-        whole.found["power"] = _power(whole)
     if json_file != "-":
-        _print(whole)
+        _print(whole, power)
     if improve is not None:
         _write_improved(improve, whole, rig_file, read, json_file != "-")
     if plots is not None:
-        _draw(plots, whole, read, json_file != "-")
-    give_json(whole.found, json_file)
+        _draw(plots, whole, json_file != "-")
+    give_json(whole.as_dict(power) if json_file else {}, json_file)
 
 
 def _control(word: str, file: Path) -> ControlName:
@@ -96,7 +94,6 @@ def _diagnose(
     files: list[Path], rig_file: Path, control: ControlName
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.gap.report import add_report
     from coupled.record.record import read_record
     from coupled.rig.rigfile import read_rig
 
@@ -104,41 +101,34 @@ def _diagnose(
     read: dict[str, Record] = {}
     for file in files:
         if str(file) in read:
-            raise InputError(file, "", "is given twice")
+            raise InputError(file, "", "is given twice: give each record once")
         read[str(file)] = read_record(file)
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance)
         advance("flying again, and looking for the next test", 0, 1)
-        add_report(whole, read)
+        _ = whole.closed_loop, whole.next_tests  # here, where progress is shown
     return whole, read
 
 
-def _power(whole: Diagnosis) -> list[dict[str, Any]]:
-    from coupled.gap.power import power
-
-    return power(whole.choice.settled.rig, whole.control, whole.outputs)
-
-
-def _print(whole: Diagnosis) -> None:
+def _print(whole: Diagnosis, power: bool) -> None:
     from coupled.cli.tables.gaps import print_closed_loop, print_power, print_stages
-    from coupled.gap.words import in_words
 
-    out.print(in_words(whole.found, whole.control), markup=False, highlight=False)
-    print_stages(out, whole.found)
-    print_closed_loop(out, whole.found)
-    if "power" in whole.found:
-        print_power(out, whole.found["power"])
+    out.print(whole.summary, markup=False, highlight=False)
+    print_stages(out, whole.stages)
+    if whole.closed_loop is not None:
+        print_closed_loop(out, whole.closed_loop)
+    if power:
+        print_power(out, whole.power)
 
 
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record], aloud: bool
 ) -> None:
-    from coupled.gap.words import in_words
     from coupled.rig.rigwrite import rig_text
 
     names = ", ".join(Path(name).name for name in records)
     remark = f"{rig_file.name} with what was found in {names}:\n"
-    write_text(path, rig_text(whole.improved, remark + in_words(whole.found, whole.control)))
+    write_text(path, rig_text(whole.improved, remark + whole.summary))
     if aloud:
         say(f"improved rig: {path}")
 
@@ -152,18 +142,20 @@ def _plot_targets(folder: Path | None) -> list[Path]:
     return [folder / name for name in FIGURES]
 
 
-def _draw(folder: Path, whole: Diagnosis, records: dict[str, Record], aloud: bool) -> None:
+def _draw(folder: Path, whole: Diagnosis, aloud: bool) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
-    for file, figure in draw_diagnosis(whole, records).items():
+    for file, figure in draw_diagnosis(whole).items():
         save(figure, folder / file)
         if aloud:
             say(f"figure: {folder / file}")
 
 
-def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None:
-    """Diagnose every record of a folder, each alone; print and write a summary."""
+def _diagnose_folder(
+    folders: list[Path], rig: str, output: Path | None, control: ControlName
+) -> None:
+    """Diagnose a control in every record of a folder, each alone; print and write a summary."""
     from coupled.cli.tables.gaps import print_summary
     from coupled.gap.batch import jobs, run_all, summary
 
@@ -173,7 +165,7 @@ def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None
         raise InputError(folders[0], "--rig", "leave it out: records.toml names each record's rig")
     if output is None:
         raise InputError(folders[0], "--output", "is missing: the folder for the diagnoses")
-    todo = jobs(folders[0], output)
+    todo = jobs(folders[0], output, control)
     check_target(output / "summary.csv")
     with progress() as advance:
         found = run_all(todo, advance)

@@ -23,13 +23,13 @@ from scipy.linalg import solveh_banded
 
 from coupled.gap.output import white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
+from coupled.gap.thresholds import STIFFEST_AIR
 from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
 NEEDS = ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
 LOAD = "load_factor"
 GRAVITY_m_per_s2 = 9.80665
-STIFFEST = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Air:
 
     speed: Floats
     rms: float  # of the true air: the rough one's less its noise
-    error: Floats  # a realisation of the error, m/s
+    error: Floats  # a sample of the error, m/s
 
 
 def can_tell_air(records: Sequence[Record]) -> bool:
@@ -64,7 +64,7 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
 
 
 def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return the rate of climb, m/s, and a realisation of its error, shape (frames,) each."""
+    """Return the rate of climb, m/s, and a sample of its error, shape (frames,) each."""
     alpha, pitch, speed, height = (record[name] for name in NEEDS)
     if LOAD not in record:
         climb = rate_of(smoothed(height), 1.0 / frame_s)
@@ -91,7 +91,7 @@ def _held(upward: Floats, height: Floats, frame_s: float, sigma: tuple[float, fl
     lacks = height - (np.cumsum(climbs) - 0.5 * climbs) * frame_s
     frames = np.arange(len(height))
     slow = Polynomial.fit(frames, lacks, 6)(frames)  # what would cost the equations digits
-    weight = min((sigma[1] / max(sigma[0] * frame_s**2, 1e-12)) ** 2, STIFFEST)
+    weight = min((sigma[1] / max(sigma[0] * frame_s**2, 1e-12)) ** 2, STIFFEST_AIR)
     drift = slow + _whittaker(lacks - slow, weight)
     return np.asarray(climbs + np.gradient(drift, frame_s))
 

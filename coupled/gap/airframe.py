@@ -18,11 +18,13 @@ from coupled.flight.airframe import SPEED, JSBSimAirframe
 from coupled.gap.air import Air, vertical_air
 from coupled.gap.output import Output, spread, white
 from coupled.gap.surfaces import commands, surface_channel
+from coupled.gap.thresholds import FLIGHT_KNOWN, LOST_MOTION
 from coupled.record.channels import motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.rig.rig import Rig
+from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 RATE = "pitch_rate_rad_per_s"
@@ -34,7 +36,6 @@ COMPARED = (
     "yaw_rate_rad_per_s",
     "sideslip_rad",
 )
-KNOWN = 1e-4  # share of its span to which a channel can be replayed by measured surfaces
 _KEPT = 4  # flights remembered
 
 
@@ -43,7 +44,7 @@ class Model:
     """The aircraft of one record, flown by its surfaces; remembers its last flights."""
 
     rig: Rig
-    told: Floats  # commands about trim, shape (frames, 3)
+    commands: Floats  # about trim, shape (frames, 3)
     compared: tuple[str, ...]
     air: Air | None
     _flown: list[tuple[Flight, Floats]] = field(default_factory=list)
@@ -55,31 +56,31 @@ class Model:
         for known, flown in self._flown:
             if known == flight:
                 return flown
-        flown = self.fly(flight, self.told)
+        flown = self.fly(flight, self.commands)
         self._flown[:] = [*self._flown[1 - _KEPT :], (flight, flown)]
         return flown
 
-    def fly(self, flight: Flight, told: Floats, astray: bool = False) -> Floats:
+    def fly(self, flight: Flight, asked: Floats, with_error: bool = False) -> Floats:
         """Return the motion that the surfaces' commands make.
 
-        `astray` adds to the air what is wrong with it.
+        `with_error` adds to the air a sample of its error.
         """
-        still = flight.model_copy(update={"gust_rms": 0.0})
+        still = changed(flight, {"gust_rms_m_per_s": 0.0}, flight.model)
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
-            moves = moves + self.air.error if astray else moves
+            moves = moves + self.air.error if with_error else moves
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 tells of the air over the frame before
         frame_s, controls = 1.0 / self.rig.frame_rate, list(self.rig.controls)
         airframe = JSBSimAirframe(still, frame_s, controls, [aircraft_folder()], air_m_per_s=air)
         every = motion_channels(controls, flown=True)
         at = [every.index(name) for name in self.compared]
-        motion = np.full((len(told), len(at)), np.nan)
-        rows = [(a, b, c) for a, b, c in told.tolist()]
+        motion = np.full((len(asked), len(at)), np.nan)
+        rows = [(a, b, c) for a, b, c in asked.tolist()]
         for k in range(len(rows)):
             now = airframe.motion()
             motion[k] = [now[i] for i in at]
-            if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > 20.0:
+            if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > LOST_MOTION:
                 motion[k:] = motion[max(k - 1, 0)]
                 break
             # Row k + 1 is the answer to the command of row k.
@@ -99,18 +100,18 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
     known = motion_channels(list(rig.controls), flown=True)
     compared = tuple(n for n in COMPARED if n in known and n in record and np.ptp(record[n]) > 0.0)
     rng = np.random.default_rng(43)
-    told, wrong = commands(rig, record, rng)
-    model = Model(rig, told, compared, vertical_air(record, 1.0 / rig.frame_rate))
+    given, wrong = commands(rig, record, rng)
+    model = Model(rig, given, compared, vertical_air(record, 1.0 / rig.frame_rate))
     flown = model.motion(rig)
-    carried = model.fly(rig.flight, wrong, astray=True) - flown
+    carried = model.fly(rig.flight, wrong, with_error=True) - flown
     outputs = []
     for i, name in enumerate(compared):
-        own = float(np.hypot(white(record[name]), KNOWN * np.ptp(record[name])))
+        own = float(np.hypot(white(record[name]), FLIGHT_KNOWN * np.ptp(record[name])))
         floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
         loose = spread([carried[:, i]], own)
 
-        def predict(changed: Rig, i: int = i) -> Floats:
-            return np.asarray(model.motion(changed)[:, i])
+        def predict(other: Rig, i: int = i) -> Floats:
+            return np.asarray(model.motion(other)[:, i])
 
         outputs.append(
             Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)

@@ -11,7 +11,8 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +22,12 @@ import coupled
 from coupled.errors import InputError, nearest
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
-from coupled.gap.report import add_report
+from coupled.gap.result import FORMAT
 from coupled.parallel import executor
+from coupled.record.channels import ControlName
 from coupled.record.record import read_record
 from coupled.resources import shipped_rigs
+from coupled.rig.parameters import PLAIN_NAME
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
@@ -35,15 +38,16 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Job:
-    """One record, its rig, and where its diagnosis goes."""
+    """One record, its rig, where its diagnosis goes, and the control that is diagnosed."""
 
     name: str
     record: Path
     rig: Path
     out: Path
+    control: ControlName = "column"
 
 
-def jobs(folder: Path, out: Path) -> list[Job]:
+def jobs(folder: Path, out: Path, control: ControlName = "column") -> list[Job]:
     """Return what a folder's `records.toml` asks for: record = rig.
 
     Records lie beside it or in `records/`, rigs in `rigs/` there or a folder up, else among
@@ -54,9 +58,14 @@ def jobs(folder: Path, out: Path) -> list[Job]:
     for name, rig in listed.items():
         if not isinstance(rig, str):
             raise InputError(folder / LIST, name, "needs the name of a rig, in quotes")
+        if not re.match(PLAIN_NAME, name):
+            problem = "should be a record's name: letters, digits, dots and dashes, no folder"
+            raise InputError(folder / LIST, name, problem)
+        if not re.match(PLAIN_NAME, rig):
+            raise InputError(folder / LIST, name, f"names the rig {rig!r}: give a name, no folder")
         file = f"{name}.json"
         check_target(out / file)
-        found.append(Job(name, _record(folder, name), _rig(folder, name, rig), out / file))
+        found.append(Job(name, _record(folder, name), _rig(folder, name, rig), out / file, control))
     if not found:
         raise InputError(folder / LIST, "", "names no record")
     return found
@@ -82,28 +91,49 @@ def _rig(folder: Path, name: str, rig: str) -> Path:
     raise InputError(folder / LIST, name, f"there is no rig {rig!r}; {nearest(rig, shipped)}")
 
 
-def summary(found: Sequence[dict[str, Any]]) -> str:
+@dataclass(frozen=True)
+class Row:
+    """One record's line of the summary, read off the JSON of its diagnosis."""
+
+    record: str
+    rig: str
+    verdict: str
+    effects: tuple[str, ...]
+    parameters: tuple[tuple[str, float], ...]
+    guilty: tuple[str, ...]
+    rivals: tuple[tuple[str, ...], ...]
+    closed: float | None
+    why: str = ""  # it was refused, or failed
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Row:
+        """Return the line of a diagnosis' JSON."""
+        effects = document["effects"]
+        return cls(
+            record=document["record"],
+            rig=document["made"]["rig"],
+            verdict=document["verdict"],
+            effects=tuple(effect["name"] for effect in effects),
+            parameters=tuple(
+                (name, one["value"]) for e in effects for name, one in e["parameters"].items()
+            ),
+            guilty=tuple(s for s, stage in document["stages"].items() if stage.get("guilty")),
+            rivals=tuple(tuple(group) for group in document["rivals"]),
+            closed=document["shrink"].get("closed"),
+            why=document.get("why", ""),
+        )
+
+
+def summary(rows: Sequence[Row]) -> str:
     """Return a table of diagnoses as CSV, a row a record."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(
-        ["record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed"]
-    )
-    for item in found:
-        effects = item["effects"]
-        parameters = [
-            f"{name}={value['value']:.5g}"
-            for effect in effects
-            for name, value in effect["parameters"].items()
-        ]
-        guilty = [stage for stage, told in item["stages"].items() if told.get("guilty")]
-        rivals = ["|".join(group) for group in item["rivals"]]
-        closed = item["shrink"].get("closed", "")
-        row = [item["record"], item["made"]["rig"], item["verdict"]]
-        row += [
-            " ".join(names) for names in ([e["name"] for e in effects], parameters, guilty, rivals)
-        ]
-        table.writerow([*row, f"{closed:.4f}" if closed != "" else ""])
+    table.writerow(HEAD)
+    for row in rows:
+        cells = [row.record, row.rig, row.verdict, " ".join(row.effects)]
+        cells += [" ".join(f"{name}={value:.5g}" for name, value in row.parameters)]
+        cells += [" ".join(row.guilty), " ".join("|".join(group) for group in row.rivals)]
+        table.writerow([*cells, "" if row.closed is None else f"{row.closed:.4f}"])
     return text.getvalue()
 
 
@@ -116,29 +146,42 @@ def version_hash() -> str:
     return digest.hexdigest()
 
 
-def run(job: Job, version: str) -> dict[str, Any]:
-    """Diagnose one record, write its JSON, and return it; a refused record is told as such."""
+def run(job: Job, version: str) -> Row:
+    """Diagnose one record, write its JSON, and return its line.
+
+    A record that is refused, or whose diagnosis fails, has a verdict that says so, and why.
+    """
     made = {
         "coupled": coupled.__version__,
         "sources_sha256": version,
         "record_sha256": sha256(job.record),
         "rig": job.rig.stem,
         "rig_sha256": sha256(job.rig),
+        "control": job.control,
     }
     known = _known(job.out)
-    if known.get("made") == made:
-        return known
+    if known.get("made") == made and known.get("format") == FORMAT:
+        return Row.of(known)
+    document = {"record": job.name} | _document(job) | {"made": made}
+    write_text(job.out, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    return Row.of(document)
+
+
+def _document(job: Job) -> dict[str, Any]:
     try:
         records = {str(job.record): read_record(job.record)}
-        whole = diagnose(read_rig(job.rig), records, "column")
-        add_report(whole, records)
-        found = whole.found
+        return diagnose(read_rig(job.rig), records, job.control).as_dict()
     except InputError as error:
-        refused = {"verdict": "refused", "why": f"{error.key}: {error.problem}".lstrip(": ")}
-        found = refused | {"stages": {}, "effects": [], "rivals": [], "shrink": {}}
-    found = {"record": job.name} | found | {"made": made}
-    write_text(job.out, json.dumps(found, indent=1, ensure_ascii=False) + "\n")
-    return found
+        return _nothing("refused", f"{error.key}: {error.problem}".lstrip(": "))
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        # A defect of the diagnosis: said in this record's file, and no other record pays for it.
+        return _nothing("failed", f"{type(error).__name__}: {error}")
+
+
+def _nothing(verdict: str, why: str) -> dict[str, Any]:
+    """Return the JSON of a record that could not be diagnosed."""
+    nothing: dict[str, Any] = {"stages": {}, "effects": [], "rivals": [], "shrink": {}}
+    return {"format": FORMAT, "verdict": verdict, "why": why} | nothing
 
 
 def _known(path: Path) -> dict[str, Any]:
@@ -149,10 +192,10 @@ def _known(path: Path) -> dict[str, Any]:
     return known if isinstance(known, dict) else {}
 
 
-def run_all(todo: list[Job], progress: Progress, workers: int = 0) -> list[dict[str, Any]]:
+def run_all(todo: list[Job], progress: Progress, workers: int = 0) -> list[Row]:
     """Diagnose all records on all cores; the order and the numbers are those of one core."""
     version = version_hash()
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Row] = {}
     with executor(workers or os.cpu_count() or 1) as pool:
         waiting = {pool.submit(run, job, version): job.name for job in todo}
         for done in as_completed(waiting):

@@ -1,17 +1,18 @@
-"""What the search for effects works on, and how it fits: with the settings' tolerance profiled."""
+"""What the search for effects works on: a rig, its outputs, and fits with the settings free."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from coupled.gap.effects import SETTINGS, Effect
+from coupled.gap.effect import Effect
 from coupled.gap.fit import Fit, fit
+from coupled.gap.library import SETTINGS
 from coupled.gap.output import Output, Part, stage_gaps
+from coupled.gap.thresholds import SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
-SETTLE = 1.05  # gap from which a stage's settings are worth fitting
 Tell = Callable[[str, int, int], None]
 
 
@@ -31,13 +32,13 @@ class Case:
     @property
     def settings(self) -> tuple[Effect, ...]:
         """The nominal rig's settings that the outputs tell of: nuisances of every fit."""
-        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE}
+        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
         return tuple(s for s in SETTINGS.values() if s.stage in stages)
 
     @property
     def neutral(self) -> dict[str, float]:
         """The settings as the rig file has them."""
-        return {f"{setting.name}.factor": 1.0 for setting in SETTINGS.values()}
+        return {s.value_key(p): 1.0 for s in SETTINGS.values() for p in s.free}
 
     def gaps(self, rig: Rig) -> dict[str, float]:
         """Return each stage's gap, by the floors of this rig where they are higher."""

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from coupled.errors import InputError
+from coupled.gap.thresholds import (
+    OTHER_RATE,
+    OTHER_RIG,
+    OTHER_SPEED,
+    STAMP_JITTER,
+    SHORTEST_RECORD_s,
+)
 from coupled.record.channels import ControlName, channel
 from coupled.record.importing import plausible
 from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
-
-ANOTHER = 2.0  # factor on the gradient beyond which a rig file is another rig's
-OFF_SPEED = 0.03  # relative error of the trimmed airspeed, likewise
-LEAST_s = 10.0  # a shorter record holds too few stretches to hold any out
 
 
 def check_record(rig: Rig, record: Record, control: ControlName, file: object) -> None:
@@ -23,15 +26,17 @@ def check_record(rig: Rig, record: Record, control: ControlName, file: object) -
     time = record.time_s
     steps = np.diff(time)
     rate = 1.0 / float(np.median(steps))
-    if abs(rate / rig.frame_rate - 1.0) > 1e-3:
+    if abs(rate / rig.frame_rate - 1.0) > OTHER_RATE:
         raise InputError(
             file, "time_s", f"runs at {rate:.4g} Hz, the rig at {rig.frame_rate:g} Hz: another rig?"
         )
-    gap = np.flatnonzero(np.abs(steps * rig.frame_rate - 1.0) > 0.01)
+    gap = np.flatnonzero(np.abs(steps * rig.frame_rate - 1.0) > STAMP_JITTER)
     if gap.size:
         raise InputError(file, "time_s", f"has a gap or a jump after {time[gap[0]]:.3f} s")
-    if len(time) < LEAST_s * rig.frame_rate:
-        raise InputError(file, "", f"is {time[-1] - time[0]:.1f} s long; {LEAST_s:g} s are needed")
+    if len(time) < SHORTEST_RECORD_s * rig.frame_rate:
+        raise InputError(
+            file, "", f"is {time[-1] - time[0]:.1f} s long; {SHORTEST_RECORD_s:g} s are needed"
+        )
     for name in record.channels:
         if not np.all(np.isfinite(record[name])):
             row = int(np.argmax(~np.isfinite(record[name])))
@@ -50,8 +55,8 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
         if other is not None:
             raise InputError(file, name, f"is a copy of {other}")
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
-    told = gradient in record and pressure in record
-    stuck = told and plausible.is_constant(record[pressure])
+    both = gradient in record and pressure in record
+    stuck = both and plausible.is_constant(record[pressure])
     if stuck and not plausible.is_constant(record[gradient]):
         raise InputError(file, pressure, f"never changes, while {gradient} does: it is stuck")
     data = rig.controls[control]
@@ -74,7 +79,7 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
     if not specified.any():
         return
     ratio = float(np.median(record[gradient]) / np.median(specified))
-    if not 1.0 / ANOTHER < ratio < ANOTHER:
+    if not 1.0 / OTHER_RIG < ratio < OTHER_RIG:
         raise InputError(
             file, gradient, f"is {ratio:.3g} times what this rig's table gives: another rig's file?"
         )
@@ -86,7 +91,7 @@ def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
     if name not in record:
         return
     start = float(np.median(record[name][:12]))
-    if abs(start / trim_speed_m_per_s - 1.0) > OFF_SPEED:
+    if abs(start / trim_speed_m_per_s - 1.0) > OTHER_SPEED:
         raise InputError(
             file,
             name,

@@ -14,24 +14,24 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from coupled.gap.case import Case, Tell
-from coupled.gap.effects import BY_NAME, EFFECTS, SETTINGS, TOLERANCE, Effect, apply
-from coupled.gap.fit import Fit, shows_in
-from coupled.gap.output import Output, memory, stage_gaps, stage_limits
+from coupled.gap.effect import Effect, apply, value_of
+from coupled.gap.fit import Fit
+from coupled.gap.library import BY_NAME, EFFECTS, SETTINGS
+from coupled.gap.output import Output, explained_below, memory, stage_gaps, stage_limits
 from coupled.gap.screen import screen
+from coupled.gap.thresholds import (
+    FAINT_GAP,
+    LAW_GAIN,
+    LEAST_GAIN,
+    MOST_EFFECTS,
+    NEEDLESS_GAIN,
+    NO_GAP_LEFT,
+    RIVAL_GAIN,
+    SIMPLER_GAIN,
+    SIMPLER_SHARE,
+)
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
-
-LEAST_GAIN = 8.0  # log-likelihood by which an effect must beat the rig without it
-RIVAL = 4.0  # and by which the best must beat another to be the only answer
-LITTLE = 0.01  # floors squared: a tenth of the floor is no gap to close
-MISMATCH = 0.03  # share of a gap that the physics of a right effect may leave
-# By which, or by which share of the gain, more numbers must win where fewer close the gap.
-SIMPLER, SIMPLER_SHARE = 6.0, 0.05
-FAINT, LAW = 2.0, 12.0  # a gap under which the law of dry friction has to be told by such a gain
-DRY = COULOMB, STRIBECK = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
-SLOW = 2e-3  # d/s over which a breakaway fades, where none is known
-SPARE = 4.0  # an effect that others have made needless: it would be missed by less
-MOST = 4  # effects in one answer
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Step:
+class Found:
     """One effect found: its gain, and the others that the record cannot tell from it."""
 
     effect: Effect
@@ -60,7 +60,7 @@ class Choice:
     `settled` has the nominal rig's settings moved within their tolerance, and no effect.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[Found, ...]
     fit: Fit
     settled: Fit
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
@@ -78,9 +78,9 @@ def search(
     """Return the effects that explain a record's gap, each earning its place in turn."""
     case = Case(nominal, control, outputs, tell, refloored)
     settled = current = case.fit(())
-    steps: list[Step] = []
+    steps: list[Found] = []
     rounds: list[dict[str, float]] = []
-    while len(steps) < MOST:
+    while len(steps) < MOST_EFFECTS:
         ranked = _round(case, settled, current, library)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
         if not ranked or ranked[0].gain < LEAST_GAIN:
@@ -101,7 +101,7 @@ def search(
     return Choice(tuple(steps), current, settled, tried, tuple(rounds))
 
 
-def _again(case: Case, settled: Fit, current: Fit, step: Step) -> Step:
+def _again(case: Case, settled: Fit, current: Fit, step: Found) -> Found:
     """Return a step whose rivals are tried again, now that the other effects are known."""
     if not step.rivals:
         return step
@@ -123,17 +123,17 @@ def _needless(case: Case, current: Fit) -> Effect | None:
     if len(current.effects) < 2:
         return None
     whole = case.fit(current.effects, "fitted", current.values)
-    spare: tuple[float, Effect] | None = None
+    least: tuple[float, Effect] | None = None
     for effect in current.effects[:-1]:
         rest = tuple(other for other in current.effects if other is not effect)
         without = case.fit(rest, "fitted", current.values)
         missed = ranked_by_gain(case.outputs, without, [(effect, whole)])[0].gain
-        if missed < SPARE and (spare is None or missed < spare[0]):
-            spare = (missed, effect)
-    return None if spare is None else spare[1]
+        if missed < NEEDLESS_GAIN and (least is None or missed < least[0]):
+            least = (missed, effect)
+    return None if least is None else least[1]
 
 
-def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]) -> Step:
+def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]) -> Found:
     """Return a found effect with its rivals; what holds it as a special case is none.
 
     Unless the gap is faint: there one law of dry friction passes for another.
@@ -143,32 +143,50 @@ def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]
         for other in ranked
         if other is not best and len(other.effect.free) <= len(best.effect.free)
     ]
-    rivals = [other for other in others if other.gain > best.gain - RIVAL]
+    rivals = [other for other in others if other.gain > best.gain - RIVAL_GAIN]
     gaps = stage_gaps(case.outputs, settled.rig)
-    if best.effect in DRY and all(gaps.get(at, 0.0) < FAINT for at in shows_in(best.effect)):
-        rivals = [other for other in rivals if other.effect not in DRY]
+    family = _family(best.effect)
+    if family and all(gaps.get(at, 0.0) < FAINT_GAP for at in best.effect.shows_in):
+        rivals = [other for other in rivals if other.effect not in family]
         rivals += _other_laws(case, best, ranked)
     weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
-    return Step(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
+    return Found(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
+
+
+def _family(effect: Effect) -> tuple[Effect, ...]:
+    """Return an effect with those that pass for it, or for which it passes, in a faint gap."""
+    found: list[Effect] = []
+    for richer in EFFECTS:
+        if richer.alike is not None and effect.name in (richer.name, richer.alike.plainer):
+            found += [BY_NAME[richer.alike.plainer], richer]
+    return tuple(dict.fromkeys(found))
 
 
 def _other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
-    """Return the other law of dry friction, if a faint gap leaves it open.
+    """Return the effects that a faint gap does not distinguish from the best.
 
-    A breakaway of twice the running friction hardly shows there, and is never excluded.
+    The richer of two laws excludes the plainer by its gain; the plainer never excludes the
+    richer, which may pass for it.
     """
-    if best.effect is STRIBECK:
-        return [one for one in ranked if one.effect is COULOMB and one.gain > best.gain - LAW]
-    friction = best.fit.values["coulomb_friction.friction_N"]
-    breakaway = 2.0 * friction + case.nominal.controls[case.control].loader.friction
-    told = {"friction_N": friction, "breakaway_N": breakaway, "stribeck_{d}_per_s": SLOW}
-    values = {f"{STRIBECK.name}.{name}": value for name, value in told.items()}
-    effects = (*(e for e in best.fit.effects if e is not COULOMB), STRIBECK)
-    known = {**best.fit.values, **values}
-    rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), known)
-    return [
-        Candidate(best.gain, STRIBECK, replace(best.fit, effects=effects, values=known, rig=rig))
-    ]
+    if best.effect.alike is not None:
+        plainer = best.effect.alike.plainer
+        return [
+            one for one in ranked if one.effect.name == plainer and one.gain > best.gain - LAW_GAIN
+        ]
+    found = []
+    for richer in _family(best.effect):
+        if richer.alike is None:
+            continue
+        known = {p.name: best.fit.values[best.effect.value_key(p)] for p in best.effect.free}
+        base = float(value_of(case.nominal, case.control, richer.alike.base))
+        imitating = richer.alike.values(known, base)
+        values = dict(best.fit.values)
+        values |= {richer.value_key(p): imitating[p.name] for p in richer.free}
+        effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
+        rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
+        fitted = replace(best.fit, effects=effects, values=values, rig=rig)
+        found.append(Candidate(best.gain, richer, fitted))
+    return found
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
@@ -184,23 +202,16 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
             continue
         left = stage_gaps(case.outputs, other.fit.rig)
         closes = all(
-            left[stage] <= bar(first[stage], limits[stage])
-            for stage in shows_in(other.effect)
+            left[stage] <= explained_below(first[stage], limits[stage])
+            for stage in other.effect.shows_in
             if stage in left
         )
         doubtful = closes and best.effect.stage == "loader"
-        margin = max(SIMPLER, SIMPLER_SHARE * ranked[0].gain) if doubtful else RIVAL
+        share = SIMPLER_SHARE * ranked[0].gain
+        margin = max(SIMPLER_GAIN, share) if doubtful else RIVAL_GAIN
         if other.gain > ranked[0].gain - margin:
             best = other
     return best
-
-
-def bar(before: float, limit: float) -> float:
-    """Return the gap up to which a stage is explained, by its gap without any effect.
-
-    `limit` is the gap up to which noise may be all there is.
-    """
-    return max(limit, 1.0 + MISMATCH * (before - 1.0))
 
 
 def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
@@ -208,12 +219,14 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
     first = stage_gaps(case.outputs, settled.rig)
     now = case.gaps(current.rig) if current.effects else first
     limits = stage_limits(case.outputs)
-    guilty = {stage for stage, gap in now.items() if gap > bar(first[stage], limits[stage])}
+    guilty = {
+        stage for stage, gap in now.items() if gap > explained_below(first[stage], limits[stage])
+    }
     among = guilty or _strained(current)
     candidates = [
         effect
         for effect in library
-        if effect not in current.effects and among & set(shows_in(effect))
+        if effect not in current.effects and among & set(effect.shows_in)
     ]
     found = []
     screened = screen(case, current, candidates)
@@ -225,7 +238,7 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
             case.fit(chosen, "fitted", {**current.values, **start}, effect) for start in starts
         ]
         fitted = min(tries, key=lambda one: one.cost)
-        bound = any(key.startswith(effect.name) for key in fitted.at_bound)
+        bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
         if not bound and not _within_tolerance(effect, fitted):
             found.append((effect, fitted))
     ranked = ranked_by_gain(case.outputs, current, found)
@@ -234,8 +247,10 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
 
 def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
     """Tell whether a nominal number moved by no more than its setting can be trusted to."""
-    slack = TOLERANCE.get(effect.name)
-    return slack is not None and abs(fitted.values[f"{effect.name}.factor"] - 1.0) < slack
+    if effect.tolerance == 0.0:
+        return False
+    (number,) = effect.free
+    return number.size(fitted.values[effect.value_key(number)]) < effect.tolerance
 
 
 def _strained(current: Fit) -> set[str]:
@@ -244,7 +259,7 @@ def _strained(current: Fit) -> set[str]:
     It may then keep a stage within its limit that is off by more.
     """
     settings = SETTINGS.values()
-    return {one.stage for one in settings if f"{one.name}.factor" in current.at_bound}
+    return {one.stage for one in settings for p in one.free if one.value_key(p) in current.at_bound}
 
 
 def _surely_beyond(ranked: Sequence[Candidate]) -> bool:
@@ -252,12 +267,13 @@ def _surely_beyond(ranked: Sequence[Candidate]) -> bool:
 
     In a stage within its limit no other effect is claimed.
     """
-    if not ranked or ranked[0].effect.name not in SETTINGS:
+    if not ranked or ranked[0].effect.tolerance == 0.0:
         return False
-    best, key = ranked[0], f"{ranked[0].effect.name}.factor"
-    slack = TOLERANCE[best.effect.name]
+    best, slack = ranked[0], ranked[0].effect.tolerance
+    (number,) = best.effect.free
+    key = best.effect.value_key(number)
     beyond = best.fit.low[key] > 1.0 + slack or best.fit.high[key] < 1.0 - slack
-    return beyond and all(other.gain < best.gain - RIVAL for other in ranked[1:])
+    return beyond and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])
 
 
 def ranked_by_gain(
@@ -270,9 +286,9 @@ def ranked_by_gain(
     """
     if not found:
         return []
-    before = [float(np.mean(o.residual(current.rig, "held") ** 2)) + LITTLE for o in outputs]
+    before = [float(np.mean(o.residual(current.rig, "held") ** 2)) + NO_GAP_LEFT for o in outputs]
     lefts = [[o.residual(fitted.rig, "held") for o in outputs] for _, fitted in found]
-    squares = [[float(np.mean(left**2)) + LITTLE for left in each] for each in lefts]
+    squares = [[float(np.mean(left**2)) + NO_GAP_LEFT for left in each] for each in lefts]
     best = min(range(len(found)), key=lambda i: float(np.sum(np.log(squares[i]))))
     counts = [0.5 * len(left) / memory(left) for left in lefts[best]]
     ranked = []

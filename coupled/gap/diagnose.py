@@ -8,54 +8,51 @@ found close the gap, `ambiguous` where the record cannot tell the first of them 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.gap.air import can_tell_air, spread_of_air
 from coupled.gap.airframe import airframe_outputs, needs, trim_speed
 from coupled.gap.case import Case, Tell
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.choose import Choice, bar, search
-from coupled.gap.effects import EFFECTS, SETTINGS, STAGES, parameter_name
-from coupled.gap.output import CLEAR, Output, stage_gaps, stage_limits
+from coupled.gap.choose import Choice, Found, search
+from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import Effect, Parameter, field_of
+from coupled.gap.library import EFFECTS, SETTINGS
+from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.result import (
+    EffectResult,
+    ParameterEstimate,
+    SettingResult,
+    StageResult,
+    Verdict,
+)
 from coupled.gap.shrink import shrink
 from coupled.gap.stages import Reader, compensation_gap
 from coupled.gap.surfaces import surface_points
+from coupled.gap.thresholds import DOUBT, GUILTY_FROM, SURE
 from coupled.gap.where import remains, where
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-# What the search is sure of is right in so many of 100 blind trials; where structure is left, an
-# effect found may only imitate what is there.
-SURE, DOUBT = 0.97, 0.3
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """What was found: the JSON's content, the rig with the effects, and what it rests on."""
-
-    found: dict[str, Any]
-    improved: Rig
-    nominal: Rig
-    control: ControlName
-    outputs: tuple[Output, ...]
-    choice: Choice
+__all__ = ["Diagnosis", "diagnose"]
 
 
 def diagnose(
     rig: Rig,
     records: Mapping[str, Record],
-    control: ControlName,
+    control: ControlName = "column",
     tell: Tell | None = None,
 ) -> Diagnosis:
-    """Hold records of one rig, by their files' names, against it.
+    """Return the diagnosis of records of one rig, by their files' names.
 
-    Raises InputError where a record and the rig cannot be held against each other.
+    `tell` is called with what is being done, and how much of how much is done. Raises InputError
+    where a record cannot be of this rig, or lets no stage be judged.
     """
     for file, record in records.items():
         check_record(rig, record, control, file)
@@ -69,32 +66,30 @@ def diagnose(
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
         raise InputError(file, "", "lets no stage be judged; it lacks " + ", ".join(lacking))
-    airs = can_tell_air(list(records.values()))
-    library = [effect for effect in EFFECTS if airs or effect.name != "vertical_gust"]
+    library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()))]
 
     def refloored(other: Rig) -> Sequence[Output]:
         return _outputs([replace(reader, rig=other) for reader in readers])
 
     choice = search(rig, control, outputs, library, tell, refloored)
     case = Case(rig, control, outputs, tell, refloored)
-    after = case.gaps(choice.fit.rig)
-    stages = _stages(readers, outputs, after, choice)
-    _tell_where(stages, readers, outputs, choice)
-    found = {
-        "verdict": _verdict(choice, stages),
-        "stages": stages,
-        "effects": _effects(choice, control, _spread_of_air(readers, choice), stages),
-        "rivals": [
-            [s.effect.name, *(r.effect.name for r in s.rivals)] for s in choice.steps if s.rivals
-        ],
-        "shrink": shrink(case, choice),
-        "settings": {
-            setting.parameters[0].field: choice.fit.values[f"{setting.name}.factor"]
-            for setting in SETTINGS.values()
-            if f"{setting.name}.factor" in choice.fit.values
-        },
-    }
-    return Diagnosis(found, choice.fit.rig, rig, control, tuple(outputs), choice)
+    stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
+    return Diagnosis(
+        control=control,
+        verdict=_verdict(choice, stages),
+        stages=stages,
+        effects=_effects(choice, control, readers, stages),
+        rivals=tuple(
+            (s.effect.name, *(r.effect.name for r in s.rivals)) for s in choice.steps if s.rivals
+        ),
+        settings=_settings(choice, rig, control),
+        shrink=shrink(case, choice),
+        nominal=rig,
+        improved=choice.fit.rig,
+        records=dict(records),
+        outputs=tuple(outputs),
+        choice=choice,
+    )
 
 
 def _outputs(readers: Sequence[Reader]) -> list[Output]:
@@ -105,133 +100,170 @@ def _outputs(readers: Sequence[Reader]) -> list[Output]:
     return found
 
 
-def _lacking(readers: Sequence[Reader]) -> dict[str, list[str]]:
-    """Return the channels that each stage lacks in every record."""
-    each = [reader.missing() for reader in readers]
-    shared = {stage: names for stage, names in each[0].items() if all(stage in m for m in each)}
-    shared.pop("multiplier", None)
-    if readers[0].rig.flight is None:
-        shared.pop("surface", None)
-    return shared
-
-
-def _stages(
-    readers: Sequence[Reader],
-    outputs: Sequence[Output],
-    last: Mapping[str, float],
-    choice: Choice,
-) -> dict[str, Any]:
-    lacking = _lacking(readers)
-    before = _joined(stage_gaps(outputs, readers[0].rig))
-    settled = _joined(stage_gaps(outputs, choice.settled.rig))
-    after, limits = _joined(last), _joined(stage_limits(outputs))
-    blamed = {step.effect.stage for step in choice.steps}
-    found: dict[str, Any] = {}
-    for stage in STAGES:
-        if stage in before and stage not in lacking:
-            guilty = stage in blamed or after[stage] > bar(settled[stage], limits[stage])
-            found[stage] = {"gap": before[stage], "settled": settled[stage]}
-            found[stage] |= {"limit": limits[stage]}
-            found[stage] |= {"left": after[stage], "guilty": guilty}
-        elif stage in lacking:
-            found[stage] = {"judged": False, "missing": lacking[stage]}
-        elif stage == "schedule":
-            found[stage] = {"judged": False, "missing": [], "why": "constant gradient"}
-        elif stage == "surface" and readers[0].rig.flight is not None:
-            why = "the aircraft moves it, too"
-            found[stage] = {"judged": False, "missing": [], "why": why}
-    scale = [before[stage] for stage in ("loader", "linkage") if stage in before]
-    if scale:
-        found["sensing"] = {"gap": max(scale) if "sensing" in blamed else 1.0}
-        found["sensing"]["guilty"] = "sensing" in blamed
-    if "compensation" not in lacking:
-        gap = max(compensation_gap(r) for r in readers if "compensation" not in r.missing())
-        found["compensation"] = {"gap": gap, "guilty": gap > CLEAR}
-    if readers[0].rig.flight is not None and "airframe" not in before:
-        missing = [name for name in needs(readers[0].rig) if name not in readers[0].record]
-        found["airframe"] = {"judged": False, "missing": missing}
-    return found
-
-
-def _tell_where(
-    stages: dict[str, Any], readers: Sequence[Reader], outputs: Sequence[Output], choice: Choice
-) -> None:
-    """Add to each guilty stage where in it the gap lies, by the output where it is widest."""
-    shown = {"sensing": ("loader", "linkage", "multiplier"), "loader": ("loader", "multiplier")}
-    for stage, found in stages.items():
-        ours = [o for o in outputs if o.stage in shown.get(stage, (stage,))]
-        if found.get("guilty") and ours:
-            # Without what its settings explain, unless at the end of their tolerance they hide it.
-            hidden = found.get("settled", np.inf) <= found.get("limit", 0.0)
-            rig = readers[0].rig if hidden else choice.settled.rig
-            widest = max(ours, key=lambda o: o.gap(rig))
-            reader = readers[widest.record]
-            found["where"] = where(widest, rig, reader.record, reader.control)
-            if _left(found):
-                most = max(ours, key=lambda o: o.gap(choice.fit.rig))
-                told = readers[most.record].record
-                found["remains"] = remains(most, choice.fit.rig, told, reader.control)
-
-
-def _joined(gaps: Mapping[str, float]) -> dict[str, float]:
-    """Return gaps by the contract's stages: F_mod is the loader's, though judged apart."""
+def _by_stage(gaps: Mapping[str, float]) -> dict[str, float]:
+    """Return the gaps of outputs by the stages that they judge, the widest of each."""
     joined: dict[str, float] = {}
-    for stage, gap in gaps.items():
-        name = "loader" if stage == "multiplier" else stage
+    for output, gap in gaps.items():
+        name = stage_of(output)
         joined[name] = max(joined.get(name, 0.0), gap)
     return joined
 
 
-def _left(found: Mapping[str, Any]) -> bool:
-    """Tell whether a stage still holds structure that the effects found do not explain."""
-    return "left" in found and found["left"] > bar(found["settled"], found["limit"])
+@dataclass(frozen=True)
+class _Judge:
+    """Judges the stages by their outputs. `last` are the outputs' gaps with the effects found."""
+
+    readers: Sequence[Reader]
+    outputs: Sequence[Output]
+    choice: Choice
+    last: Mapping[str, float]
+
+    @property
+    def rig(self) -> Rig:
+        """The nominal rig."""
+        return self.readers[0].rig
+
+    @property
+    def blamed(self) -> set[str]:
+        """The stages of the effects found."""
+        return {step.effect.stage for step in self.choice.steps}
+
+    def stages(self) -> tuple[StageResult, ...]:
+        """Return the stages that the records have, in the order of the chain."""
+        before = _by_stage(stage_gaps(self.outputs, self.rig))
+        settled = _by_stage(stage_gaps(self.outputs, self.choice.settled.rig))
+        left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
+        lacking = self._lacking()
+        found = []
+        for stage in CHAIN:
+            name = stage.name
+            result: StageResult | None
+            if name in before and name not in lacking:
+                wide = left[name] > explained_below(settled[name], limits[name])
+                guilty = name in self.blamed or wide
+                numbers = (before[name], settled[name], limits[name], left[name])
+                result = self._with_where(StageResult(name, *numbers, guilty=guilty))
+            elif name == "sensing":
+                result = self._with_where(self._sensing(before))
+            elif name in lacking:
+                result = StageResult(name, missing=lacking[name])
+            else:
+                result = self._without_output(name)
+            found += [result] if result is not None else []
+        return tuple(found)
+
+    def _lacking(self) -> dict[str, tuple[str, ...]]:
+        """Return the channels that each stage lacks in every record."""
+        each = [reader.missing() for reader in self.readers]
+        shared = {s: tuple(n) for s, n in each[0].items() if all(s in m for m in each)}
+        shared.pop("multiplier", None)
+        if self.rig.flight is None:
+            shared.pop("surface", None)
+        return shared
+
+    def _sensing(self, before: Mapping[str, float]) -> StageResult:
+        """Return sensing: guilty where its effect was found, else not judged by itself.
+
+        A wrong scale has no residual of its own: it shows in those of its neighbours at once,
+        and the widest of them is its gap.
+        """
+        shown = dict.fromkeys(stage_of(o) for o in STAGE_OF["sensing"].effects_show_in)
+        neighbours = tuple(name for name in shown if name in before)
+        if "sensing" in self.blamed:
+            widest = max(before[name] for name in neighbours)
+            return StageResult("sensing", widest, guilty=True, shown_in=neighbours)
+        why = f"shows in {' and '.join(neighbours or shown)}"
+        return StageResult("sensing", why=why, shown_in=tuple(shown))
+
+    def _without_output(self, name: str) -> StageResult | None:
+        """Return a stage that no output judges, None where the rig has none of it."""
+        flown = self.rig.flight is not None
+        if name == "schedule":
+            return StageResult(name, why="constant gradient")
+        if name == "compensation":
+            able = [r for r in self.readers if "compensation" not in r.missing()]
+            gap = max(compensation_gap(reader) for reader in able)
+            return StageResult(name, gap, limit=GUILTY_FROM, guilty=gap > GUILTY_FROM)
+        if name == "surface" and flown:
+            return StageResult(name, why="the aircraft moves it, too")
+        if name == "airframe" and flown:
+            lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
+            return StageResult(name, missing=tuple(lacking))
+        return None
+
+    def _with_where(self, found: StageResult) -> StageResult:
+        """Return a stage with where in it the gap lies, by the output where it is widest."""
+        stage = STAGE_OF[found.name]
+        shown = stage.outputs or stage.effects_show_in
+        ours = [output for output in self.outputs if output.stage in shown]
+        if not found.guilty or not ours:
+            return found
+        # Without what its settings explain, unless at the end of their tolerance they hide it.
+        hidden = found.settled is not None and found.settled <= (found.limit or 0.0)
+        rig = self.rig if hidden else self.choice.settled.rig
+        widest = max(ours, key=lambda o: o.gap(rig))
+        reader = self.readers[widest.record]
+        found = replace(found, where=where(widest, rig, reader.record, reader.control))
+        if not found.unexplained:
+            return found
+        improved = self.choice.fit.rig
+        most = max(ours, key=lambda o: o.gap(improved))
+        record = self.readers[most.record].record
+        return replace(found, remains=remains(most, improved, record, reader.control))
 
 
-def _verdict(choice: Choice, stages: dict[str, Any]) -> str:
+def _verdict(choice: Choice, stages: Sequence[StageResult]) -> Verdict:
     blamed = {step.effect.stage for step in choice.steps}
-    left = [
-        stage
-        for stage, found in stages.items()
-        if found.get("guilty") and (stage not in blamed or _left(found))
-    ]
-    if left:
+    if any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages):
         return "unexplained"
     if not choice.steps:
         return "no_gap"
     return "ambiguous" if any(step.rivals for step in choice.steps) else "effect"
 
 
-def _spread_of_air(readers: Sequence[Reader], choice: Choice) -> float:
-    """Return the relative standard error of the rms of the gusts, where they were found."""
-    if all(effect.name != "vertical_gust" for effect in choice.fit.effects):
-        return 0.0
-    each = [spread_of_air(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
-    return float(np.sqrt(np.sum(np.square(each)))) / len(each)
+def _settings(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
+    found = []
+    for setting in SETTINGS.values():
+        for p in setting.free:
+            factor = choice.fit.values.get(setting.value_key(p))
+            if factor is not None:
+                name = field_of(rig, control, p.key)
+                found.append(SettingResult(name, setting.stage, factor))
+    return tuple(found)
 
 
 def _effects(
-    choice: Choice, control: ControlName, air: float, stages: Mapping[str, Any]
-) -> list[dict[str, Any]]:
-    found = []
-    for step in sorted(choice.steps, key=lambda s: -s.gain):
-        effect, values = step.effect, {}
-        for p in effect.free:
-            key = f"{effect.name}.{p.name}"
-            value, low, high = choice.fit.values[key], choice.fit.low[key], choice.fit.high[key]
-            if effect.name == "vertical_gust":  # a record meets a sample of the gusts
-                low = value - math.hypot(value - low, 1.96 * air * value)
-                high = value + math.hypot(high - value, 1.96 * air * value)
-            values[parameter_name(p, control)] = {
-                "value": value,
-                "low": low if math.isfinite(low) else None,
-                "high": high if math.isfinite(high) else None,
-            }
-        found.append(
-            {
-                "name": effect.name,
-                "stage": effect.stage,
-                "probability": step.probability * (DOUBT if _left(stages[effect.stage]) else SURE),
-                "parameters": values,
-            }
-        )
-    return found
+    choice: Choice, control: ControlName, readers: Sequence[Reader], stages: Sequence[StageResult]
+) -> tuple[EffectResult, ...]:
+    """Return the effects found, the largest first."""
+    left = {stage.name for stage in stages if stage.unexplained}
+
+    def result(step: Found) -> EffectResult:
+        effect = step.effect
+        sure = DOUBT if effect.stage in left else SURE
+        scatter = _sample_error(effect, readers)
+        numbers = tuple(_estimate(choice, effect, p, control, scatter) for p in effect.free)
+        return EffectResult(effect.name, effect.stage, step.probability * sure, numbers)
+
+    return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
+
+
+def _estimate(
+    choice: Choice, effect: Effect, p: Parameter, control: ControlName, scatter: float
+) -> ParameterEstimate:
+    key, fit = effect.value_key(p), choice.fit
+    value, low, high = fit.values[key], fit.low[key], fit.high[key]
+    if scatter > 0.0:  # the records meet a sample of it
+        low = value - math.hypot(value - low, 1.96 * scatter * value)
+        high = value + math.hypot(high - value, 1.96 * scatter * value)
+    ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
+    return ParameterEstimate(p.named(control), value, *ends)
+
+
+def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
+    """Return the relative standard error of an effect's number from what the records meet of it."""
+    one: Callable[[Record, float], float] | None = effect.sample_error
+    if one is None:
+        return 0.0
+    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    return float(np.sqrt(np.sum(np.square(each)))) / len(each)

@@ -16,25 +16,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from coupled.gap.effects import Effect, Parameter, apply
+from coupled.gap.effect import Effect, Parameter, possible
 from coupled.gap.output import Output, Part, memory
+from coupled.gap.thresholds import DIFFERENCE, DIFFERENCE_STEPS, FIT_ITERATIONS, MODEL_ERROR
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-CHANGE = 0.3  # floors by which a difference should move the residual
-MODEL = 0.015  # of an effect's size: what the physics of a right effect is known to be off by
-TRIES = 40  # iterations of a fit
-# The outputs in which an effect of a stage shows.
-TOUCHES = {
-    "schedule": ("schedule",),
-    "loader": ("loader",),
-    "multiplier": ("loader", "multiplier"),
-    "sensing": ("loader", "multiplier", "linkage"),
-    "linkage": ("linkage",),
-    "surface": ("surface",),
-    "airframe": ("airframe",),
-}
+_FAR = 1e6  # floors: the residual of a rig that the physics cannot give
 
 
 @dataclass(frozen=True)
@@ -50,14 +39,9 @@ class Fit:
     cost: float  # half the sum of squares, in floors
 
 
-def shows_in(effect: Effect) -> tuple[str, ...]:
-    """Return the outputs' stages in which an effect shows."""
-    return TOUCHES["multiplier" if effect.name == "digital_multiplier" else effect.stage]
-
-
 def touched(outputs: Sequence[Output], effects: Sequence[Effect]) -> list[Output]:
     """Return the outputs that these effects act on."""
-    stages = {stage for effect in effects for stage in shows_in(effect)}
+    stages = {stage for effect in effects for stage in effect.shows_in}
     return [output for output in outputs if output.stage in stages]
 
 
@@ -75,8 +59,9 @@ def fit(
 
     Starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. `nuisances` are settings, free within their tolerance: fitted, but nothing found.
-    Effects that share no output are fitted apart, so that neither's misfit leads the other
-    astray; with `only`, just those that share one with it, and the others stay at `start`.
+    Effects that share no output are fitted each on its own, so that neither's misfit misleads
+    the other; with `only`, just those that share one with it, and the others stay at `start`. A
+    set that the physics cannot give stands at its bounds.
     """
     every = [*effects, *nuisances]
     values: dict[str, float] = {}
@@ -92,7 +77,9 @@ def fit(
             continue
         keys, frees = _free(group)
         values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
-    rig = apply(nominal, control, every, values)
+    rig = possible(nominal, control, every, values)
+    if rig is None:
+        rig, bound = nominal, tuple(values)
     return Fit(tuple(effects), values, low, high, bound, rig, cost)
 
 
@@ -100,14 +87,14 @@ def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
     """Return the effects in groups that share no output."""
     groups: list[tuple[set[str], list[Effect]]] = []
     for effect in effects:
-        stages, members = set(shows_in(effect)), [effect]
-        apart = []
+        stages, members = set(effect.shows_in), [effect]
+        separate = []
         for others, theirs in groups:
             if others & stages:
                 stages, members = stages | others, theirs + members
             else:
-                apart.append((others, theirs))
-        groups = [*apart, (stages, members)]
+                separate.append((others, theirs))
+        groups = [*separate, (stages, members)]
     return [members for _, members in groups]
 
 
@@ -131,10 +118,14 @@ def _fit(
     start: Mapping[str, float],
 ) -> _Group:
     keys, frees = _free(effects)
+    scale = np.array([max(abs(s) for s in p.starts) or 1.0 for p in frees])
+    frames = sum(int(output.rows(part).sum()) for output in ours)
 
     def residual(scaled: Floats) -> Floats:
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
-        rig = apply(nominal, control, effects, values)
+        rig = possible(nominal, control, effects, values)
+        if rig is None:
+            return np.full(frames, _FAR)
         return np.concatenate([output.residual(rig, part) for output in ours])
 
     if not ours:
@@ -142,7 +133,6 @@ def _fit(
     if not keys:
         left = residual(np.array([]))
         return _Group({}, {}, {}, (), 0.5 * float(left @ left))
-    scale = np.array([max(abs(s) for s in p.starts) or 1.0 for p in frees])
     low = np.array([p.low for p in frees]) / scale
     high = np.array([p.high for p in frees]) / scale
     best = None
@@ -150,7 +140,7 @@ def _fit(
         x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
         slopes = _Slopes(residual, low, high)
         found = least_squares(
-            residual, x0, slopes, bounds=(low, high), xtol=1e-5, ftol=1e-6, max_nfev=TRIES
+            residual, x0, slopes, bounds=(low, high), xtol=1e-5, ftol=1e-6, max_nfev=FIT_ITERATIONS
         )
         if best is None or found.cost < best.cost:
             best = found
@@ -158,7 +148,7 @@ def _fit(
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     half = _half_width(best, len(ours), np.concatenate(number)) * scale
     values = best.x * scale
-    half = np.hypot(half, [MODEL * _size(p, v) for p, v in zip(frees, values, strict=True)])
+    half = np.hypot(half, [MODEL_ERROR * p.size(v) for p, v in zip(frees, values, strict=True)])
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
@@ -193,18 +183,13 @@ class _Slopes:
             change = self._residual(there) - here
             columns.append(change / (there[i] - value))
             size = float(np.sqrt(np.mean(change**2)))
-            growth = np.clip(CHANGE / max(size, 1e-9), 0.1, 10.0)
-            self._step[i] = float(np.clip(step * growth, 1e-4, 0.1))
+            growth = np.clip(DIFFERENCE / max(size, 1e-9), 0.1, 10.0)
+            self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
         return np.column_stack(columns)
 
 
-def _size(p: Parameter, value: float) -> float:
-    """Return how far a parameter is from where it does nothing."""
-    return abs(value - 1.0) if p.mode == "factor" else abs(value)
-
-
 def _half_width(found: Any, outputs: int, groups: NDArray[np.intp]) -> Floats:
-    """Return half of each scaled parameter's 95 % interval; infinite where nothing tells it.
+    """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
 
     The larger of two: white residuals widened by their memory, and the scatter of the score from
     stretch to stretch (the sandwich), which counts misfit wherever it sits.
@@ -217,16 +202,16 @@ def _half_width(found: Any, outputs: int, groups: NDArray[np.intp]) -> Floats:
     names, number = np.unique(groups, return_inverse=True)
     scores = np.zeros((len(names), jacobian.shape[1]))
     np.add.at(scores, number, jacobian * left[:, None])
-    spare = max(1, len(names) - jacobian.shape[1])
-    filled = bread @ (scores.T @ scores) @ bread * (len(names) / spare)
+    freedom = max(1, len(names) - jacobian.shape[1])
+    filled = bread @ (scores.T @ scores) @ bread * (len(names) / freedom)
     variance = np.maximum(np.maximum(plain, np.diag(filled)), 0.0)
-    half = student.ppf(0.975, spare) * np.sqrt(variance)
+    half = student.ppf(0.975, freedom) * np.sqrt(variance)
     half[np.linalg.norm(jacobian, axis=0) < 1e-9] = np.inf
     return np.asarray(half)
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:
-    pairs = [(f"{e.name}.{p.name}", p) for e in effects for p in e.free]
+    pairs = [(e.value_key(p), p) for e in effects for p in e.free]
     return [key for key, _ in pairs], [p for _, p in pairs]
 
 

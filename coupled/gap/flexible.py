@@ -16,13 +16,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from coupled.gap.output import Output
+from coupled.gap.thresholds import BENDS, FLAT, RIDGES, LAGS_s
 
 Floats = NDArray[np.float64]
 Response = tuple[Floats, Floats]
-BENDS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)  # quantiles where a function may bend
-LAGS_s = (0.03, 0.1, 0.3, 1.0)
-RIDGES = tuple(10.0**k for k in range(-7, 3))
-FLAT = 1e-3  # share of its whole spread under which a function is not told by a part
 ALL = "all"
 
 
@@ -74,10 +71,10 @@ def _taken(output: Output, left: Floats, columns: Floats) -> float:
 def _ridges(known: Floats, wanted: Floats, asked: Floats) -> Floats:
     """Return the ridge regressions' predictions, shape (frames, RIDGES)."""
     spread = known.std(axis=0)
-    told = spread > FLAT * np.vstack((known, asked)).std(axis=0)
-    mean, spread = known[:, told].mean(axis=0), spread[told]
+    varies = spread > FLAT * np.vstack((known, asked)).std(axis=0)
+    mean, spread = known[:, varies].mean(axis=0), spread[varies]
     level = float(wanted.mean())
-    left, sizes, right = np.linalg.svd((known[:, told] - mean) / spread, full_matrices=False)
+    left, sizes, right = np.linalg.svd((known[:, varies] - mean) / spread, full_matrices=False)
     passed = sizes[:, None] / (sizes[:, None] ** 2 + np.array(RIDGES) * len(wanted))
     weights = right.T @ (passed * (left.T @ (wanted - level))[:, None])
-    return np.asarray(level + (asked[:, told] - mean) / spread @ weights)
+    return np.asarray(level + (asked[:, varies] - mean) / spread @ weights)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from coupled.flight.pilot.base import Start
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
+from coupled.gap.thresholds import TOLD_EVERY
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -24,7 +26,27 @@ Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
 MOTION = ("pitch_rate_rad_per_s", "load_factor", "pitch_rad")
 LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")
-TOLD_EVERY = 12  # frames between the points at which a bench is told q̄
+
+
+@dataclass(frozen=True)
+class ChannelAgain:
+    """How far two flights with the record's pilot stay from it, rms in the channel's unit.
+
+    `before` with the rig as filed, `after` with the improved one; the seconds compared where one
+    of the flights ended early.
+    """
+
+    channel: str
+    before: float
+    after: float
+    before_s: float | None = None
+    after_s: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        known = {"before_s": self.before_s, "after_s": self.after_s}
+        found = {"before": self.before, "after": self.after}
+        return found | {name: value for name, value in known.items() if value is not None}
 
 
 class Recorded(Pilot):
@@ -60,8 +82,8 @@ def fly_force(
     bench = None
     if rig.flight is None:
         assert pressure_Pa is not None
-        told = slice(None, None, TOLD_EVERY)
-        bench = PressureProfile(time_s=times[told], dynamic_pressure_Pa=pressure_Pa[told])
+        points = slice(None, None, TOLD_EVERY)
+        bench = PressureProfile(time_s=times[points], dynamic_pressure_Pa=pressure_Pa[points])
     again = Manoeuvre(
         rig, pilots, frames / rig.frame_rate, seed=seed, bench=bench, name="flown-again"
     )
@@ -71,10 +93,10 @@ def fly_force(
 
 def closed_loop(
     nominal: Rig, improved: Rig, control: ControlName, record: Record
-) -> dict[str, Any] | None:
+) -> tuple[ChannelAgain, ...] | None:
     """Return how far the flights of both rigs, with the record's pilot, stay from the record.
 
-    rms differences by channel, in its unit: {channel: {"before", "after"}}. None where the
+    None where the
     record lacks the force, or a bench's q̄, or where the rig cannot be flown so.
     """
     pressure = "dynamic_pressure_Pa"
@@ -87,32 +109,38 @@ def closed_loop(
     motion = [surface, *MOTION, *(() if control == "column" else LATERAL)]
     motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in record]
-    told = smoothed(record[pressure]) if pressure in record else None
-    left: dict[str, dict[str, float]] = {name: {} for name in names}
-    for when, rig in (("before", nominal), ("after", improved)):
-        gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
-        told_air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
-        air = None if told_air is None else told_air.speed
-        quiet = rig.model_copy(update={"noise": {}})
-        try:
-            flown = fly_force(quiet, pulled, told, air)
-        except InputError:
-            return None
-        rows = min(len(flown), len(record))
-        for name in names:
-            difference = flown[name][:rows] - record[name][:rows]
-            left[name][when] = float(np.sqrt(np.mean(difference**2)))
-        left_seconds = rows / rig.frame_rate
-        for name in names:
-            left[name][f"{when}_s"] = left_seconds
-    return _worth(left)
+    q = smoothed(record[pressure]) if pressure in record else None
+    before = _differences(nominal, pulled, q, record, names)
+    after = _differences(improved, pulled, q, record, names)
+    if before is None or after is None:
+        return None
+    seconds = (before.seconds, after.seconds) if before.seconds != after.seconds else (None, None)
+    return tuple(ChannelAgain(name, before.rms[name], after.rms[name], *seconds) for name in names)
 
 
-def _worth(left: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-    """Return the differences; the time flown only where it is not the same for both."""
-    found: dict[str, Any] = {}
-    for name, item in left.items():
-        found[name] = {"before": item["before"], "after": item["after"]}
-        if item["before_s"] != item["after_s"]:
-            found[name] |= {"before_s": item["before_s"], "after_s": item["after_s"]}
-    return found
+@dataclass(frozen=True)
+class _Differences:
+    """rms differences of a flight from a record by channel, and how long both last."""
+
+    rms: Mapping[str, float]
+    seconds: float
+
+
+def _differences(
+    rig: Rig,
+    pulled: Mapping[ControlName, Floats],
+    pressure_Pa: Floats | None,
+    record: Record,
+    names: Sequence[str],
+) -> _Differences | None:
+    """Return how far a rig's flight stays from a record; None where it cannot be flown so."""
+    gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
+    air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
+    quiet = rig.changed({"noise": {}})
+    try:
+        flown = fly_force(quiet, pulled, pressure_Pa, None if air is None else air.speed)
+    except InputError:
+        return None
+    rows = min(len(flown), len(record))
+    rms = {n: float(np.sqrt(np.mean((flown[n][:rows] - record[n][:rows]) ** 2))) for n in names}
+    return _Differences(rms, rows / rig.frame_rate)

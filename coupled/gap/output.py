@@ -9,18 +9,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.thresholds import (
+    ECHO_FRAMES,
+    GUILTY_FROM,
+    MISMATCH,
+    NOISE_SIGMAS,
+    ROUNDED,
+    SMOOTHING_LOST,
+    STRETCH_POWER,
+    UNCORRELATED,
+    SHORTEST_STRETCH_s,
+    STRETCH_s,
+)
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
-STRETCH_s = 2.5  # a stretch of the record, fitted or held out
-SHORTEST_s = 0.25  # and the shortest to which one is cut that holds much of what is left
-MUCH = 0.125  # share of the residual's power above which a stretch is cut
-CLEAR = 1.2  # residual over floor from which a stage is guilty: nominal tolerances stay below
-SIGMAS = 3.0  # and by how many standard deviations of what noise alone leaves
-LOST = 0.15  # by how much a smoother's error may exceed what is known of it, at kinks of a signal
-ECHO = 12  # frames over which noise may echo
 _KEPT = 4  # predictions remembered
 
 
@@ -75,9 +80,9 @@ class Output:
         stretch that holds much of the residual's power is cut where it has had its share.
         """
         frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
-        least = max(1, round(SHORTEST_s * self.frame_rate_Hz))
+        least = max(1, round(SHORTEST_STRETCH_s * self.frame_rate_Hz))
         power = np.concatenate(([0.0], np.cumsum(self.residual(rig) ** 2)))
-        most = max(MUCH, 2.0 * frames / len(self.measured)) * float(power[-1])
+        most = max(STRETCH_POWER, 2.0 * frames / len(self.measured)) * float(power[-1])
         held = np.zeros(len(self.measured), dtype=bool)
         start, odd = 0, False
         while start < len(held):
@@ -90,7 +95,7 @@ class Output:
     @property
     def limit(self) -> float:
         """The gap up to which noise may be all there is."""
-        return max(CLEAR, 1.0 + SIGMAS * self.spread + LOST * self.smoothed)
+        return max(GUILTY_FROM, 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
@@ -98,7 +103,7 @@ class Output:
 
 
 def white(signal: Floats) -> float:
-    """Return the white noise in a smooth signal, by its fourth differences (gain √70).
+    """Return the rms of the white noise in a smooth signal, by its fourth differences (gain √70).
 
     No less than its rounding, which is not white where the signal is slow.
     """
@@ -114,7 +119,7 @@ def rounding(signal: Floats, noise: float) -> float:
     """
     steps = np.diff(np.unique(signal))
     error = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
-    return error if error < 3.0 * noise else 0.0
+    return error if error < ROUNDED * noise else 0.0
 
 
 def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
@@ -123,8 +128,8 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
     The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal as it should
     be, with the noise of its source: where that comes late or filtered, it echoes over frames.
     """
-    noise, source = np.diff(signal, 4)[ECHO:], np.diff(made, 4)
-    echo = np.column_stack([source[ECHO - k : len(source) - k] for k in range(ECHO)])
+    noise, source = np.diff(signal, 4)[ECHO_FRAMES:], np.diff(made, 4)
+    echo = np.column_stack([source[ECHO_FRAMES - k : len(source) - k] for k in range(ECHO_FRAMES)])
     left = noise - echo @ np.linalg.lstsq(echo, noise, rcond=None)[0]
     power = float(noise @ noise)
     share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
@@ -153,16 +158,24 @@ def memory(residual: Floats) -> float:
     if correlation[0] <= 0.0:
         return 1.0
     correlation /= correlation[0]
-    negative = np.flatnonzero(correlation < 0.05)
+    negative = np.flatnonzero(correlation < UNCORRELATED)
     end = int(negative[0]) if negative.size else len(correlation)
     return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
+
+
+def explained_below(before: float, limit: float) -> float:
+    """Return the gap up to which a stage is explained, by its gap without any effect.
+
+    `limit` is the gap up to which noise may be all there is.
+    """
+    return max(limit, 1.0 + MISMATCH * (before - 1.0))
 
 
 def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
     """Return the gap of each stage up to which noise may be all there is."""
     found: dict[str, float] = {}
     for output in outputs:
-        found[output.stage] = max(found.get(output.stage, CLEAR), output.limit)
+        found[output.stage] = max(found.get(output.stage, GUILTY_FROM), output.limit)
     return found
 
 

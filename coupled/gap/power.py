@@ -1,7 +1,7 @@
 """Power: how large each effect would have had to be for this record to show it.
 
 An effect shows where its signature, made orthogonal to those of the settings that may stand off
-by their tolerance, lifts a stage from its floor over the bar of guilt. The least such size is
+by their tolerance, lifts a stage from its floor over its limit. The least such size is
 found by bisection. A setting that is off by less than its tolerance is no effect, however well
 the record shows it.
 """
@@ -10,30 +10,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects import (
-    EFFECTS,
-    SETTINGS,
-    TOLERANCE,
-    Effect,
-    Parameter,
-    apply,
-    parameter_name,
-)
+from coupled.gap.effect import Effect, Parameter, apply, possible, value_of
 from coupled.gap.fit import touched
+from coupled.gap.library import EFFECTS, SETTINGS
 from coupled.gap.output import Output
+from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-DECADE, DECADES = 10.0, 3  # sizes are sought over three decades to either side of a fit's start
-STEPS = 5  # halvings of the decade where it begins to show: to 7 %
-HELD = ("stribeck_{d}_per_s",)
-INVERSE = ("rate_{d}_per_s", "rate_norm_per_s", "limit_{d}")  # the smaller, the more it does
+DECADE = 10.0
+
+
+@dataclass(frozen=True)
+class EffectPower:
+    """The least size of an effect that the records would have shown.
+
+    `judged`: whether they judge its stage; `shows`: whether any size that it may have would show.
+    """
+
+    name: str
+    stage: str
+    judged: bool = True
+    shows: bool = False
+    parameters: tuple[tuple[str, float], ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        found: dict[str, Any] = {"name": self.name, "stage": self.stage}
+        if not self.judged:
+            return found | {"judged": False}
+        found["shows"] = self.shows
+        return found | ({"parameters": dict(self.parameters)} if self.shows else {})
 
 
 def power(
@@ -41,31 +55,23 @@ def power(
     control: ControlName,
     outputs: Sequence[Output],
     library: Sequence[Effect] = EFFECTS,
-) -> list[dict[str, Any]]:
-    """Return for each effect the least size that the record would have shown.
+) -> tuple[EffectPower, ...]:
+    """Return for each effect the least size that the record would have shown."""
+    return tuple(_power(nominal, control, touched(outputs, [one]), one) for one in library)
 
-    `shows` is False where no size within the effect's bounds would, `parameters` the sizes.
-    """
-    found = []
-    for effect in library:
-        ours = touched(outputs, [effect])
-        if not ours:
-            found.append({"name": effect.name, "stage": effect.stage, "judged": False})
-            continue
-        values = _least(nominal, control, ours, effect)
-        item: dict[str, Any] = {
-            "name": effect.name,
-            "stage": effect.stage,
-            "shows": values is not None,
-        }
-        if values is not None:
-            item["parameters"] = {
-                parameter_name(p, control): values[f"{effect.name}.{p.name}"]
-                for p in effect.free
-                if p.name not in HELD
-            }
-        found.append(item)
-    return found
+
+def _power(
+    nominal: Rig, control: ControlName, ours: Sequence[Output], effect: Effect
+) -> EffectPower:
+    if not ours:
+        return EffectPower(effect.name, effect.stage, judged=False)
+    values = _least(nominal, control, ours, effect)
+    if values is None:
+        return EffectPower(effect.name, effect.stage)
+    sizes = tuple(
+        (p.named(control), values[effect.value_key(p)]) for p in effect.free if not p.shape
+    )
+    return EffectPower(effect.name, effect.stage, shows=True, parameters=sizes)
 
 
 def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> dict[str, float]:
@@ -73,36 +79,36 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
     values = {}
     for p in effect.free:
         start = p.starts[0]
-        if p.name in HELD:
+        if p.shape:
             value = start
         elif p.mode == "factor":
             off = size * (start - 1.0)
-            slack = TOLERANCE.get(effect.name, 0.0)
-            value = 1.0 + math.copysign(max(abs(off), slack), off)
-        elif p.name in INVERSE:
+            value = 1.0 + math.copysign(max(abs(off), effect.tolerance), off)
+        elif p.inverse:
             value = start / size
         else:
             value = _base(p, nominal, control) + size * start
-        values[f"{effect.name}.{p.name}"] = float(np.clip(value, p.low, p.high))
+        values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
     return values
 
 
 def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
     """Return what a value that replaces the nominal one starts from."""
-    if p.mode != "value" or p.section == "flight":
+    if p.mode != "value":
         return 0.0
-    section = getattr(nominal.controls[control], p.section)
-    return float(getattr(section, p.above or p.field))
+    return float(value_of(nominal, control, p.above or p.key))
 
 
 def _signature(
     nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect, size: float
 ) -> float:
-    """Return the largest rms signature of an effect in an output, settings profiled.
+    """Return the largest rms signature of an effect in an output, settings profiled; 0 if none.
 
     Of what would lift a residual of noise alone to the gap from which its stage is guilty.
     """
-    rig = apply(nominal, control, [effect], _values(effect, size, nominal, control))
+    rig = possible(nominal, control, [effect], _values(effect, size, nominal, control))
+    if rig is None:
+        return 0.0
     largest = 0.0
     for output in outputs:
         change = output.residual(rig) - output.residual(nominal)
@@ -119,7 +125,8 @@ def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect
     columns = []
     for name, setting in SETTINGS.items():
         if setting.stage == output.stage and name != effect.name:
-            rig = apply(nominal, control, [setting], {f"{setting.name}.factor": 1.01})
+            values = {setting.value_key(p): SETTING_NUDGE for p in setting.free}
+            rig = apply(nominal, control, [setting], values)
             columns.append(output.residual(rig) - output.residual(nominal))
     return np.column_stack(columns) if columns else np.empty((0, 0))
 
@@ -137,14 +144,14 @@ def _least(
     high = 1.0
     while not shows(high):
         high *= DECADE
-        if high > DECADE**DECADES:
+        if high > DECADE**POWER_DECADES:
             return None
     low = high / DECADE
     while shows(low):
         low, high = low / DECADE, low
-        if low < DECADE**-DECADES:
+        if low < DECADE**-POWER_DECADES:
             break
-    for _ in range(STEPS):
+    for _ in range(POWER_HALVINGS):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if shows(middle) else (middle, high)
     return _values(effect, high, nominal, control)

@@ -12,14 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from coupled.gap.case import Case
-from coupled.gap.effects import Effect, apply
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, touched
+from coupled.gap.thresholds import SCREEN_FACTORS, SCREEN_SHOWN, SCREEN_SIZES, SCREENED
 from coupled.rig.rig import Rig
-
-SCREENED = 6
-SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts
-SHOWN = 1e-4  # mean square of a signature, floors², from which a size does something
-FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
 
 
 def screen(
@@ -39,12 +36,14 @@ def screen(
             least, start = np.inf, {}
             for values in _sizes(case, effect, shape):
                 rig = _with(case, current, effect, values)
+                if rig is None:
+                    continue
                 left = np.concatenate([output.residual(rig) for output in ours])
                 sign = now - left
                 size = float(sign @ sign)
                 best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
                 # A limit that is never met leaves the residual as it is, and a fit where it was.
-                if size > SHOWN * len(now) and float(left @ left) < least:
+                if size > SCREEN_SHOWN * len(now) and float(left @ left) < least:
                     least, start = float(left @ left), values
             starts += [start] if start or not effect.free else []
         if starts:
@@ -54,29 +53,27 @@ def screen(
     return [(effect, starts) for _, effect, starts in kept]
 
 
-def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig:
-    """Return the current rig with one more effect, of these values."""
+def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig | None:
+    """Return the current rig with one more effect, None where the physics cannot give it."""
     chosen = (*current.effects, effect)
     every = (*chosen, *case.nuisances(chosen))
     known = {**case.neutral, **current.values, **values}
-    return apply(case.nominal, case.control, every, known)
+    return possible(case.nominal, case.control, every, known)
 
 
 def _sizes(case: Case, effect: Effect, shape: int) -> list[dict[str, float]]:
     """Return sets of an effect's parameters to try; one where each has to be flown."""
-    flown = effect.stage == "airframe"
+    flown = STAGE_OF[effect.stage].flown
     found = []
-    for k in range(1 if flown or not effect.free else len(SIZES)):
+    for k in range(1 if flown or not effect.free else len(SCREEN_SIZES)):
         values = {}
         for p in effect.free:
             start = value = p.starts[min(shape, len(p.starts) - 1)]
             if not flown and p.mode == "factor":
-                value = 1.0 + FACTORS[k] * (start - 1.0)
-            elif not flown and not p.name.startswith(("bend", "stribeck")):
-                value = SIZES[k] * start
-            if p.above:
-                section = getattr(case.nominal.controls[case.control], p.section)
-                value += float(getattr(section, p.above))
-            values[f"{effect.name}.{p.name}"] = float(np.clip(value, p.low, p.high))
+                value = 1.0 + SCREEN_FACTORS[k] * (start - 1.0)
+            elif not flown and p.scanned:
+                value = SCREEN_SIZES[k] * start
+            value += p.base(case.nominal, case.control)
+            values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
         found.append(values)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,62 @@ from coupled.gap.case import Case
 from coupled.gap.choose import Choice
 from coupled.gap.fit import touched
 from coupled.gap.output import Output
+from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES
 from coupled.rig.rig import Rig
 
-BOOTSTRAPS = 400
-FEW = 8  # blocks under which a bootstrap interval is not to be relied on
+
+@dataclass(frozen=True)
+class ChannelShrink:
+    """One channel's rms residual on held-out stretches, in its own unit, and its noise floor.
+
+    `closed` is (before − after)/(before − floor) with its 95 % interval; None where no effect
+    was found, or where there was no gap to close. `reliable`: from enough stretches.
+    """
+
+    channel: str
+    before: float
+    after: float
+    floor: float
+    blocks: int
+    closed: float | None = None
+    low: float | None = None
+    high: float | None = None
+    reliable: bool | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON; what there is not is left out."""
+        known = {
+            "channel": self.channel,
+            "before": self.before,
+            "after": self.after,
+            "floor": self.floor,
+            "blocks": self.blocks,
+            "closed": self.closed,
+            "low": self.low,
+            "high": self.high,
+            "reliable": self.reliable,
+        }
+        return {name: value for name, value in known.items() if value is not None}
 
 
-def shrink(case: Case, choice: Choice) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Shrink:
+    """How far the gap shrinks: the channel where it is widest, and every one that is touched."""
+
+    widest: ChannelShrink
+    channels: tuple[ChannelShrink, ...]
+
+    @property
+    def closed(self) -> float | None:
+        """The share of the widest gap that is closed."""
+        return self.widest.closed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return self.widest.as_dict() | {"channels": [c.as_dict() for c in self.channels]}
+
+
+def shrink(case: Case, choice: Choice) -> Shrink:
     """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
     rig, outputs, effects = case.nominal, case.outputs, choice.fit.effects
     found = case.fit(effects, "fitted", choice.fit.values).rig
@@ -27,14 +77,14 @@ def shrink(case: Case, choice: Choice) -> dict[str, Any]:
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
 
-    def told(output: Output) -> dict[str, Any]:
+    def held(output: Output) -> ChannelShrink:
         floor = max(output.floor, floors.get((output.record, output.channel), 0.0))
         return _of(output, rig, found, floor / output.floor, bool(effects))
 
-    return told(widest) | {"channels": [told(output) for output in pool]}
+    return Shrink(held(widest), tuple(held(output) for output in pool))
 
 
-def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> dict[str, Any]:
+def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> ChannelShrink:
     """Return one channel's rms residual before and after, and its floor, in its own unit.
 
     `floor` is that of the improved rig, over the output's own.
@@ -44,21 +94,26 @@ def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> d
     old, new = output.residual(rig, "held") ** 2, output.residual(found, "held") ** 2
     sums = np.array([[np.sum(x[number == b]) for x in (old, new, np.ones(len(old)))] for b in held])
     before, after = _rms(sums)
-    result: dict[str, Any] = {
-        "channel": output.channel,
-        "before": float(before * output.floor),
-        "after": float(after * output.floor),
-        "floor": floor * output.floor,
-        "blocks": len(held),
-    }
-    if improved and before > floor:
-        picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
-        drawn = np.array([_rms(sums[pick]) for pick in picks])
-        closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
-        result["closed"] = min(1.0, float((before - after) / (before - floor)))
-        result["low"], result["high"] = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
-        result["reliable"] = len(held) >= FEW
-    return result
+    result = ChannelShrink(
+        channel=output.channel,
+        before=float(before * output.floor),
+        after=float(after * output.floor),
+        floor=floor * output.floor,
+        blocks=len(held),
+    )
+    if not improved or before <= floor:
+        return result
+    picks = np.random.default_rng(7).integers(0, len(held), (BOOTSTRAPS, len(held)))
+    drawn = np.array([_rms(sums[pick]) for pick in picks])
+    closed = (drawn[:, 0] - drawn[:, 1]) / np.maximum(drawn[:, 0] - floor, 1e-9)
+    low, high = np.percentile(np.minimum(closed, 1.0), [2.5, 97.5]).tolist()
+    return replace(
+        result,
+        closed=min(1.0, float((before - after) / (before - floor))),
+        low=low,
+        high=high,
+        reliable=len(held) >= FEW_STRETCHES,
+    )
 
 
 def _rms(sums: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -59,9 +59,9 @@ class Smoother:
         return np.asarray(out[self.reach : self.reach + len(signal)])
 
     def wiener_error(self, level: float, frames: int, rng: np.random.Generator) -> Floats:
-        """Return a realisation of what is wrong with a signal that this smoother is Wiener's for.
+        """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
-        `level` is the rms of the white noise. Noise passed and signal lost have the spectrum H·S_n.
+        For a signal of which this smoother is the Wiener filter; `level` is the rms of the noise.
         """
         hiss = rng.normal(0.0, level, frames + 2 * self.reach)
         out = np.fft.irfft(np.fft.rfft(hiss) * np.sqrt(self.gain), len(hiss))

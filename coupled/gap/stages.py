@@ -2,7 +2,7 @@
 
 The chain is cut at every measured signal, so that a fault upstream is inherited by nobody.
 Inputs are smoothed first (`smooth`). A residual is divided by the channel's floor: its own
-white noise, told by fourth differences (gain √70), and the input's carried through the stage.
+white noise, estimated by fourth differences (gain √70), and the input's carried through the stage.
 
     schedule      q̄ → G_T                       surface   δ̂, q̄ → its position
     loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
@@ -24,6 +24,15 @@ from numpy.typing import NDArray
 
 from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
+from coupled.gap.thresholds import (
+    ECHO_SHARE,
+    NOISE_TRIES,
+    PRELOAD_UNSURE,
+    ROUNDING_SPAN,
+    SURFACE_KNOWN,
+    RESTART_s,
+    SLOW_LOADER_s,
+)
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.replay import (
@@ -38,13 +47,6 @@ from coupled.rig.replay import (
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-SHARED = 0.1  # of G_T's noise that echoes q̄'s: the host is taken to have made it of q̄ as recorded
-NEUTRAL = 8.0  # of a channel's noise: so near to neutral its side is not sure
-ROUNDING = 1e-6  # of a channel's span
-KNOWN = 1e-4  # share of its span to which a surface's map tells where it stands
-SLOW_s = 5.0  # a loader whose own period is longer drifts, and is replayed in short windows
-WINDOW_s = 0.25
-TRIES = 4  # realisations of the input's noise, to carry it through a stage
 
 
 @dataclass(frozen=True)
@@ -102,8 +104,8 @@ class Reader:
         two = self.rig.controls[self.control].schedule.second_gradient is not None
         if not two or pressure not in self.record:
             return None
-        calm = smoothed(self.record[pressure])
-        return replay_schedule(self.rig, self.control, calm, beyond=True)
+        smooth = smoothed(self.record[pressure])
+        return replay_schedule(self.rig, self.control, smooth, beyond=True)
 
     def outputs(self) -> list[Output]:
         """Return every output that the record lets judge, in the order of the chain."""
@@ -129,7 +131,7 @@ class Reader:
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, carried through."""
         base = predict(self.rig)
-        tries = [noisy(self.rig, k) - base for k in range(TRIES)]
+        tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
         floor = float(np.hypot(own, carried))
         made = self._output(stage, name, measured, predict, floor)
@@ -143,30 +145,30 @@ class Reader:
         rate = self.rig.frame_rate
         return Output(stage, name, measured, predict, floor, rate, self.number)
 
-    def _calmed(self, signal: Floats, k: int, level: float) -> Floats:
-        """Return a smoothed signal with a try's error: of noise passed, and of signal lost."""
+    def _with_error(self, signal: Floats, k: int, level: float) -> Floats:
+        """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
         rng = np.random.default_rng([41, k])
         raw = signal + rng.normal(0.0, level, len(signal))
         return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
-        own, level, calm = white(gradient), white(pressure), smoothed(pressure)
+        own, level, smooth = white(gradient), white(pressure), smoothed(pressure)
 
-        def predict(rig: Rig, q: Floats = calm) -> Floats:
+        def predict(rig: Rig, q: Floats = smooth) -> Floats:
             return replay_schedule(rig, self.control, q)
 
         share, rest = echoed(gradient, predict(self.rig, pressure))
-        if share > SHARED:
+        if share > ECHO_SHARE:
             # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
             def as_read(rig: Rig) -> Floats:
                 return predict(rig, pressure)
 
-            floor = max(rest, ROUNDING * float(np.ptp(gradient)))
+            floor = max(rest, ROUNDING_SPAN * float(np.ptp(gradient)))
             return [self._output("schedule", self._name("gradient"), gradient, as_read, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, self._calmed(calm, k, level))
+            return predict(rig, self._with_error(smooth, k, level))
 
         return [self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)]
 
@@ -176,8 +178,8 @@ class Reader:
         computed, second = self.signal("computed"), self.second()
         flown = "load_factor" in self.record
         load = smoothed(self.record["load_factor"]) if flown else None
-        calm, own = smoothed(computed), white(computed)
-        every = round(WINDOW_s * self.rig.frame_rate) if self._drifts(gradient) else 0
+        smooth, own = smoothed(computed), white(computed)
+        every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
         def driven(f: Floats, seen: Floats) -> Predict:
             """Return the prediction for a force and the δc at which windows start."""
@@ -188,23 +190,23 @@ class Reader:
             def predict(rig: Rig) -> Floats:
                 scale = rig.controls[self.control].sensing.deflection_scale
                 restart = (every, seen / scale, rate / scale)
-                told = (nodes, gradient, misread, load, second, restart)
-                return scale * drive_loader(rig, self.control, *told)[0]
+                driven_by = (nodes, gradient, misread, load, second, restart)
+                return scale * drive_loader(rig, self.control, *driven_by)[0]
 
             return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
-            seen = self._calmed(calm, k + TRIES, own)
-            return driven(self._calmed(force, k, level), seen)(rig)
+            seen = self._with_error(smooth, k + NOISE_TRIES, own)
+            return driven(self._with_error(force, k, level), seen)(rig)
 
-        predict = driven(force, calm)
+        predict = driven(force, smooth)
         return [self._made("loader", self._name("computed"), computed, predict, noisy, own)]
 
     def _drifts(self, gradient: Floats) -> bool:
         """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
         loader = self.rig.controls[self.control].loader
         softest = float(np.min(np.maximum(gradient, 0.0)))
-        return softest * SLOW_s**2 < 4.0 * np.pi**2 * loader.mass
+        return softest * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * loader.mass
 
     def _multiplier(self) -> list[Output]:
         """Return F_mod against the product it should be: of δc itself, or of δc as read.
@@ -213,25 +215,25 @@ class Reader:
         does not know of it; a wrong scale is in the one and not in the other.
         """
         computed, product = self.signal("computed"), self.signal("modifying_force")
-        gradient, second, calm = self.gradient(), self.second(), smoothed(computed)
+        gradient, second, smooth = self.gradient(), self.second(), smoothed(computed)
         level = white(computed)
 
         def made(rig: Rig, read: Floats) -> Floats:
             return replay_product(rig, self.control, read, gradient, second)
 
         # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
-        jump = made(self.rig, 0.0 * calm + level) - made(self.rig, 0.0 * calm - level)
-        near = np.abs(calm) < NEUTRAL * level
-        unsure = near & (np.abs(jump) > NEUTRAL * white(product))
+        jump = made(self.rig, 0.0 * smooth + level) - made(self.rig, 0.0 * smooth - level)
+        near = np.abs(smooth) < PRELOAD_UNSURE * level
+        unsure = near & (np.abs(jump) > PRELOAD_UNSURE * white(product))
 
-        def predict(rig: Rig, seen: Floats = calm) -> Floats:
+        def predict(rig: Rig, seen: Floats = smooth) -> Floats:
             data = rig.controls[self.control]
             digital = data.loader.multiplier == "digital"
             read = computed if digital else seen / data.sensing.deflection_scale
             return np.where(unsure, product, made(rig, read))
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, self._calmed(calm, k, level))
+            return predict(rig, self._with_error(smooth, k, level))
 
         name = self._name("modifying_force")
         return [self._made("multiplier", name, product, predict, noisy, white(product))]
@@ -239,7 +241,7 @@ class Reader:
     def _linkage(self) -> list[Output]:
         computed, force = self.signal("computed"), self.signal("force")
         measured = self.signal("deflection")
-        levels, calm, calm_force = (
+        levels, smooth, smooth_force = (
             (white(computed), white(force)),
             smoothed(computed),
             smoothed(force),
@@ -255,10 +257,10 @@ class Reader:
             return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
-            c = self._calmed(calm, k, levels[0])
-            return driven(c, self._calmed(calm_force, k + TRIES, levels[1]))(rig)
+            c = self._with_error(smooth, k, levels[0])
+            return driven(c, self._with_error(smooth_force, k + NOISE_TRIES, levels[1]))(rig)
 
-        name, predict = self._name("deflection"), driven(calm, calm_force)
+        name, predict = self._name("deflection"), driven(smooth, smooth_force)
         return [self._made("linkage", name, measured, predict, noisy, white(measured))]
 
     def _surface(self) -> list[Output]:
@@ -266,21 +268,21 @@ class Reader:
         if points is None:
             return []
         commands_at, positions = points
-        believed, measured = self.signal("estimate"), self.record[self.surface]
+        estimate, measured = self.signal("estimate"), self.record[self.surface]
         pressure = self.record["dynamic_pressure_Pa"]
-        command = replay_surface(self.rig, self.control, believed, pressure)
+        command = replay_surface(self.rig, self.control, estimate, pressure)
 
         def position(wanted: Floats) -> Floats:
             return np.interp(wanted, commands_at, positions)
 
         def predict(rig: Rig) -> Floats:
-            commands = replay_surface(rig, self.control, believed, pressure)
+            commands = replay_surface(rig, self.control, estimate, pressure)
             # Row k is the answer to row k − 1; the first is the trim.
             return position(np.concatenate(([0.0], commands[:-1])))
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
         left = measured - position(np.concatenate(([0.0], command[:-1])))
-        floor = float(np.hypot(white(left), KNOWN * np.ptp(measured)))
+        floor = float(np.hypot(white(left), SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
 
 
@@ -288,4 +290,5 @@ def compensation_gap(reader: Reader) -> float:
     """Return the rms departure of the host's δ̂ from its own arithmetic, over δc's noise."""
     computed, force = reader.signal("computed"), reader.signal("force")
     made = replay_compensation(reader.rig, reader.control, computed, force)
-    return float(np.sqrt(np.mean((reader.signal("estimate") - made) ** 2))) / white(computed)
+    floor = max(white(computed), ROUNDING_SPAN * float(np.ptp(computed)))
+    return float(np.sqrt(np.mean((reader.signal("estimate") - made) ** 2))) / floor

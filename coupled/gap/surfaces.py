@@ -1,4 +1,4 @@
-"""What the airframe's surfaces were told, taken back from where the record says that they stood.
+"""The commands of the airframe's surfaces, taken back from their recorded positions.
 
 Each model has a map of its own from command to position, found by flying it. A surface that the
 aircraft moves itself (a yaw damper) stands where its motion wants it, too: what was commanded is
@@ -17,6 +17,7 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.output import white
 from coupled.gap.smooth import Smoother, smoothed
+from coupled.gap.thresholds import SURFACE_SHAKE, SURFACE_MOVES_rad, SURFACE_SHAKE_s
 from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -26,9 +27,6 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
-OWN_rad = 1e-4  # of a surface while the other controls move, from which the aircraft moves it
-SHAKE_s = 1.0  # for so long each of the others is held at
-SHAKE = 0.1  # of its travel
 
 
 def surface_channel(control: ControlName) -> str:
@@ -42,7 +40,7 @@ def surface_points(rig: Rig, control: ControlName) -> Points | None:
     None where the aircraft moves the surface by laws of its own.
     """
     assert rig.flight is not None
-    plain = rig.flight.model_copy(update=UNALTERED)
+    plain = Flight.model_validate({**dict(rig.flight), **UNALTERED})
     return _points(plain.model_dump_json(), tuple(rig.controls), rig.frame_rate, control)
 
 
@@ -69,10 +67,16 @@ def _moves_itself(
     for i, other in enumerate(controls):
         if other == control:
             continue
-        for _ in range(round(SHAKE_s * rate_Hz)):
-            airframe.step((SHAKE * (i == 0), SHAKE * (i == 1), SHAKE * (i == 2)))
+        for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
+            airframe.step(
+                (
+                    SURFACE_SHAKE * (i == 0),
+                    SURFACE_SHAKE * (i == 1),
+                    SURFACE_SHAKE * (i == 2),
+                )
+            )
             moved = max(moved, abs(airframe.motion()[at] - still))
-    return moved > OWN_rad
+    return moved > SURFACE_MOVES_rad
 
 
 def command_of(position: Floats, points: Points) -> Floats:
@@ -83,23 +87,23 @@ def command_of(position: Floats, points: Points) -> Floats:
 
 
 def commands(rig: Rig, record: Record, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return what the surfaces were told, shape (frames, 3), and the same with its error.
+    """Return the surfaces' commands, shape (frames, 3), and the same with a sample of their error.
 
     In the order of the rig's controls, about trim. Row k holds what row k answers to. A control
     that the record knows nothing of is taken to have been left alone.
     """
-    told = np.zeros((len(record), 3))
-    astray = np.zeros_like(told)
+    found = np.zeros((len(record), 3))
+    wrong = np.zeros_like(found)
     for i, control in enumerate(rig.controls):
         name, points = surface_channel(control), surface_points(rig, control)
         if name not in record or points is None:
-            told[:, i] = astray[:, i] = _asked(rig, record, control)
+            found[:, i] = wrong[:, i] = _asked(rig, record, control)
             continue
         position = record[name]
-        level, calm = white(position), smoothed(position)
-        error = Smoother.of(position).wiener_error(level, len(calm), rng)
-        told[:, i], astray[:, i] = command_of(calm, points), command_of(calm + error, points)
-    return told, astray
+        level, smooth = white(position), smoothed(position)
+        error = Smoother.of(position).wiener_error(level, len(smooth), rng)
+        found[:, i], wrong[:, i] = command_of(smooth, points), command_of(smooth + error, points)
+    return found, wrong
 
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:

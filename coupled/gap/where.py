@@ -7,6 +7,7 @@ second whose residual stands clear of the floor and is followed by more.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -17,50 +18,130 @@ from scipy.signal import bilinear, welch
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
+from coupled.gap.thresholds import (
+    NO_SIGN,
+    WHERE_LOUD,
+    WHERE_MOST,
+    WHERE_SHARE,
+    SPECTRUM_s,
+    WHERE_WINDOW_s,
+)
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-WINDOW_s = 0.5
-LOUD = 2.0  # floors from which a window shows the gap
-TOLD = 0.05  # least share of the variance that is worth telling
 
 
-def where(output: Output, rig: Rig, record: Record, control: ControlName) -> dict[str, Any]:
-    """Return what an output's residual `follows`, its `peak_Hz`, `onset_s`, and more.
+@dataclass(frozen=True)
+class Follows:
+    """A signal that a residual follows: its share of the power, 0 to 1, and the slope.
 
-    `loud` is the share of time that shows it, `by_pressure` its gap in each third of the q̄ met.
-    Slopes are in the channel's unit per the signal's.
+    `per_unit` is in the channel's unit per the signal's.
     """
-    left = output.residual(rig)
-    found: dict[str, Any] = {
-        "channel": output.channel,
-        "follows": _follows(output, left, record, control),
-    }
-    found |= _in_time(left, record.time_s, output.frame_rate_Hz)
+
+    signal: str
+    share: float
+    per_unit: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"signal": self.signal, "share": self.share, "per_unit": self.per_unit}
+
+
+@dataclass(frozen=True)
+class PressureBand:
+    """The gap where q̄ lies between two pressures, Pa."""
+
+    from_Pa: float
+    to_Pa: float
+    gap: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"from_Pa": self.from_Pa, "to_Pa": self.to_Pa, "gap": self.gap}
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where in a stage its gap lies, by the channel where it is widest.
+
+    `loud` is the share of time that shows it; `onset_s` None where no half second does;
+    `by_pressure` is empty where q̄ stays.
+    """
+
+    channel: str
+    follows: tuple[Follows, ...]
+    peak_Hz: float
+    loud: float
+    onset_s: float | None = None
+    by_pressure: tuple[PressureBand, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON; what is not known is left out."""
+        found: dict[str, Any] = {"channel": self.channel}
+        found["follows"] = [item.as_dict() for item in self.follows]
+        found |= {"peak_Hz": self.peak_Hz, "loud": self.loud}
+        if self.onset_s is not None:
+            found["onset_s"] = self.onset_s
+        if self.by_pressure:
+            found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
+        return found
+
+
+@dataclass(frozen=True)
+class Remains:
+    """What the effects found leave of a stage that they do not explain.
+
+    `free_share` is what a model free in form takes of it on held-out stretches, 0 to 1, as a
+    function of the signal `free_in`, or of `all`.
+    """
+
+    gap: float
+    follows: tuple[Follows, ...]
+    peak_Hz: float
+    free_share: float
+    free_in: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "gap": self.gap,
+            "follows": [item.as_dict() for item in self.follows],
+            "peak_Hz": self.peak_Hz,
+            "free_share": self.free_share,
+            "free_in": self.free_in,
+        }
+
+
+def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Where:
+    """Return where the gap of an output lies, by the residual that this rig leaves."""
+    left, rate_Hz = output.residual(rig), output.frame_rate_Hz
+    loud, onset_s = _in_time(left, record.time_s, rate_Hz)
     pressure = "dynamic_pressure_Pa"
-    if pressure in record and np.ptp(record[pressure]) > 0.0:
-        found["by_pressure"] = _by(left, smoothed(record[pressure]))
-    return found
+    varies = pressure in record and np.ptp(record[pressure]) > 0.0
+    return Where(
+        channel=output.channel,
+        follows=_follows(output, left, record, control),
+        peak_Hz=_peak(left, rate_Hz),
+        loud=loud,
+        onset_s=onset_s,
+        by_pressure=_by(left, smoothed(record[pressure])) if varies else (),
+    )
 
 
-def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> dict[str, Any]:
-    """Return what the effects found leave of an output: its gap, what that follows, its frequency.
-
-    `free_share` is what a model free in form could still take of it, as a function of the signal
-    `free_in`, or of all.
-    """
+def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> Remains:
+    """Return what the effects found leave of an output."""
     left, answers = output.residual(improved), _response(output, improved, record, control)
     known = signals(output.stage, record, control, output.frame_rate_Hz)
     share, signal = free_share(output, left, known, answers)
-    return {
-        "gap": output.gap(improved),
-        "follows": _follows(output, left, record, control),
-        "peak_Hz": _peak(left, output.frame_rate_Hz),
-        "free_share": share,
-        "free_in": signal,
-    }
+    return Remains(
+        gap=output.gap(improved),
+        follows=_follows(output, left, record, control),
+        peak_Hz=_peak(left, output.frame_rate_Hz),
+        free_share=share,
+        free_in=signal,
+    )
 
 
 def _response(
@@ -90,14 +171,14 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
         name = channel(control, quantity)
         if name not in record:
             continue
-        calm = smoothed(record[name])
-        found[f"{quantity}_{unit}"] = calm
+        smooth = smoothed(record[name])
+        found[f"{quantity}_{unit}"] = smooth
         if quantity in ("computed", "estimate"):
-            rate = rate_of(calm, rate_Hz)
+            rate = rate_of(smooth, rate_Hz)
             found[f"{quantity}_rate_{unit}_per_s"] = rate
             found[f"{quantity}_rate_sign"] = _sign(rate)
-            found[f"{quantity}_cubed_{unit}3"] = calm**3
-            found[f"{quantity}_sign"] = _sign(calm)
+            found[f"{quantity}_cubed_{unit}3"] = smooth**3
+            found[f"{quantity}_sign"] = _sign(smooth)
     common: dict[str, tuple[str, ...]] = {
         "loader": ("load_factor",),
         "schedule": ("dynamic_pressure_Pa",),
@@ -115,18 +196,16 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
 
 def _sign(signal: Floats) -> Floats:
     """Return the sign of a signal, nothing where it is too small to have one."""
-    return np.where(np.abs(signal) > 0.05 * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
+    return np.where(np.abs(signal) > NO_SIGN * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
 
 
 def _follows(
     output: Output, left: Floats, record: Record, control: ControlName
-) -> list[dict[str, Any]]:
+) -> tuple[Follows, ...]:
     """Return what the residual follows, the largest share first; `constant` is its mean."""
     power = float(np.mean(left**2))
     mean = float(np.mean(left))
-    told: list[dict[str, Any]] = [
-        {"signal": "constant", "share": mean**2 / power, "per_unit": mean * output.floor}
-    ]
+    found = [Follows("constant", mean**2 / power, mean * output.floor)]
     spread = left - mean
     for name, signal in signals(output.stage, record, control, output.frame_rate_Hz).items():
         moved = signal - signal.mean()
@@ -135,34 +214,32 @@ def _follows(
             continue
         slope = float(spread @ moved) / size
         share = slope**2 * size / (len(left) * power)
-        told.append({"signal": name, "share": share, "per_unit": slope * output.floor})
-    told.sort(key=lambda item: -item["share"])
-    return [item for item in told if item["share"] >= TOLD][:4]
+        found.append(Follows(name, share, slope * output.floor))
+    found.sort(key=lambda item: -item.share)
+    return tuple(item for item in found if item.share >= WHERE_SHARE)[:WHERE_MOST]
 
 
-def _in_time(left: Floats, time_s: Floats, rate_Hz: float) -> dict[str, Any]:
-    window = max(1, round(WINDOW_s * rate_Hz))
+def _in_time(left: Floats, time_s: Floats, rate_Hz: float) -> tuple[float, float | None]:
+    """Return the share of windows that show the gap, and when the first of them begins, s."""
+    window = max(1, round(WHERE_WINDOW_s * rate_Hz))
     count = len(left) // window
     rms = np.sqrt(np.mean(left[: count * window].reshape(count, window) ** 2, axis=1))
-    loud = rms > LOUD
-    found: dict[str, Any] = {"peak_Hz": _peak(left, rate_Hz), "loud": float(np.mean(loud))}
-    if loud.any():
-        found["onset_s"] = float(time_s[int(np.argmax(loud)) * window])
-    return found
+    loud = rms > WHERE_LOUD
+    onset_s = float(time_s[int(np.argmax(loud)) * window]) if loud.any() else None
+    return float(np.mean(loud)), onset_s
 
 
 def _peak(left: Floats, rate_Hz: float) -> float:
-    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(8.0 * rate_Hz)))
+    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(SPECTRUM_s * rate_Hz)))
     return float(frequency[1:][np.argmax(density[1:])])
 
 
-def _by(left: Floats, pressure: Floats) -> list[dict[str, float]]:
+def _by(left: Floats, pressure: Floats) -> tuple[PressureBand, ...]:
     """Return the gap in the lower, middle and upper third of the record's q̄."""
     edges = np.linspace(pressure.min(), pressure.max(), 4)
     found = []
     for low, high in pairwise(edges.tolist()):
         rows = (pressure >= low) & (pressure <= high)
         if rows.any():
-            gap = float(np.sqrt(np.mean(left[rows] ** 2)))
-            found.append({"from_Pa": low, "to_Pa": high, "gap": gap})
-    return found
+            found.append(PressureBand(low, high, float(np.sqrt(np.mean(left[rows] ** 2)))))
+    return tuple(found)

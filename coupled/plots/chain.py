@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from coupled.gap.effects import STAGES
-from coupled.gap.output import CLEAR, Output
+from coupled.gap.chain import STAGES
+from coupled.gap.output import Output
+from coupled.gap.result import StageResult
+from coupled.gap.thresholds import GUILTY_FROM
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, residual_shown, words
+from coupled.plots.gapview import View, channel_label, residual_shown
 
 _MOST = 4  # residuals drawn
 _FILL = {"guilty": "#f6d5bf", "clear": "#cfeae0", "not judged": "0.93"}
@@ -43,7 +46,7 @@ def draw_stages(view: View) -> Figure:
     return figure
 
 
-def _draw_chain(axes: Any, stages: dict[str, Any]) -> None:
+def _draw_chain(axes: Any, stages: dict[str, StageResult]) -> None:
     """Draw a box a stage, in the order of the chain: its residual over its floor."""
     axes.set_axis_off()
     axes.set_xlim(-0.05, len(STAGES) - 0.15)
@@ -65,30 +68,31 @@ def _draw_chain(axes: Any, stages: dict[str, Any]) -> None:
             )
         )
         axes.text(i + 0.4, 0.74, stage, ha="center", va="center", fontsize=9, fontweight="bold")
-        axes.text(i + 0.4, 0.34, _told(found), ha="center", va="center", fontsize=8.5)
+        axes.text(i + 0.4, 0.34, _caption(found), ha="center", va="center", fontsize=8.5)
         if i:
             arrow = {"arrowstyle": "-|>", "color": "0.35", "shrinkA": 0, "shrinkB": 0}
             axes.annotate("", (i, 0.5), (i - 0.2, 0.5), arrowprops=arrow)
 
 
-def _state(found: dict[str, Any] | None) -> str:
-    if found is None or "gap" not in found:
+def _state(found: StageResult | None) -> str:
+    if found is None or not found.judged:
         return "not judged"
-    return "guilty" if found["guilty"] else "clear"
+    return "guilty" if found.guilty else "clear"
 
 
-def _told(found: dict[str, Any] | None) -> str:
+def _caption(found: StageResult | None) -> str:
+    """Return what stands in a stage's box."""
     if found is None:
         return "not in\nthis record"
-    if "gap" not in found:
-        return "not judged:\n" + (
-            "channels lack" if found["missing"] else found.get("why", "").replace(" ", "\n", 1)
-        )
-    text = f"{found['gap']:.3g} × floor"
-    if not found["guilty"] and found["gap"] < CLEAR:
+    if found.gap is None:
+        why = "channels lack" if found.missing else textwrap.fill(found.why, 14)
+        return f"not judged:\n{why}"
+    text = f"{found.gap:.3g} × floor"
+    limit = GUILTY_FROM if found.limit is None else found.limit
+    if not found.guilty and found.gap < limit:
         return f"{text}\nclear"
-    better = found.get("left", np.inf) < found["gap"]
-    return f"{text}\nthen {found['left']:.3g} ×" if better else text
+    better = found.left is not None and found.left < found.gap
+    return f"{text}\nthen {found.left:.3g} ×" if better else text
 
 
 def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
@@ -108,10 +112,10 @@ def _draw_residual(axes: Any, view: View, output: Output, wide: bool) -> None:
         label="± 2 floors of noise",
     )
     if wide:
-        clear = view.diagnosis.found["verdict"] == "no_gap"
+        clear = view.diagnosis.verdict == "no_gap"
         color = look.RIGHT if clear else look.WRONG
         axes.plot(time, before, color=color, linewidth=0.9, label="measured less nominal")
-        title = f"{output.stage}: {words(output.channel)}{view.source(output)}"
+        title = f"{output.stage}: {channel_label(output.channel)}{view.source(output)}"
         axes.set_title(title, fontsize=9, loc="left")
     if improved:
         axes.plot(time, after, color=look.RIGHT, linewidth=0.8, label="with the effects found")

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from matplotlib.figure import Figure
 
-from coupled.gap.diagnose import Diagnosis
+from coupled.gap.diagnosis import Diagnosis
 from coupled.plots.chain import draw_stages
 from coupled.plots.gapview import View
 from coupled.plots.ladder import draw_ladder
 from coupled.plots.signatures import draw_signature
-from coupled.record.record import Record
 
 FIGURES = {
     "ladder.png": draw_ladder,
@@ -20,7 +17,7 @@ FIGURES = {
 }
 
 
-def draw_diagnosis(diagnosis: Diagnosis, records: Mapping[str, Record]) -> dict[str, Figure]:
-    """Draw a diagnosis of these records: the figures by their files' names."""
-    view = View(diagnosis, tuple(records.values()), tuple(records))
+def draw_diagnosis(diagnosis: Diagnosis) -> dict[str, Figure]:
+    """Draw a diagnosis: the figures by their files' names."""
+    view = View(diagnosis)
     return {name: draw(view) for name, draw in FIGURES.items()}

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from coupled.gap.choose import bar
-from coupled.gap.diagnose import Diagnosis
-from coupled.gap.effects import SETTINGS, Effect, apply
-from coupled.gap.fit import shows_in
-from coupled.gap.output import CLEAR, Floats, Output, white
+from coupled.gap.chain import stage_of
+from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import Effect, apply
+from coupled.gap.library import SETTINGS
+from coupled.gap.output import Floats, Output, white
+from coupled.gap.result import StageResult
 from coupled.gap.stages import Reader
+from coupled.gap.summary import plain
 from coupled.gap.surfaces import surface_points
+from coupled.gap.thresholds import GUILTY_FROM
 from coupled.record.channels import CONTROL_NAMES, channel
 from coupled.record.record import Record
 from coupled.rig.replay import replay_compensation
@@ -34,7 +37,7 @@ _UNITS = {
     "m": (100.0, "cm"),
     "N": (1.0, "N"),
 }
-_WORDS = {
+_LABELS = {
     "computed": "computed deflection δc",
     "deflection": "deflection δ at the grip",
     "estimate": "host's estimate δ̂",
@@ -67,24 +70,14 @@ def residual_shown(name: str) -> tuple[float, str]:
     return (10.0 * factor, "mm") if unit == "cm" else (factor, unit)
 
 
-def words(name: str) -> str:
-    """Return a channel in words, with its symbol."""
+def channel_label(name: str) -> str:
+    """Return a channel's label in a figure, with its symbol."""
     first, rest = name.split("_", 1)
     bare = rest if first in CONTROL_NAMES else name
-    for start in sorted(_WORDS, key=len, reverse=True):
+    for start in sorted(_LABELS, key=len, reverse=True):
         if bare.startswith(start):
-            return _WORDS[start]
+            return _LABELS[start]
     return plain(bare)
-
-
-def plain(name: str) -> str:
-    """Return an effect's or a stage's name in words."""
-    return name.replace("_", " ")
-
-
-def joined(stage: str) -> str:
-    """Return the stage that an output is shown at: F_mod is the loader's, though judged apart."""
-    return "loader" if stage == "multiplier" else stage
 
 
 def style_of(kind: str) -> dict[str, Any]:
@@ -100,17 +93,19 @@ def style_of(kind: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class View:
-    """A diagnosis beside its records, as the figures ask for it."""
+    """A diagnosis and its records, as the figures ask for it."""
 
     diagnosis: Diagnosis
-    records: tuple[Record, ...]
-    files: tuple[str, ...]
 
     @property
-    def stages(self) -> dict[str, Any]:
-        """What was found at each stage."""
-        found: dict[str, Any] = self.diagnosis.found["stages"]
-        return found
+    def records(self) -> tuple[Record, ...]:
+        """The records, in their order."""
+        return tuple(self.diagnosis.records.values())
+
+    @property
+    def stages(self) -> dict[str, StageResult]:
+        """What was found at each stage, by its name."""
+        return {stage.name: stage for stage in self.diagnosis.stages}
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -119,14 +114,14 @@ class View:
 
     def rig_with(self, effects: Sequence[Effect]) -> Rig:
         """Return the rig with some of the effects found, at the sizes of the final fit."""
-        told = self.diagnosis
+        whole = self.diagnosis
         if not effects:
-            return told.nominal
+            return whole.nominal
         if set(effects) == set(self.effects):
-            return told.improved
-        values = told.choice.fit.values
-        settings = [s for s in SETTINGS.values() if f"{s.name}.factor" in values]
-        return apply(told.nominal, told.control, (*effects, *settings), values)
+            return whole.improved
+        values = whole.choice.fit.values
+        settings = [s for s in SETTINGS.values() if s.value_key(s.free[0]) in values]
+        return apply(whole.nominal, whole.control, (*effects, *settings), values)
 
     def rungs(self) -> list[tuple[str, Rig]]:
         """Return the rigs from the nominal one to the improved, an effect more at a time."""
@@ -137,22 +132,22 @@ class View:
 
     def threshold(self, stage: str) -> float:
         """Return the gap up to which a stage counts as explained."""
-        found = self.stages.get(stage, {})
-        return bar(found["settled"], found["limit"]) if "limit" in found else CLEAR
+        found = self.stages.get(stage)
+        return GUILTY_FROM if found is None else found.explained_below
 
     def suspects(self) -> list[Output]:
         """Return the outputs of guilty stages and of the effects found, widest gap first.
 
         Those within their floor are left out, unless all are.
         """
-        guilty = {stage for stage, found in self.stages.items() if found.get("guilty")}
+        guilty = set(self.diagnosis.guilty)
         for effect in self.effects:
-            guilty |= {joined(stage) for stage in shows_in(effect)}
+            guilty |= {stage_of(output) for output in effect.shows_in}
         every = [*self.diagnosis.outputs, *self._host()]
-        ours = [output for output in every if joined(output.stage) in guilty] or every
+        ours = [output for output in every if stage_of(output.stage) in guilty] or every
         known = [(max(o.gap(self.diagnosis.nominal), self._left(o)), o) for o in ours]
         known.sort(key=lambda pair: -pair[0])
-        wide = [output for gap, output in known if gap > CLEAR]
+        wide = [output for gap, output in known if gap > GUILTY_FROM]
         return wide or [output for _, output in known]
 
     def _left(self, output: Output) -> float:
@@ -160,7 +155,7 @@ class View:
 
     def _host(self) -> list[Output]:
         """Return the host's own arithmetic as an output, where it is guilty: nothing fits it."""
-        if not self.stages.get("compensation", {}).get("guilty"):
+        if "compensation" not in self.diagnosis.guilty:
             return []
         return [_arithmetic(reader) for reader in self.readers(self.diagnosis.nominal)]
 
@@ -176,7 +171,8 @@ class View:
 
     def source(self, output: Output) -> str:
         """Return the file that an output is of, where there are several."""
-        return "" if len(self.files) < 2 else f" ({self.files[output.record]})"
+        files = tuple(self.diagnosis.records)
+        return "" if len(files) < 2 else f" ({files[output.record]})"
 
 
 def _arithmetic(reader: Reader) -> Output:

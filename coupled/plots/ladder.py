@@ -8,23 +8,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.gap.air import can_tell_air
-from coupled.gap.choose import LEAST_GAIN, RIVAL, Step
-from coupled.gap.effects import EFFECTS
-from coupled.gap.fit import shows_in
+from coupled.gap.chain import CHAIN, stage_of
+from coupled.gap.choose import Found
+from coupled.gap.library import EFFECTS
 from coupled.gap.output import stage_gaps
-from coupled.gap.words import in_figures
+from coupled.gap.summary import in_figures, plain
+from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, joined, plain
+from coupled.plots.gapview import View
 
-_COLORS = {
-    "schedule": "#cc79a7",
-    "loader": "#0072b2",
-    "linkage": "#d55e00",
-    "compensation": "#e69f00",
-    "surface": "#009e73",
-    "airframe": "black",
-}
+_COLORS = {stage.name: stage.color for stage in CHAIN}
 _LINEAR = 10.0  # gain up to which the axis is linear
 _ROOM = 12.0  # beyond the bars, for their numbers
 _HALF = 0.38  # of a rung's width
@@ -50,7 +43,7 @@ def draw_ladder(view: View) -> Figure:
     rungs, table = right.subplots(2, 1, height_ratios=[3.0, max(1.0, 0.3 * (len(numbers) + 1))])
     _draw_rungs(rungs, view, gaps)
     _draw_numbers(table, numbers)
-    verdict = plain(view.diagnosis.found["verdict"]).replace("effect", "explained")
+    verdict = plain(view.diagnosis.verdict).replace("effect", "explained")
     figure.suptitle(f"Ladder of the {view.diagnosis.control}'s gap: {verdict}", fontsize=12)
     return figure
 
@@ -59,22 +52,24 @@ def _all_gaps(view: View) -> Gaps:
     """Return the stages' gaps rung by rung; at the last as the diagnosis has what is left."""
     gaps = [_gaps(view, rig) for _, rig in view.rungs()]
     if view.effects:
-        gaps[-1] = {s: view.stages.get(s, {}).get("left", gap) for s, gap in gaps[-1].items()}
+        left = {s.name: s.left for s in view.diagnosis.stages if s.left is not None}
+        gaps[-1] = {stage: left.get(stage, gap) for stage, gap in gaps[-1].items()}
     return gaps
 
 
 def _gaps(view: View, rig: Any) -> dict[str, float]:
     """Return each stage's gap with a rig."""
     found: dict[str, float] = {}
-    for stage, gap in stage_gaps(view.diagnosis.outputs, rig).items():
-        found[joined(stage)] = max(found.get(joined(stage), 0.0), gap)
+    for output, gap in stage_gaps(view.diagnosis.outputs, rig).items():
+        stage = stage_of(output)
+        found[stage] = max(found.get(stage, 0.0), gap)
     return found
 
 
-def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Step | None:
+def _winner(view: View, k: int, rounds: list[dict[str, float]]) -> Found | None:
     """Return the step that a round gave, if any: a step found since in no later round."""
     later = {name for gains in rounds[k + 1 :] for name in gains}
-    least = max(LEAST_GAIN, max(rounds[k].values()) - RIVAL)
+    least = max(LEAST_GAIN, max(rounds[k].values()) - RIVAL_GAIN)
     for step in view.diagnosis.choice.steps:
         name = step.effect.name
         if name not in later and rounds[k].get(name, -np.inf) >= least:
@@ -105,7 +100,7 @@ def _draw_round(axes: Any, view: View, k: int, rounds: list[dict[str, float]], g
         axes.set_xlabel("\n".join(textwrap.wrap(text, 74)), fontsize=7, color="0.45", loc="left")
 
 
-def _headline(k: int, step: Step | None) -> str:
+def _headline(k: int, step: Found | None) -> str:
     if step is None:
         return f"round {k + 1}: nothing earns its place"
     rivals = " or ".join(plain(rival.effect.name) for rival in step.rivals)
@@ -161,21 +156,20 @@ def _screened(view: View, tried: dict[str, float], gaps: dict[str, float]) -> li
     """Return the effects of the stages then guilty that were not worth a fit, or hit a bound."""
     guilty = {stage for stage, gap in gaps.items() if gap > view.threshold(stage)}
     known = {effect.name for effect in view.effects}
-    airs = can_tell_air(view.records)
     return [
         effect.name
         for effect in EFFECTS
         if effect.name not in tried
         and effect.name not in known
-        and guilty & {joined(stage) for stage in shows_in(effect)}
-        and (airs or effect.name != "vertical_gust")
+        and guilty & {stage_of(output) for output in effect.shows_in}
+        and effect.can_be_tried(view.records)
     ]
 
 
 def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
     """Draw each suspect stage's gap from the nominal rig down to the improved one."""
     names = [name for name, _ in view.rungs()]
-    suspects = {joined(output.stage) for output in view.suspects()}
+    suspects = {stage_of(output.stage) for output in view.suspects()}
     stages = [stage for stage in _COLORS if stage in suspects and stage in gaps[0]]
     places = np.arange(len(names))
     for i, stage in enumerate(stages):
@@ -237,14 +231,13 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
 def _numbers(view: View) -> list[tuple[str, str, str]]:
     """Return a line an effect, and one a parameter: its name, its value, its 95 % interval."""
     lines = []
-    for effect in view.diagnosis.found["effects"]:
-        lines.append((f"{plain(effect['name'])}, p = {effect['probability']:.2f}", "", ""))
-        for name, found in effect["parameters"].items():
-            ends = [found["low"], found["high"]]
-            interval = "not told"
-            if None not in ends:
-                interval = f"{in_figures(name, ends[0])} to {in_figures(name, ends[1])}"
-            lines.append((f"    {name}", in_figures(name, found["value"]), interval))
+    for effect in view.diagnosis.effects:
+        lines.append((f"{plain(effect.name)}, p = {effect.probability:.2f}", "", ""))
+        for p in effect.parameters:
+            interval = "not determined"
+            if p.low is not None and p.high is not None:
+                interval = f"{in_figures(p.name, p.low)} to {in_figures(p.name, p.high)}"
+            lines.append((f"    {p.name}", in_figures(p.name, p.value), interval))
     return lines
 
 

@@ -84,7 +84,7 @@ class Scene:
         """Return the same without its white noise."""
         return smoothed(self.raw(quantity, rig))
 
-    def told(self, quantity: str) -> Floats:
+    def smooth(self, quantity: str) -> Floats:
         """Return a measured channel without its white noise; KeyError where there is none."""
         return smoothed(self.recorded(quantity))
 
@@ -101,7 +101,7 @@ def _computed(scene: Scene, rig: Rig | None) -> Floats:
     try:
         seen = scene.seen("computed", rig)
     except KeyError:
-        seen = scene.told("computed")
+        seen = scene.smooth("computed")
     return seen / scene.base.controls[scene.reader.control].sensing.deflection_scale
 
 
@@ -118,9 +118,9 @@ def _missing(scene: Scene, rig: Rig | None) -> Floats:
     moved = loader.mass * scene.rate(speed) + loader.damping * speed
     held = loader.friction * np.sign(speed) + loader.breakout * np.sign(at) - loader.offset
     if loader.bob_weight:
-        held = held + loader.bob_weight * (scene.told("load_factor") - 1.0)
+        held = held + loader.bob_weight * (scene.smooth("load_factor") - 1.0)
     spring = loader.basic_gradient * at + loader.cubic * at**3
-    left = scene.told("force") - moved - spring - product - held
+    left = scene.smooth("force") - moved - spring - product - held
     sticks = (loader.friction > 0.0) & (np.abs(speed) < STICKS * np.std(speed))
     sticks |= (loader.breakout > 0.0) & (np.abs(at) < STICKS * np.std(at))
     return np.where(sticks, np.nan, left)
@@ -135,11 +135,11 @@ def _against_base(quantity: str) -> Callable[[Scene, Rig | None], Floats]:
 
 def _bent(scene: Scene, rig: Rig | None) -> Floats:
     """Return δ less the base's servo: what the structure gives under F."""
-    return _against_base("deflection")(scene, rig) + scene.loader.bend * scene.told("force")
+    return _against_base("deflection")(scene, rig) + scene.loader.bend * scene.smooth("force")
 
 
 def _servo_speed(scene: Scene, rig: Rig | None) -> Floats:
-    unbent = scene.seen("deflection", rig) - scene.loader.bend * scene.told("force")
+    unbent = scene.seen("deflection", rig) - scene.loader.bend * scene.smooth("force")
     return scene.fine * scene.rate(unbent)
 
 
@@ -156,8 +156,8 @@ def _answer(scene: Scene, rig: Rig | None) -> Floats:
 def _wanted(scene: Scene) -> Floats:
     """Return the command that the base gives the surface, a frame later, in %."""
     control = scene.reader.control
-    believed, pressure = scene.recorded("estimate"), scene.recorded("dynamic_pressure_Pa")
-    commands = replay_surface(scene.base, control, believed, pressure)
+    estimate, pressure = scene.recorded("estimate"), scene.recorded("dynamic_pressure_Pa")
+    commands = replay_surface(scene.base, control, estimate, pressure)
     sign = COMMAND_SIGN[scene.base.controls[control].surface]
     return 100.0 * sign * np.concatenate(([0.0], commands[:-1]))
 
@@ -186,7 +186,7 @@ class Signal:
     unit: str
     get: Callable[[Scene, Rig | None], Floats]
 
-    def words(self, control: str) -> str:
+    def label_on(self, control: str) -> str:
         """Return the label with its unit on a control."""
         small, large, tiny = ("mm", "m", "µm") if unit_of(control) == "m" else ("°", "°", "0.001°")
         return f"{self.label}, {self.unit.format(d=small, D=large, u=tiny)}"
@@ -204,10 +204,10 @@ SIGNALS: dict[str, Signal] = {
     ),
     "computed": Signal("computed deflection δc", "{d}", lambda s, r: s.fine * _computed(s, r)),
     "missing": Signal("missing force\nF − m·δc″ − c·δc′ − G_B·δc − F_mod", "N", _missing),
-    "force": Signal("pilot's force F", "N", lambda s, r: s.told("force")),
-    "load": Signal("load factor beyond 1", "g", lambda s, r: s.told("load_factor") - 1.0),
+    "force": Signal("pilot's force F", "N", lambda s, r: s.smooth("force")),
+    "load": Signal("load factor beyond 1", "g", lambda s, r: s.smooth("load_factor") - 1.0),
     "pressure": Signal(
-        "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.told("dynamic_pressure_Pa")
+        "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.smooth("dynamic_pressure_Pa")
     ),
     "gradient": Signal(
         "scheduled gradient G_T", "N/{D}", lambda s, r: s.raw("gradient", r) / s.coarse
@@ -237,7 +237,7 @@ SIGNALS: dict[str, Signal] = {
     "elevator": Signal(
         "elevator about trim",
         "°",
-        lambda s, r: (s.told("elevator_rad") - s.told("elevator_rad")[0]) / DEGREE_rad,
+        lambda s, r: (s.smooth("elevator_rad") - s.smooth("elevator_rad")[0]) / DEGREE_rad,
     ),
     "pitch_rate": Signal(
         "pitch rate", "°/s", lambda s, r: s.seen("pitch_rate_rad_per_s", r) / DEGREE_rad

@@ -4,71 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.gap.effects import Effect
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.effect import Effect, Signature
 from coupled.gap.fit import touched
+from coupled.gap.library import WHOLE_s
 from coupled.gap.output import Floats, Output
-from coupled.gap.words import in_figures
+from coupled.gap.summary import in_figures, plain
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, plain, style_of, unit_shown, words
+from coupled.plots.gapview import View, channel_label, style_of, unit_shown
 from coupled.plots.signals import SIGNALS, Scene
 from coupled.plots.structure import draw_structure
 from coupled.rig.rig import Rig
 
-Kind = Literal["law", "loop", "time"]
 _EDGE = 12  # frames at a record's ends that a derivative spoils
 _BINS = 36
 _FEW = 4  # of them, at the least, under one median
 _DOTS = 3000
 _LOOP_s = 5.0
-_WHOLE_s = 1e4
-
-
-@dataclass(frozen=True)
-class Signature:
-    """How an effect is drawn: y against x as a law, a loop or over time; and its zoom's length."""
-
-    x: str
-    y: str
-    kind: Kind = "law"
-    zoom_s: float = 2.5
-
-
-SIGNATURES: dict[str, Signature] = {
-    "pressure_lag": Signature("pressure", "gradient", "loop", 6.0),
-    "pressure_scale": Signature("pressure", "gradient", zoom_s=_WHOLE_s),
-    "schedule_slope": Signature("pressure", "gradient", zoom_s=_WHOLE_s),
-    "coulomb_friction": Signature("speed", "missing"),
-    "stribeck_friction": Signature("speed", "missing"),
-    "viscous_damping": Signature("speed", "missing"),
-    "inertia": Signature("acceleration", "missing", zoom_s=1.5),
-    "gradient_error": Signature("computed", "missing"),
-    "cubic_stiffness": Signature("computed", "missing"),
-    "breakout": Signature("computed", "missing"),
-    "bob_weight": Signature("load", "missing"),
-    "force_offset": Signature("computed", "missing"),
-    "digital_multiplier": Signature("noise", "product_left", zoom_s=0.3),
-    "transport_delay": Signature("speed", "computed_left", zoom_s=1.0),
-    "deflection_scale": Signature("computed", "computed_left"),
-    "bend": Signature("force", "bent"),
-    "stiffening_bend": Signature("force", "bent"),
-    "backlash": Signature("computed", "deflection_left", "loop"),
-    "servo_lag": Signature("speed", "deflection_left", zoom_s=0.8),
-    "servo_rate_limit": Signature("speed", "servo_speed", zoom_s=1.5),
-    "arc_geometry": Signature("deflection", "deflection_left"),
-    "cable_stretch": Signature("pressure", "ratio"),
-    "surface_lag": Signature("wanted_rate", "answer_left", zoom_s=1.5),
-    "surface_rate_limit": Signature("wanted_rate", "answer_rate", zoom_s=1.5),
-    "surface_freeplay": Signature("wanted", "answer_left", "loop"),
-    "rigging_offset": Signature("wanted", "answer_left"),
-    "elevator_effectiveness": Signature("elevator", "pitch_rate", "loop", 4.0),
-    "pitch_damping": Signature("pitch_rate", "pitch_left", zoom_s=4.0),
-    "vertical_gust": Signature("", "air", "time", 6.0),
-}
 
 
 @dataclass(frozen=True)
@@ -86,7 +43,7 @@ def draw_signature(view: View) -> Figure:
     The structure is drawn where no effect was found, or not enough.
     """
     effects = view.effects
-    rest = not effects or view.diagnosis.found["verdict"] == "unexplained"
+    rest = not effects or view.diagnosis.verdict == "unexplained"
     heights = [3.9] * len(effects) + ([5.4] if rest else [])
     figure = Figure(figsize=(10.4, 0.5 + sum(heights)), layout="constrained")
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
@@ -107,11 +64,11 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
     models = _models(view, effect, base)
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
     try:
-        _draw_law(left, Scene(reader, ours), SIGNATURES[effect.name], models)
+        _draw_law(left, Scene(reader, ours), effect.signature, models)
     except KeyError as lacking:
         left.set_axis_off()
         left.text(0.5, 0.5, f"the record lacks {lacking.args[0]}", ha="center", fontsize=9)
-    _draw_zoom(right, view, widest, models, SIGNATURES[effect.name].zoom_s)
+    _draw_zoom(right, view, widest, models, effect.signature.zoom_s)
     for axes in (left, right):
         axes.grid(alpha=0.25)
         axes.tick_params(labelsize=8)
@@ -122,10 +79,8 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
 
 def _title(view: View, effect: Effect) -> str:
     """Return the effect with its parameters."""
-    found = next(e for e in view.diagnosis.found["effects"] if e["name"] == effect.name)
-    numbers = [
-        f"{name} = {in_figures(name, p['value'])}" for name, p in found["parameters"].items()
-    ]
+    found = next(e for e in view.diagnosis.effects if e.name == effect.name)
+    numbers = [f"{p.name} = {in_figures(p.name, p.value)}" for p in found.parameters]
     return ", ".join([f"{effect.stage}: {plain(effect.name)}", *numbers])
 
 
@@ -143,35 +98,35 @@ def _models(view: View, effect: Effect, base: Rig) -> list[_Model]:
 def _draw_law(axes: Any, scene: Scene, signature: Signature, models: Sequence[_Model]) -> None:
     """Draw the effect's law: what was measured as dots, the rigs as lines."""
     control, y = scene.reader.control, SIGNALS[signature.y]
-    axes.set_ylabel(y.words(control), fontsize=9)
-    if signature.kind == "time":
+    axes.set_ylabel(y.label_on(control), fontsize=9)
+    if signature.drawing == "time":
         time = scene.reader.record.time_s
         axes.plot(time - time[0], y.get(scene, None), color=look.RIGHT, linewidth=1.2)
         axes.axhline(0.0, **style_of("wrong"))
         axes.set_xlabel("time, s", fontsize=9)
-        axes.set_title("as the kinematics tell it", fontsize=9, loc="left")
+        axes.set_title("from kinematics", fontsize=9, loc="left")
         return
     x = SIGNALS[signature.x]
-    axes.set_xlabel(x.words(control), fontsize=9)
+    axes.set_xlabel(x.label_on(control), fontsize=9)
     inner = slice(_EDGE, -_EDGE)
-    at, told = x.get(scene, None)[inner], y.get(scene, None)[inner]
+    at, seen = x.get(scene, None)[inner], y.get(scene, None)[inner]
     known = [(m, x.get(scene, m.rig)[inner], y.get(scene, m.rig)[inner]) for m in models]
-    rows = _widest_window(told - known[0][2], round(_LOOP_s * scene.frame_rate))
-    if signature.kind == "loop":
-        axes.plot(at, told, ".", color="0.75", markersize=1.5, zorder=0, rasterized=True)
-        axes.plot(at[rows], told[rows], **{**style_of("measured"), "linewidth": 1.8})
+    rows = _widest_window(seen - known[0][2], round(_LOOP_s * scene.frame_rate))
+    if signature.drawing == "loop":
+        axes.plot(at, seen, ".", color="0.75", markersize=1.5, zorder=0, rasterized=True)
+        axes.plot(at[rows], seen[rows], **{**style_of("measured"), "linewidth": 1.8})
         title = f"loops of {_LOOP_s:g} s; dots: all that was measured"
         for model, across, up in known:
             axes.plot(across[rows], up[rows], **style_of(model.kind))
     else:
         every = max(1, len(at) // _DOTS)
-        axes.plot(at[::every], told[::every], ".", color="0.7", markersize=2.0, rasterized=True)
+        axes.plot(at[::every], seen[::every], ".", color="0.7", markersize=2.0, rasterized=True)
         for model, across, up in known:
             axes.plot(*_medians(across, up), **style_of(model.kind))
-        axes.plot(*_medians(at, told), "o", color=look.MEASURED, markersize=3.5, zorder=4)
+        axes.plot(*_medians(at, seen), "o", color=look.MEASURED, markersize=3.5, zorder=4)
         title = "dots: measured; black: their medians; lines: medians"
     axes.set_title(title, fontsize=9, loc="left")
-    _limit(axes, [told, *(up for _, _, up in known)])
+    _limit(axes, [seen, *(up for _, _, up in known)])
 
 
 def _limit(axes: Any, series: Sequence[Floats]) -> None:
@@ -214,28 +169,28 @@ def _draw_zoom(
     made = [(model, factor * output.predict(model.rig)) for model in models]
     rows = _widest_window(made[1][1] - made[0][1], round(length_s * output.frame_rate_Hz))
     time = view.time(output)[rows]
-    told = factor * output.measured[rows]
+    seen = factor * output.measured[rows]
     driven = _input(view, output)
     if driven is not None:
         label, signal = driven
         part = signal[rows] - np.median(signal[rows])
-        size = float(np.ptp(told)) / max(float(np.ptp(part)), 1e-12)
+        size = float(np.ptp(seen)) / max(float(np.ptp(part)), 1e-12)
         axes.plot(
             time,
-            size * part + np.median(told),
+            size * part + np.median(seen),
             color="#e69f00",
             linewidth=1.0,
             linestyle="dashdot",
             label=f"{label}, scaled",
         )
-    axes.plot(time, told, label="measured", **style_of("measured"))
+    axes.plot(time, seen, label="measured", **style_of("measured"))
     for model, whole in made:
         axes.plot(time, whole[rows], label=model.label, **style_of(model.kind))
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time, s", fontsize=9)
-    axes.set_ylabel(f"{words(output.channel)}, {unit}", fontsize=9)
+    axes.set_ylabel(f"{channel_label(output.channel)}, {unit}", fontsize=9)
     axes.set_title(
-        "the whole record" if length_s == _WHOLE_s else "where they differ most",
+        "the whole record" if length_s == WHOLE_s else "where they differ most",
         fontsize=9,
         loc="left",
     )
@@ -244,12 +199,8 @@ def _draw_zoom(
 def _input(view: View, output: Output) -> tuple[str, Floats] | None:
     """Return what drives an output's stage, where the record has it."""
     control, record = view.diagnosis.control, view.records[output.record]
-    names = {
-        "loader": ("F", f"{control}_force_N"),
-        "airframe": ("elevator, nose up", "elevator_rad"),
-        "schedule": ("q̄", "dynamic_pressure_Pa"),
-    }
-    label, name = names.get(output.stage, ("", ""))
+    label, name = STAGE_OF[output.stage].drive if output.stage in STAGE_OF else ("", "")
+    name = f"{control}_force_N" if name == "force" else name
     if name not in record:
         return None
     return label, (-1.0 if name == "elevator_rad" else 1.0) * record[name]

@@ -9,8 +9,9 @@ import numpy as np
 
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
+from coupled.gap.summary import plain
 from coupled.plots import gapview as look
-from coupled.plots.gapview import View, plain, residual_shown, unit_shown, words
+from coupled.plots.gapview import View, channel_label, residual_shown, unit_shown
 from coupled.record.channels import unit_of
 
 _BINS = 24
@@ -31,16 +32,17 @@ def draw_structure(figure: Any, view: View) -> None:
     for i, (axes, (share, label, signal)) in enumerate(zip(grid, panels, strict=False)):
         if label:
             _draw_against(axes, signal, left, label, unit)
-            told = f"{100.0 * share:.0f} % of its variance goes with it"
+            title = f"{100.0 * share:.0f} % of its variance goes with it"
         else:
             _draw_spectrum(axes, line, unit)
-            told = f"{100.0 * share:.0f} % of its power at {line.frequency[line.peak]:.3g} Hz"
-        axes.set_title(f"{i + 1}. {told}", fontsize=9, loc="left")
+            title = f"{100.0 * share:.0f} % of its power at {line.frequency[line.peak]:.3g} Hz"
+        axes.set_title(f"{i + 1}. {title}", fontsize=9, loc="left")
         axes.grid(alpha=0.25)
         axes.tick_params(labelsize=8)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    what = f"{plain(output.stage)}: residual of the {words(output.channel)}{view.source(output)}"
+    label = channel_label(output.channel)
+    what = f"{plain(output.stage)}: residual of the {label}{view.source(output)}"
     gap = output.gap(improved)
     figure.suptitle(f"{what}, {gap:.3g} × its floor, against what it may go with", fontsize=11)
 
@@ -60,7 +62,7 @@ def _signals(view: View, output: Output) -> list[tuple[str, Floats]]:
     for name in (f"{control}_force_N", f"{control}_computed_{d}", "dynamic_pressure_Pa"):
         if name in record:
             factor, unit = unit_shown(name)
-            found.append((f"{words(name)}, {unit}", factor * record[name]))
+            found.append((f"{channel_label(name)}, {unit}", factor * record[name]))
     computed = f"{control}_computed_{d}"
     if computed in record:
         factor, unit = unit_shown(computed)

@@ -12,10 +12,11 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects import BY_NAME, EFFECTS, apply
+from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import white
 from coupled.gap.smooth import smoothed
-from coupled.gap.words import in_words
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from tests.reference.test_records import FOUNDERS, OWN, RECORDS, available
@@ -55,11 +56,9 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
 
 def diagnosed(
     folder: Path, flown: bool, values: Mapping[str, Mapping[str, float]], seed: int = 4
-) -> dict[str, Any]:
+) -> Diagnosis:
     nominal = nominal_rig(flown)
-    found = diagnose(nominal, {"r.csv": made(folder, nominal, values, seed)}, "column").found
-    json.dumps(found, allow_nan=False)
-    return found
+    return diagnose(nominal, {"r.csv": made(folder, nominal, values, seed)})
 
 
 @pytest.mark.parametrize(("flown", "name", "values"), SINGLES, ids=[name for _, name, _ in SINGLES])
@@ -67,33 +66,33 @@ def test_a_single_effect_is_named_at_its_stage_and_size(
     tmp_path: Path, flown: bool, name: str, values: dict[str, float]
 ) -> None:
     found = diagnosed(tmp_path, flown, {name: values})
-    assert [effect["name"] for effect in found["effects"]] == [name], found
-    assert found["verdict"] in ("effect", "ambiguous")
-    guilty = [stage for stage, judged in found["stages"].items() if judged.get("guilty")]
-    assert guilty == [BY_NAME[name].stage]
-    got = found["effects"][0]["parameters"]
+    assert [effect.name for effect in found.effects] == [name], found
+    assert found.verdict in ("effect", "ambiguous")
+    assert found.guilty == (BY_NAME[name].stage,)
+    got = {p.name: p.value for p in found.effects[0].parameters}
     for key, value in values.items():
-        measured = got[key.format(d="m")]["value"]
+        measured = got[key.format(d="m")]
         near = 0.25 if name == "vertical_gust" else 0.06  # forty seconds meet few gusts
         assert measured == pytest.approx(value, rel=near), got
-    assert found["shrink"]["closed"] > 0.95
-    assert name.replace("_", " ") in in_words(found, "column")
+    assert found.shrink.closed is not None and found.shrink.closed > 0.95
+    assert name.replace("_", " ") in found.summary
+    json.dumps(found.as_dict(), allow_nan=False)
 
 
 def test_two_effects_at_two_stages_are_both_named(tmp_path: Path) -> None:
     pair = {"inertia": {"factor": 1.4}, "backlash": {"play_{d}": 1e-3}}
     found = diagnosed(tmp_path, False, pair)
-    assert {effect["name"] for effect in found["effects"]} == set(pair)
-    assert found["verdict"] == "effect"
+    assert {effect.name for effect in found.effects} == set(pair)
+    assert found.verdict == "effect"
 
 
 @pytest.mark.parametrize("flown", [False, True])
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_without_an_effect_there_is_no_gap(tmp_path: Path, flown: bool, seed: int) -> None:
     found = diagnosed(tmp_path, flown, {}, seed)
-    assert found["verdict"] == "no_gap"
-    assert found["effects"] == []
-    assert all(judged["gap"] < 1.15 for judged in found["stages"].values() if "gap" in judged)
+    assert found.verdict == "no_gap"
+    assert found.effects == ()
+    assert all(stage.gap < 1.15 for stage in found.stages if stage.gap is not None)
 
 
 def test_an_effect_outside_the_library_is_unexplained_at_its_stage(tmp_path: Path) -> None:
@@ -103,9 +102,9 @@ def test_an_effect_outside_the_library_is_unexplained_at_its_stage(tmp_path: Pat
     data = record.data.copy()
     at = record.channels.index("column_deflection_m")
     data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
-    found = diagnose(nominal, {"r.csv": Record(record.channels, data)}, "column").found
-    assert found["verdict"] == "unexplained"
-    assert [s for s, judged in found["stages"].items() if judged.get("guilty")] == ["linkage"]
+    found = diagnose(nominal, {"r.csv": Record(record.channels, data)}, "column")
+    assert found.verdict == "unexplained"
+    assert found.guilty == ("linkage",)
 
 
 def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:
@@ -113,14 +112,15 @@ def test_a_stage_whose_channels_lack_is_not_judged(tmp_path: Path) -> None:
     record = made(tmp_path, nominal, {"backlash": {"play_{d}": 1e-3}}, 6)
     keep = [name for name in record.channels if name != "column_deflection_m"]
     data = np.column_stack([record[name] for name in keep])
-    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column").found
-    assert found["stages"]["linkage"] == {"judged": False, "missing": ["column_deflection_m"]}
-    assert found["verdict"] == "no_gap"
+    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column")
+    lacks = {"judged": False, "missing": ["column_deflection_m"]}
+    assert found.stage("linkage").as_dict() == lacks
+    assert found.verdict == "no_gap"
     keep.remove("column_force_N")
     data = np.column_stack([record[name] for name in keep])
-    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column").found
-    assert found["stages"]["loader"] == {"judged": False, "missing": ["column_force_N"]}
-    assert "Not judged: loader, linkage, compensation" in in_words(found, "column")
+    found = diagnose(nominal, {"r.csv": Record(tuple(keep), data)}, "column")
+    assert found.stage("loader").missing == ("column_force_N",)
+    assert "Not judged: loader, sensing, linkage, compensation" in found.summary
 
 
 @pytest.mark.parametrize("name", available())
@@ -132,8 +132,8 @@ def test_clean_records_have_no_gap(name: str, tmp_path: Path) -> None:
     else:
         rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
         record = read_record(FOUNDERS / "examples" / f"{name}.csv")
-    found = diagnose(rig, {"r.csv": record}, "column").found
-    assert found["verdict"] == "no_gap", found["stages"]
+    found = diagnose(rig, {"r.csv": record}, "column")
+    assert found.verdict == "no_gap", found.stages
 
 
 def spoiled(record: Record, **changes: Any) -> Record:
@@ -165,7 +165,7 @@ def test_bad_records_are_refused_in_one_line(tmp_path: Path) -> None:
         assert str(caught.value).startswith("r.csv: ")
 
 
-def test_effects_are_data_that_leave_the_host_its_belief() -> None:
+def test_effects_are_data_that_leave_the_hosts_values_as_they_are() -> None:
     nominal = nominal_rig(False)
     rig = apply(nominal, "column", [BY_NAME["gradient_error"]], {"gradient_error.factor": 1.1})
     column = rig.controls["column"]

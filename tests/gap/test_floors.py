@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output, spread
 from coupled.gap.smooth import Smoother
-from coupled.gap.words import in_figures
+from coupled.gap.summary import in_figures
 
 Floats = NDArray[np.float64]
 RATE_Hz = 120.0

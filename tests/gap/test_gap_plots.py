@@ -6,26 +6,28 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from coupled.gap.airframe import airframe_outputs
-from coupled.gap.choose import Candidate, Choice, Step
-from coupled.gap.diagnose import Diagnosis, diagnose
-from coupled.gap.effects import BY_NAME, EFFECTS, Effect, apply
+from coupled.gap.choose import Candidate, Choice, Found
+from coupled.gap.diagnose import diagnose
+from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import Effect, apply
 from coupled.gap.fit import Fit
+from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import Output, stage_gaps
+from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.shrink import ChannelShrink, Shrink
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.plots.gaps import FIGURES, draw_diagnosis
-from coupled.plots.gapview import View, unit_shown, words
+from coupled.plots.gapview import View, channel_label, unit_shown
 from coupled.plots.saving import save
 from coupled.plots.signals import SIGNALS
-from coupled.plots.signatures import SIGNATURES, draw_signature
-from coupled.record.channels import unit_of
+from coupled.plots.signatures import draw_signature
 from coupled.record.record import Record, write_record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
@@ -48,37 +50,42 @@ def case(folder: Path, flown: bool) -> Case:
     return nominal, record, (*reader.outputs(), *airframe_outputs(nominal, record))
 
 
-def told(case: Case, effects: list[Effect], rival: Effect | None = None) -> Diagnosis:
+def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None) -> Diagnosis:
     """Return the diagnosis that names these effects, whatever the record says."""
-    nominal, _, outputs = case
+    nominal, record, outputs = case
     fitted = fit_of(nominal, effects)
     rivals = (Candidate(9.0, rival, fit_of(nominal, [rival])),) if rival else ()
-    steps = tuple(Step(effect, 50.0, 0.99, rivals) for effect in effects)
+    steps = tuple(Found(effect, 50.0, 0.99, rivals) for effect in effects)
     rounds = tuple({effect.name: 50.0, "inertia_like": -300.0} for effect in effects)
     gaps = stage_gaps(outputs, nominal)
     blamed = {effect.stage for effect in effects}
-    stages = {s: {"gap": gap, "left": 1.0, "guilty": s in blamed} for s, gap in gaps.items()}
-    found = {
-        "verdict": "effect" if effects else "no_gap",
-        "stages": stages,
-        "effects": [
-            {
-                "name": effect.name,
-                "probability": 0.99,
-                "parameters": {
-                    p.name.format(d=unit_of("column")): {"value": 1.0, "low": 0.9, "high": None}
-                    for p in effect.free
-                },
-            }
+    held = ChannelShrink("column_computed_m", 1.0, 1.0, 1.0, 8)
+    return Diagnosis(
+        control="column",
+        verdict="effect" if effects else "no_gap",
+        stages=tuple(StageResult(s, g, g, 1.2, 1.0, s in blamed) for s, g in gaps.items()),
+        effects=tuple(
+            EffectResult(
+                effect.name,
+                effect.stage,
+                0.99,
+                tuple(ParameterEstimate(p.named("column"), 1.0, 0.9, None) for p in effect.free),
+            )
             for effect in effects
-        ],
-    }
-    choice = Choice(steps, fitted, fit_of(nominal, []), {}, rounds)
-    return Diagnosis(found, fitted.rig, nominal, "column", outputs, choice)
+        ),
+        rivals=(),
+        settings=(),
+        shrink=Shrink(held, (held,)),
+        nominal=nominal,
+        improved=fitted.rig,
+        records={"r.csv": record},
+        outputs=outputs,
+        choice=Choice(steps, fitted, fit_of(nominal, []), {}, rounds),
+    )
 
 
 def fit_of(nominal: Rig, effects: list[Effect]) -> Fit:
-    values = {f"{e.name}.{p.name}": p.starts[0] for e in effects for p in e.free}
+    values = {e.value_key(p): p.starts[0] for e in effects for p in e.free}
     rig = apply(nominal, "column", effects, values)
     return Fit(tuple(effects), values, values, values, (), rig, 0.0)
 
@@ -98,7 +105,7 @@ def test_every_effect_has_a_signature_with_units(
     cases: Mapping[bool, Case], effect: Effect
 ) -> None:
     case = cases[needs_flight(effect)]
-    figure = draw_signature(View(told(case, [effect]), (case[1],), ("r.csv",)))
+    figure = draw_signature(View(diagnosis_of(case, [effect])))
     figure.draw_without_rendering()
     assert effect.name.replace("_", " ") in figure.subfigs[0].get_suptitle()
     found = labels(figure)
@@ -106,22 +113,22 @@ def test_every_effect_has_a_signature_with_units(
     assert all(UNIT.search(label) for label in found), found
 
 
-def test_the_table_of_signatures_is_the_library() -> None:
-    assert set(SIGNATURES) == set(BY_NAME)
-    used = {name for s in SIGNATURES.values() for name in (s.x, s.y) if name}
+def test_the_library_draws_by_every_signal_and_no_other() -> None:
+    used = {name for e in EFFECTS for name in (e.signature.x, e.signature.y) if name}
     assert used == set(SIGNALS)
 
 
 def test_the_files_differ_as_the_diagnoses_do(cases: Mapping[bool, Case], tmp_path: Path) -> None:
     case = cases[False]
+    pair = ("coulomb_friction", "backlash")
     diagnoses = [
-        told(case, []),
-        told(case, [BY_NAME["coulomb_friction"]]),
-        told(case, [BY_NAME["coulomb_friction"], BY_NAME["backlash"]], BY_NAME["servo_lag"]),
+        diagnosis_of(case, []),
+        diagnosis_of(case, [BY_NAME["coulomb_friction"]]),
+        diagnosis_of(case, [BY_NAME[n] for n in pair], BY_NAME["servo_lag"]),
     ]
     written: dict[str, set[bytes]] = {name: set() for name in FIGURES}
     for diagnosis in diagnoses:
-        for name, figure in draw_diagnosis(diagnosis, {"r.csv": case[1]}).items():
+        for name, figure in draw_diagnosis(diagnosis).items():
             assert all(UNIT.search(label) for label in labels(figure) if not stands_alone(label))
             save(figure, tmp_path / name)
             written[name].add((tmp_path / name).read_bytes())
@@ -141,9 +148,9 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
     data[:, at] += np.where(np.sin(record.time_s * 9.0) > 0.6, 2e-3, 0.0)
     spoiled = Record(record.channels, data)
     diagnosis = diagnose(nominal, {"r.csv": spoiled}, "column")
-    assert diagnosis.found["verdict"] == "unexplained"
+    assert diagnosis.verdict == "unexplained"
     assert diagnosis.choice.rounds[0] == diagnosis.choice.tried
-    figures = draw_diagnosis(diagnosis, {"r.csv": spoiled})
+    figures = draw_diagnosis(diagnosis)
     figure = figures["signature.png"]
     figure.draw_without_rendering()
     titles = [axes.get_title("left") for axes in figure.axes]
@@ -155,20 +162,19 @@ def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: P
 
 def test_what_was_lost_on_the_way_is_drawn_without_it(cases: Mapping[bool, Case]) -> None:
     """A record without load factor, and one whose host does not compute as it should."""
-    nominal, record, outputs = cases[False]
-    diagnosis = told(cases[False], [BY_NAME["bob_weight"]])
-    figure = draw_signature(View(diagnosis, (record,), ("r.csv",)))
+    nominal, _, outputs = cases[False]
+    diagnosis = diagnosis_of(cases[False], [BY_NAME["bob_weight"]])
+    figure = draw_signature(View(diagnosis))
     assert "lacks load_factor" in figure.axes[0].texts[0].get_text()
-    guilty: dict[str, Any] = {"compensation": {"gap": 40.0, "guilty": True}}
-    found = {**told(cases[False], []).found, "verdict": "unexplained", "stages": guilty}
-    host = replace(told(cases[False], []), found=found)
-    figure = draw_diagnosis(host, {"r.csv": record})["signature.png"]
+    guilty = (StageResult("compensation", 40.0, limit=1.2, guilty=True),)
+    host = replace(diagnosis_of(cases[False], []), verdict="unexplained", stages=guilty)
+    figure = draw_diagnosis(host)["signature.png"]
     assert "compensation" in figure.subfigs[0].get_suptitle()
     assert outputs and nominal.flight is None
 
 
-def test_channels_are_put_in_words_and_units() -> None:
-    assert words("column_gradient_N_per_m") == "scheduled gradient G_T"
+def test_channels_have_labels_and_units() -> None:
+    assert channel_label("column_gradient_N_per_m") == "scheduled gradient G_T"
     assert unit_shown("column_gradient_N_per_m")[1] == "N/m"
     assert unit_shown("wheel_deflection_rad")[1] == "°"
     assert unit_shown("pitch_rate_rad_per_s")[1] == "°/s"

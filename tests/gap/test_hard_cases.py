@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from coupled.gap.air import vertical_air
 from coupled.gap.case import Case
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects import BY_NAME, EFFECTS
-from coupled.gap.output import Output, STRETCH_s, echoed, white
+from coupled.gap.library import BY_NAME, EFFECTS
+from coupled.gap.output import Output, echoed, white
 from coupled.gap.screen import screen
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
-from coupled.gap.words import in_words
+from coupled.gap.thresholds import STRETCH_s
 from coupled.record.record import write_record
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
@@ -93,12 +93,13 @@ def test_noise_that_comes_late_or_filtered_is_known_again() -> None:
 
 def test_a_lag_of_a_few_frames_is_told_by_the_noise_it_holds_back(tmp_path: Path) -> None:
     effect = {"pressure_lag": {"lag_s": 0.02}}
-    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column").found
-    assert [e["name"] for e in found["effects"]] == ["pressure_lag"]
-    assert found["verdict"] == "effect"
-    assert found["effects"][0]["parameters"]["lag_s"]["value"] == pytest.approx(0.02, rel=0.05)
-    assert found["stages"]["schedule"]["left"] < 1.15
-    assert found["stages"]["schedule"]["gap"] > 300.0  # 10 where the noise is taken for another's
+    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column")
+    assert [e.name for e in found.effects] == ["pressure_lag"]
+    assert found.verdict == "effect"
+    assert found.effects[0].value == pytest.approx(0.02, rel=0.05)
+    schedule = found.stage("schedule")
+    assert schedule.left is not None and schedule.left < 1.15
+    assert schedule.gap is not None and schedule.gap > 300.0  # else 10
 
 
 def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> None:
@@ -106,10 +107,11 @@ def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> No
     nominal = loader(basic_gradient_N_per_m=140.0, friction_N=2.0, breakout_N=2.0)
     found = diagnose(
         nominal, {"r": made(tmp_path, nominal, {"digital_multiplier": {}}, 4)}, "column"
-    ).found
-    assert [effect["name"] for effect in found["effects"]] == ["digital_multiplier"]
-    assert found["verdict"] == "effect"
-    assert found["stages"]["loader"]["left"] < 1.1
+    )
+    assert [effect.name for effect in found.effects] == ["digital_multiplier"]
+    assert found.verdict == "effect"
+    left = found.stage("loader").left
+    assert left is not None and left < 1.1
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.015, "no_gap"), (1.03, "effect")])
@@ -117,21 +119,22 @@ def test_a_setting_is_no_effect_until_it_is_off_by_more(
     tmp_path: Path, factor: float, verdict: str
 ) -> None:
     record = made(tmp_path, RIG, {"viscous_damping": {"factor": factor}}, 4)
-    found = diagnose(RIG, {"r": record}, "column").found
-    judged, said = found["stages"]["loader"], in_words(found, "column")
-    assert found["verdict"] == verdict
+    found = diagnose(RIG, {"r": record}, "column")
+    judged, said = found.stage("loader").as_dict(), found.summary
+    assert found.verdict == verdict
     assert judged["gap"] > judged["limit"]
     assert judged["settled"] < judged["limit"]  # by the setting at the end of its tolerance
     if verdict == "effect":
         assert judged["where"]["follows"][0]["signal"] == "computed_rate_m_per_s"
-        [effect] = found["effects"]
-        assert effect["name"] == "viscous_damping"
-        assert effect["parameters"]["factor"]["value"] == pytest.approx(factor, abs=0.003)
+        [effect] = found.effects
+        assert effect.name == "viscous_damping"
+        assert effect.value == pytest.approx(factor, abs=0.003)
         assert "settings" not in said
     else:
-        assert found["settings"]["damping"] == pytest.approx(factor, abs=0.003)
-        assert f"by its settings, mass {100 * (found['settings']['mass'] - 1):+.1f} %" in said
-        assert f"damping {100 * (found['settings']['damping'] - 1):+.1f} %: within what" in said
+        settings = {setting.name: setting.factor for setting in found.settings}
+        assert settings["damping"] == pytest.approx(factor, abs=0.003)
+        assert f"by its settings, mass {100 * (settings['mass'] - 1):+.1f} %" in said
+        assert f"damping {100 * (settings['damping'] - 1):+.1f} %: within what" in said
 
 
 def test_an_effect_without_a_number_is_always_tried(
@@ -152,8 +155,8 @@ def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
     told = {"controls.column.schedule.total_gradient_N_per_m": [400.0, 400.0]}
     soft = {"controls.column.loader.basic_gradient_N_per_m": 400.0}
     nominal = bench(told | soft, {**BENCH, "frame_rate_Hz": 120.0})
-    found = diagnose(nominal, {"r": made(tmp_path, nominal, effect, 4)}, "column").found
-    assert [e["name"] for e in found["effects"]] == ["cubic_stiffness"], found
+    found = diagnose(nominal, {"r": made(tmp_path, nominal, effect, 4)}, "column")
+    assert [e.name for e in found.effects] == ["cubic_stiffness"], found
 
 
 @pytest.mark.parametrize(
@@ -172,15 +175,14 @@ def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
 def test_a_faint_gap_leaves_the_law_of_dry_friction_open(
     tmp_path: Path, effect: dict[str, dict[str, float]]
 ) -> None:
-    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column").found
-    assert 1.2 < found["stages"]["loader"]["settled"] < 2.0
-    assert found["verdict"] == "ambiguous"
-    assert [sorted(group) for group in found["rivals"]] == [
-        ["coulomb_friction", "stribeck_friction"]
-    ]
+    found = diagnose(RIG, {"r": made(tmp_path, RIG, effect, 4)}, "column")
+    settled = found.stage("loader").settled
+    assert settled is not None and 1.2 < settled < 2.0
+    assert found.verdict == "ambiguous"
+    assert [sorted(group) for group in found.rivals] == [["coulomb_friction", "stribeck_friction"]]
     told = {"coulomb_friction": {"friction_N": 1.0}}
-    clear = diagnose(RIG, {"r": made(tmp_path, RIG, told, 4)}, "column").found
-    assert (clear["verdict"], clear["rivals"]) == ("effect", [])
+    clear = diagnose(RIG, {"r": made(tmp_path, RIG, told, 4)}, "column")
+    assert (clear.verdict, clear.rivals) == ("effect", ())
 
 
 def test_what_remains_is_told_in_numbers_and_words(tmp_path: Path) -> None:
@@ -188,12 +190,13 @@ def test_what_remains_is_told_in_numbers_and_words(tmp_path: Path) -> None:
     at = record.channels.index("column_deflection_m")
     speed = np.gradient(record["column_deflection_m"]) * RIG.frame_rate
     record.data[:, at] += 2e-3 * np.tanh(speed / 0.02) ** 2
-    found = diagnose(RIG, {"r": record}, "column").found
-    assert found["verdict"] == "unexplained"
-    left = found["stages"]["linkage"]["remains"]
-    assert left["gap"] == pytest.approx(found["stages"]["linkage"]["left"], rel=0.05)
-    assert 0.5 < left["free_share"] <= 1.0
-    assert f"What remains in the linkage is {left['gap']:.3g} floors: " in in_words(found, "column")
+    found = diagnose(RIG, {"r": record}, "column")
+    assert found.verdict == "unexplained"
+    linkage = found.stage("linkage")
+    assert linkage.remains is not None
+    assert linkage.remains.gap == pytest.approx(linkage.left, rel=0.05)
+    assert 0.5 < linkage.remains.free_share <= 1.0
+    assert f"What remains in the linkage is {linkage.remains.gap:.3g} floors: " in found.summary
 
 
 def test_still_air_is_told_to_be_still_through_pulls_of_two_g(tmp_path: Path) -> None:

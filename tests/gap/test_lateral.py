@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects import BY_NAME, apply
+from coupled.gap.effect import apply
 from coupled.gap.flown import closed_loop, fly_force
+from coupled.gap.library import BY_NAME
 from coupled.gap.surfaces import surface_points
 from coupled.record.channels import ControlName, noisy_channels
 from coupled.record.record import Record
@@ -28,7 +29,7 @@ def noisy(rig: Rig) -> Rig:
         name: OF_THE_AIR.get(name, next(v for end, v in NOISE.items() if name.endswith(end)))
         for name in noisy_channels(list(rig.controls), flown=True)
     }
-    return rig.model_copy(update={"noise": levels})
+    return rig.changed({"noise": levels})
 
 
 def pushes(rig: Rig) -> dict[ControlName, NDArray[np.float64]]:
@@ -59,10 +60,11 @@ def test_three_moving_controls_are_no_gap(cessna: Rig) -> None:
     record = fly_force(cessna, pushes(cessna), seed=3)
     assert max(abs(record["roll_rad"])) > 0.1  # it does roll, which pitches it, too
     for control in cessna.controls:
-        found = diagnose(cessna, {"r": record}, control).found
-        assert found["verdict"] == "no_gap"
-        gaps = [stage["gap"] for stage in found["stages"].values()]
-        assert len(gaps) == 7 and max(gaps) < 1.2
+        found = diagnose(cessna, {"r": record}, control)
+        assert found.verdict == "no_gap"
+        gaps = [stage.gap for stage in found.stages if stage.gap is not None]
+        assert len(gaps) == 6 and max(gaps) < 1.2
+        assert found.stage("sensing").shown_in == ("loader", "linkage")
 
 
 @pytest.mark.parametrize(
@@ -74,22 +76,25 @@ def test_a_surface_of_wheel_and_pedals_is_judged(
 ) -> None:
     record = flown(cessna, control, name, value)
     whole = diagnose(cessna, {"r": record}, control)
-    (effect,) = whole.found["effects"]
-    (number,) = effect["parameters"].values()
-    assert (whole.found["verdict"], effect["name"]) == ("effect", name)
-    assert number["low"] < value < number["high"]
-    assert [s for s, judged in whole.found["stages"].items() if judged["guilty"]] == ["surface"]
+    (effect,) = whole.effects
+    (number,) = effect.parameters
+    assert (whole.verdict, effect.name) == ("effect", name)
+    assert number.low is not None and number.high is not None
+    assert number.low < value < number.high
+    assert whole.guilty == ("surface",)
     again = closed_loop(cessna, whole.improved, control, record)
     assert again is not None
-    turned = again["roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"]
-    assert turned["after"] < 0.5 * turned["before"]
+    rate = "roll_rate_rad_per_s" if control == "wheel" else "yaw_rate_rad_per_s"
+    [turned] = [one for one in again if one.channel == rate]
+    assert turned.after < 0.5 * turned.before
 
 
 def test_a_damped_rudder_is_not_judged_by_its_command() -> None:
     jet = noisy(read_rig(aircraft_folder() / "737" / "737.toml"))
     assert surface_points(jet, "pedals") is None  # the yaw damper moves it
     assert surface_points(jet, "wheel") is not None
-    found = diagnose(jet, {"r": fly_force(jet, pushes(jet), seed=3)}, "pedals").found
-    assert found["verdict"] == "no_gap"
-    assert found["stages"]["surface"]["judged"] is False
-    assert found["stages"]["airframe"]["gap"] < 1.1
+    found = diagnose(jet, {"r": fly_force(jet, pushes(jet), seed=3)}, "pedals")
+    assert found.verdict == "no_gap"
+    assert not found.stage("surface").judged
+    airframe = found.stage("airframe").gap
+    assert airframe is not None and airframe < 1.1

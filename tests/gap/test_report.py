@@ -11,9 +11,7 @@ import pytest
 from coupled.flight.gusts import dryden
 from coupled.gap.air import vertical_air
 from coupled.gap.diagnose import diagnose
-from coupled.gap.power import power
-from coupled.gap.report import add_report
-from coupled.gap.words import in_words
+from coupled.gap.library import BY_NAME
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
@@ -33,30 +31,32 @@ def test_three_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     effect = {"backlash": {"play_{d}": 1.2e-4}}
     three = {str(seed): made(tmp_path, nominal, effect, seed) for seed in (4, 5, 6)}
-    one = diagnose(nominal, {"4": three["4"]}, "column").found
-    both = diagnose(nominal, three, "column").found
-    widths = [
-        found["effects"][0]["parameters"]["play_m"]["high"]
-        - found["effects"][0]["parameters"]["play_m"]["low"]
-        for found in (one, both)
-    ]
-    assert [effect["name"] for effect in both["effects"]] == ["backlash"]
+    one = diagnose(nominal, {"4": three["4"]}, "column")
+    both = diagnose(nominal, three, "column")
+    widths = []
+    for found in (one, both):
+        [play] = found.effects[0].parameters
+        assert play.low is not None and play.high is not None
+        widths.append(play.high - play.low)
+    assert [effect.name for effect in both.effects] == ["backlash"]
     assert widths[1] < 0.85 * widths[0]
 
 
 def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"bend": {"bend_{d}_per_N": 1.6e-4}}, 4)
-    found = diagnose(nominal, {"a": record}, "column").found["stages"]["linkage"]["where"]
-    assert found["follows"][0]["signal"] == "force_N"
+    found = diagnose(nominal, {"a": record}).stage("linkage").where
+    assert found is not None
+    assert found.follows[0].signal == "force_N"
     bend = nominal.controls["column"].loader.bend
-    assert found["follows"][0]["per_unit"] == pytest.approx(1.6e-4 - bend, rel=0.02)
+    assert found.follows[0].per_unit == pytest.approx(1.6e-4 - bend, rel=0.02)
     late = record.data.copy()
     at = record.channels.index("column_deflection_m")
     clean = made(tmp_path, nominal, {}, 4)
     late[:2400, at] = clean["column_deflection_m"][:2400]
-    found = diagnose(nominal, {"a": Record(record.channels, late)}, "column").found
-    assert found["stages"]["linkage"]["where"]["onset_s"] == pytest.approx(20.0, abs=2.5)
+    again = diagnose(nominal, {"a": Record(record.channels, late)}).stage("linkage").where
+    assert again is not None
+    assert again.onset_s == pytest.approx(20.0, abs=2.5)
 
 
 @pytest.mark.parametrize("flown", [False, True])
@@ -64,11 +64,11 @@ def test_the_improved_rig_flown_again_comes_back_to_the_record(tmp_path: Path, f
     nominal = nominal_rig(flown)
     record = made(tmp_path, nominal, {"gradient_error": {"factor": 1.15}}, 6)
     whole = diagnose(nominal, {"a": record}, "column")
-    add_report(whole, {"a": record})
-    again = whole.found["closed_loop"]
-    assert again["column_computed_m"]["after"] < 0.2 * again["column_computed_m"]["before"]
+    assert whole.closed_loop is not None
+    again = {one.channel: one for one in whole.closed_loop}
+    assert again["column_computed_m"].after < 0.2 * again["column_computed_m"].before
     assert ("pitch_rate_rad_per_s" in again) is flown
-    assert whole.found["next_test"] == ""
+    assert whole.next_test == ""
 
 
 def test_a_gust_is_told_by_kinematics(tmp_path: Path) -> None:
@@ -84,49 +84,47 @@ def test_a_gust_is_told_by_kinematics(tmp_path: Path) -> None:
     assert np.std(told.speed - true) < 0.1 * np.std(true)
     still = without(record, "alpha_rad")
     assert vertical_air(still, 1.0 / nominal.frame_rate) is None
-    found = diagnose(nominal, {"a": still}, "column").found
-    assert found["verdict"] == "unexplained"
+    found = diagnose(nominal, {"a": still}, "column")
+    assert found.verdict == "unexplained"
 
 
 def test_power_is_the_size_at_which_an_effect_is_found(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     clean = made(tmp_path, nominal, {}, 8)
     whole = diagnose(nominal, {"a": clean}, "column")
-    sizes = {item["name"]: item for item in power(nominal, "column", whole.outputs)}
-    assert len(sizes) == 29
-    assert sizes["surface_lag"] == {"name": "surface_lag", "stage": "surface", "judged": False}
-    least = sizes["backlash"]["parameters"]["play_m"]
+    sizes = {one.name: one for one in whole.power}
+    assert set(sizes) == set(BY_NAME)
+    unjudged = {"name": "surface_lag", "stage": "surface", "judged": False}
+    assert sizes["surface_lag"].as_dict() == unjudged
+    least = dict(sizes["backlash"].parameters)["play_m"]
     for times, verdict in ((0.4, "no_gap"), (2.5, "effect")):
         record = made(tmp_path, nominal, {"backlash": {"play_{d}": times * least}}, 8)
-        assert diagnose(nominal, {"a": record}, "column").found["verdict"] == verdict
-    assert sizes["inertia"]["parameters"]["factor"] >= 1.02
+        assert diagnose(nominal, {"a": record}, "column").verdict == verdict
+    assert dict(sizes["inertia"].parameters)["factor"] >= 1.02
 
 
 def test_what_one_speed_cannot_tell_is_said_with_the_test_that_would(tmp_path: Path) -> None:
     """At one q̄ a wrong pressure and a wrong slope are one gain; its change tells nothing more."""
     nominal = nominal_rig(False)
-    table = nominal.controls["column"].schedule
-    curved = table.model_copy(
-        update={
-            "dynamic_pressure": [0.0, 1000.0, 3000.0],
-            "total_gradient": [560.0, 900.0, 2200.0],
-        }
-    )
-    column = nominal.controls["column"].model_copy(update={"schedule": curved})
-    nominal = nominal.model_copy(update={"controls": {"column": column}})
+    table = "controls.column.schedule"
+    curved = {
+        f"{table}.dynamic_pressure_Pa": [0.0, 1000.0, 3000.0],
+        f"{table}.total_gradient_N_per_m": [560.0, 900.0, 2200.0],
+    }
+    nominal = nominal.changed(curved)
     record = made(tmp_path, nominal, {"pressure_scale": {"factor": 1.05}}, 4)
     whole = diagnose(nominal, {"a": record.between(0.0, 18.0)}, "column")
-    assert whole.found["effects"][0]["name"] in ("pressure_scale", "schedule_slope")
-    several = diagnose(nominal, {"a": record}, "column").found
-    assert [effect["name"] for effect in several["effects"]] == ["pressure_scale"]
-    assert several["verdict"] == "effect"
+    assert whole.effects[0].name in ("pressure_scale", "schedule_slope")
+    several = diagnose(nominal, {"a": record}, "column")
+    assert [effect.name for effect in several.effects] == ["pressure_scale"]
+    assert several.verdict == "effect"
 
 
-def test_words_name_size_certainty_and_share(tmp_path: Path) -> None:
+def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"coulomb_friction": {"friction_N": 2.0}}, 4)
-    found = diagnose(nominal, {"a": record}, "column").found
-    said = in_words(found, "column")
+    found = diagnose(nominal, {"a": record}, "column")
+    said = found.summary
     assert "The gap lies in the loader: coulomb friction, friction_N 2.0" in said
     assert "Probability 0.97." in said
     assert "% of the gap on held-out data" in said
@@ -218,11 +216,11 @@ gradient = false
 
 def test_a_loader_without_a_spring_is_judged_in_short_windows(tmp_path: Path) -> None:
     (tmp_path / "axis.toml").write_text(SPRINGLESS)
-    found = diagnose(read_rig(tmp_path / "axis.toml"), {"a": drifting(tmp_path)}, "column").found
-    named = {effect["name"]: effect["parameters"] for effect in found["effects"]}
+    found = diagnose(read_rig(tmp_path / "axis.toml"), {"a": drifting(tmp_path)}, "column")
+    named = {effect.name: effect.value for effect in found.effects}
     assert set(named) == {"coulomb_friction", "force_offset"}
-    assert named["coulomb_friction"]["friction_N"]["value"] == pytest.approx(20.0, rel=0.03)
-    assert named["force_offset"]["offset_N"]["value"] == pytest.approx(3.0, rel=0.1)
+    assert named["coulomb_friction"] == pytest.approx(20.0, rel=0.03)
+    assert named["force_offset"] == pytest.approx(3.0, rel=0.1)
 
 
 def test_a_measured_axis_gives_its_published_answer(tmp_path: Path) -> None:
@@ -237,9 +235,9 @@ def test_a_measured_axis_gives_its_published_answer(tmp_path: Path) -> None:
         (tmp_path / "axis.toml").write_text(SPRINGLESS)
         rig = read_rig(tmp_path / "axis.toml")
         record, friction_N, offset_N = drifting(tmp_path), 20.0, 3.0
-    found = diagnose(rig, {"axis": record}, "column").found
-    assert [effect["name"] for effect in found["effects"]] == ["coulomb_friction", "force_offset"]
-    friction = found["effects"][0]["parameters"]["friction_N"]
-    assert friction["low"] < friction_N < friction["high"]
-    offset = found["effects"][1]["parameters"]["offset_N"]
-    assert offset["low"] < offset_N < offset["high"]
+    found = diagnose(rig, {"axis": record}, "column")
+    assert [effect.name for effect in found.effects] == ["coulomb_friction", "force_offset"]
+    for effect, published_N in zip(found.effects, (friction_N, offset_N), strict=True):
+        [number] = effect.parameters
+        assert number.low is not None and number.high is not None
+        assert number.low < published_N < number.high

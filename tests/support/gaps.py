@@ -12,7 +12,8 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.effects import BY_NAME, apply
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.reference.test_records import NOISE
@@ -52,9 +53,9 @@ def made(
     flat = {f"{name}.{key}": v for name, found in values.items() for key, v in found.items()}
     real = apply(nominal, "column", effects, flat)
     flown = nominal.flight is not None
-    told = ("column", "dynamic")
-    noise = {name: level for name, level in NOISE.items() if flown or name.startswith(told)}
-    real = real.model_copy(update={"noise": noise})
+    of_a_bench = ("column", "dynamic")
+    noise = {name: level for name, level in NOISE.items() if flown or name.startswith(of_a_bench)}
+    real = real.changed({"noise": noise})
     t, force = pushes(seed)
     rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
     (folder / "force.csv").write_text("time_s,column_force_N\n" + rows)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from coupled.gap.airframe import airframe_outputs
-from coupled.gap.effects import BY_NAME
 from coupled.gap.fit import fit
+from coupled.gap.library import BY_NAME
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.record import Record

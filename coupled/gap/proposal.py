@@ -1,4 +1,4 @@
-"""The record that would tell rivals apart, found by computation (T-optimal design).
+"""The next test: the record that would separate rivals, found by computation (T-optimal design).
 
 Each candidate test is flown by the rig with one rival, noise and all, and the record so made is
 fitted by both: the rival refitted, since without the refit any test would seem to separate them.
@@ -18,68 +18,80 @@ from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice, ranked_by_gain
-from coupled.gap.effects import Effect
+from coupled.gap.effect import Effect, value_of
 from coupled.gap.flown import fly_force
+from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, white
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
+from coupled.gap.thresholds import SEPARATED_GAIN, TEST_EDGE_s, TEST_s
 from coupled.record.channels import ControlName, channel, noisy_channels
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-LENGTH_s = 15.0
-SEPARATED = 10.0  # log-likelihood that settles the matter
-RAMP_s = 0.25  # a hand's edge
 
 
 @dataclass(frozen=True)
-class Test:
-    """A test that could be flown: its words, its force at each frame, and its q̄."""
+class ProposedTest:
+    """A test that would tell two rivals apart, and by what log-likelihood."""
 
-    words: str
+    text: str
+    rivals: tuple[str, str]
+    gain: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"words": self.text, "rivals": list(self.rivals), "gain": self.gain}
+
+
+@dataclass(frozen=True)
+class Push:
+    """A test that could be flown: what it is called, its force at each frame, and its q̄."""
+
+    text: str
     force_N: Floats
     pressure_Pa: Floats
     rig: Rig
 
 
-def next_test(
+def next_tests(
     nominal: Rig, record: Record, control: ControlName, choice: Choice
-) -> list[dict[str, Any]]:
-    """Return the tests that would separate the first rivals found, the best first.
-
-    Each has `words`, `rivals`, and `gain`: the log-likelihood by which it should tell them apart.
-    """
+) -> tuple[ProposedTest, ...]:
+    """Return the tests that would separate the first rivals found, the best first."""
     step = next((step for step in choice.steps if step.rivals), None)
     if step is None or channel(control, "force") not in record:
-        return []
+        return ()
     rival = step.rivals[0]
     others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
-    hiss = {name: white(record[name]) for name in _noisy(record, control)}
+    noise = {name: white(record[name]) for name in _noisy(nominal, record, control)}
     found = []
-    for test in tests(nominal, record, control):
-        real = rival.fit.rig.model_copy(update={"noise": hiss, "flight": test.rig.flight})
-        if choice.fit.rig.flight is not None and nominal.flight is not None:
-            changed = {
-                name: getattr(rival.fit.rig.flight, name)
-                for name in ("elevator_effectiveness", "pitch_damping", "gust_rms")
-            }
-            assert test.rig.flight is not None
-            real = real.model_copy(update={"flight": test.rig.flight.model_copy(update=changed)})
+    for test in pushes(nominal, record, control):
+        real = _as_flown(rival.fit.rig, test.rig, control).changed({"noise": noise})
         pair = ((*others, rival.effect), (*others, step.effect))
         gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
         if gain is not None:
-            rivals = [step.effect.name, rival.effect.name]
-            found.append({"words": test.words, "rivals": rivals, "gain": gain})
-    return sorted(found, key=lambda item: -float(item["gain"]))
+            rivals = (step.effect.name, rival.effect.name)
+            found.append(ProposedTest(test.text, rivals, gain))
+    return tuple(sorted(found, key=lambda item: -item.gain))
 
 
-def _noisy(record: Record, control: ControlName) -> list[str]:
-    return [name for name in noisy_channels([control], flown=True) if name in record]
+def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
+    """Return the rig with a test's aircraft and speed, what effects change in the flight kept."""
+    if test.flight is None:
+        return rig
+    freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
+    kept = {key: value_of(rig, control, key) for key in freed}
+    return rig.changed({"flight": test.flight}).changed(kept)
+
+
+def _noisy(rig: Rig, record: Record, control: ControlName) -> list[str]:
+    channels = noisy_channels([control], flown=rig.flight is not None)
+    return [name for name in channels if name in record]
 
 
 def _gain(
-    test: Test,
+    test: Push,
     real: Rig,
     control: ControlName,
     pair: tuple[tuple[Effect, ...], tuple[Effect, ...]],
@@ -105,25 +117,25 @@ def _gain(
     return gains[pair[0][-1].name] - gains[pair[1][-1].name]
 
 
-def tests(nominal: Rig, record: Record, control: ControlName) -> Iterator[Test]:
+def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:
     """Yield tests that the rig can make: pushes of the record's own size, at its q̄ and others."""
     most = float(np.max(np.abs(record[channel(control, "force")])))
     rate = nominal.frame_rate
-    time = np.arange(round(LENGTH_s * rate)) / rate
+    time = np.arange(round(TEST_s * rate)) / rate
     settings = _pressures(nominal, record, control, len(time))
-    for words, shape in _shapes(time):
+    for text, shape in _shapes(time):
         for where, pressure, rig in settings:
-            push = f"{words} of ±{most:.0f} N for {LENGTH_s:g} s {where}"
-            yield Test(push, most * shape, pressure, rig)
+            text_of = f"{text} of ±{most:.0f} N for {TEST_s:g} s {where}"
+            yield Push(text_of, most * shape, pressure, rig)
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:
     """Return what a hand can do, ±1, at rest at both ends."""
-    quiet = np.clip(np.minimum(time, time[-1] - time) / RAMP_s, 0.0, 1.0)
+    quiet = np.clip(np.minimum(time, time[-1] - time) / TEST_EDGE_s, 0.0, 1.0)
     slow = np.abs(((time / 5.0 + 0.75) % 1.0) * 4.0 - 2.0) - 1.0
     chirp = np.sin(2.0 * np.pi * (0.1 + 0.07 * time) * time)
     holds = np.repeat([1.0, -0.6, 0.3, -1.0, 0.5, 0.0], -(-len(time) // 6))[: len(time)]
-    width = max(3, round(RAMP_s / (time[1] - time[0])))
+    width = max(3, round(TEST_EDGE_s / (time[1] - time[0])))
     edge = np.hanning(width + 2)
     steps = np.convolve(holds, edge / edge.sum(), mode="same")
     return [
@@ -144,23 +156,20 @@ def _pressures(
     table = nominal.controls[control].schedule.dynamic_pressure
     if nominal.flight is None:
         whole = np.linspace(table[0], table[-1], frames)
-        words = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"
-        return [*here, (words, whole, nominal)]
-    faster = nominal.flight.model_copy(
-        update={"calibrated_airspeed": 1.2 * nominal.flight.calibrated_airspeed}
-    )
-    changed = nominal.model_copy(update={"flight": faster})
-    return [*here, ("at 1.2 times the airspeed", level, changed)]
+        text = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"
+        return [*here, (text, whole, nominal)]
+    faster = {"flight.calibrated_airspeed_m_per_s": 1.2 * nominal.flight.calibrated_airspeed}
+    return [*here, ("at 1.2 times the airspeed", level, nominal.changed(faster))]
 
 
-def in_one_line(tests_found: Sequence[dict[str, Any]], lacking: Sequence[str]) -> str:
+def in_one_line(tests_found: Sequence[ProposedTest], lacking: Sequence[str]) -> str:
     """Return what to record next, in a sentence, or nothing where nothing would help."""
     if tests_found:
         best = tests_found[0]
-        one, other = (name.replace("_", " ") for name in best["rivals"])
-        if best["gain"] < SEPARATED:
+        one, other = (name.replace("_", " ") for name in best.rivals)
+        if best.gain < SEPARATED_GAIN:
             return f"No test tried would tell {one} from {other}: they act alike on this rig."
-        return f"To tell {one} from {other}, record {best['words']}."
+        return f"To tell {one} from {other}, record {best.text}."
     if lacking:
         return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
     return ""

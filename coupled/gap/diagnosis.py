@@ -1,0 +1,89 @@
+"""A diagnosis, whole: what was found, the improved rig, and what is computed when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from coupled.gap.choose import Choice
+from coupled.gap.flown import ChannelAgain, closed_loop
+from coupled.gap.output import Output
+from coupled.gap.power import EffectPower, power
+from coupled.gap.proposal import ProposedTest, in_one_line, next_tests
+from coupled.gap.result import FORMAT, Findings
+from coupled.gap.shrink import Shrink
+from coupled.gap.summary import summary
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+
+@dataclass(frozen=True)
+class Diagnosis(Findings):
+    """What records say of a rig, with the rig that has the effects found (`improved`).
+
+    The flight again, the next test and the power are computed when they are first asked for:
+    each flies the rig, and takes as long as the diagnosis or longer.
+    """
+
+    control: ControlName
+    shrink: Shrink
+    nominal: Rig = field(repr=False, compare=False)
+    improved: Rig = field(repr=False, compare=False)
+    records: Mapping[str, Record] = field(repr=False, compare=False)
+    outputs: tuple[Output, ...] = field(repr=False, compare=False)
+    choice: Choice = field(repr=False, compare=False)
+
+    @property
+    def first(self) -> Record:
+        """The first of the records, by which the flight again and the next test are made."""
+        return next(iter(self.records.values()))
+
+    @cached_property
+    def closed_loop(self) -> tuple[ChannelAgain, ...] | None:
+        """How far both rigs, flown with the record's force, stay from it; None without effects."""
+        if not self.choice.steps:
+            return None
+        return closed_loop(self.nominal, self.improved, self.control, self.first)
+
+    @cached_property
+    def next_tests(self) -> tuple[ProposedTest, ...]:
+        """The tests that would separate the first rivals, the best first; empty without rivals."""
+        return next_tests(self.nominal, self.first, self.control, self.choice)
+
+    @property
+    def next_test(self) -> str:
+        """What to record next, in a sentence; empty where nothing would help."""
+        return in_one_line(self.next_tests, sorted({n for s in self.stages for n in s.missing}))
+
+    @cached_property
+    def power(self) -> tuple[EffectPower, ...]:
+        """The least size of each effect that the records would have shown."""
+        return power(self.choice.settled.rig, self.control, self.outputs)
+
+    @cached_property
+    def summary(self) -> str:
+        """What is wrong, how large, how sure, how much it explains, and what to record next."""
+        return summary(self, self.shrink, self.next_test)
+
+    def as_dict(self, with_power: bool = False) -> dict[str, Any]:
+        """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
+        found: dict[str, Any] = {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "stages": {stage.name: stage.as_dict() for stage in self.stages},
+            "effects": [effect.as_dict() for effect in self.effects],
+            "rivals": [list(group) for group in self.rivals],
+            "shrink": self.shrink.as_dict(),
+            "settings": {setting.name: setting.factor for setting in self.settings},
+        }
+        if self.closed_loop is not None:
+            found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
+        if self.next_tests:
+            found["next_tests"] = [test.as_dict() for test in self.next_tests]
+        found["next_test"] = self.next_test
+        if with_power:
+            found["power"] = [one.as_dict() for one in self.power]
+        return found

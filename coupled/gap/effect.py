@@ -1,0 +1,210 @@
+"""What an entry of the library of effects is, and how effects enter a rig.
+
+Adding an effect to a rig means writing values under the rig file's own keys, which the same
+stages then fly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+from coupled.errors import InputError
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.record.channels import ControlName, unit_of
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from coupled.schema import Section, file_keys
+
+Mode = Literal["value", "factor", "added", "switch"]
+Drawing = Literal["law", "loop", "time"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One freed number of the rig: its key in a rig file, and how a fitted value enters it.
+
+    The key is one of a control's, or of the flight's; `{d}` in it and in the name is m, or rad on
+    a wheel. `value` replaces the nominal one, `factor` multiplies it, `added` is added to it; a
+    `switch` has no number, and sets the key to `on`. `above` is a key from whose nominal value
+    the starts count.
+
+    How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
+    the least size that shows is sought; of an `inverse` one, less does more.
+    """
+
+    name: str
+    key: str
+    mode: Mode
+    low: float = 0.0
+    high: float = 0.0
+    starts: tuple[float, ...] = (0.0,)
+    on: Any = None
+    above: str = ""
+    scanned: bool = True
+    shape: bool = False
+    inverse: bool = False
+
+    def named(self, control: str) -> str:
+        """Return its name with its unit on this control."""
+        return self.name.format(d=unit_of(control))
+
+    def nominal(self, rig: Rig, control: ControlName) -> Any:
+        """Return what the rig has."""
+        return value_of(rig, control, self.key)
+
+    def base(self, rig: Rig, control: ControlName) -> float:
+        """Return the nominal value from which a start counts, 0 where it has none."""
+        return float(value_of(rig, control, self.above)) if self.above else 0.0
+
+    def entered(self, nominal: Any, value: float) -> Any:
+        """Return the rig's new number for a fitted value."""
+        if self.mode == "switch":
+            return self.on
+        if self.mode == "factor":
+            return nominal * value
+        return nominal + value if self.mode == "added" else value
+
+    def size(self, value: float) -> float:
+        """Return how far a value is from where it does nothing."""
+        return abs(value - 1.0) if self.mode == "factor" else abs(value)
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How an effect is drawn: y against x as a law, a loop or over time; and its zoom's length.
+
+    `x` and `y` are names of `plots.signals`.
+    """
+
+    x: str
+    y: str
+    drawing: Drawing = "law"
+    zoom_s: float = 2.5
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """An effect that passes for a plainer one in a faint gap, and by which values it then does.
+
+    `values` takes the plainer one's values and what the nominal rig has under `base`.
+    """
+
+    plainer: str
+    base: str
+    values: Callable[[Mapping[str, float], float], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named effect of one stage.
+
+    `outputs`      those in which it shows, if not those of its stage
+    `needs`        channels that every record must have for it to be tried
+    `tolerance`    relative; its number is a setting, off by so much without being an effect
+    `alike`        the effect for which it passes in a faint gap
+    `sample_error` relative standard error of its number, from what little of it a record meets
+    """
+
+    name: str
+    stage: str
+    parameters: tuple[Parameter, ...]
+    signature: Signature
+    outputs: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    tolerance: float = 0.0
+    alike: Likeness | None = None
+    sample_error: Callable[[Record, float], float] | None = None
+
+    @property
+    def free(self) -> tuple[Parameter, ...]:
+        """The parameters that have a number to fit."""
+        return tuple(p for p in self.parameters if p.mode != "switch")
+
+    @property
+    def shows_in(self) -> tuple[str, ...]:
+        """The outputs in which it shows."""
+        return self.outputs or STAGE_OF[self.stage].effects_show_in
+
+    def value_key(self, parameter: Parameter) -> str:
+        """Return the key of a parameter among fitted values."""
+        return f"{self.name}.{parameter.name}"
+
+    def can_be_tried(self, records: Sequence[Record]) -> bool:
+        """Tell whether all records have the channels that it needs."""
+        return all(name in record for record in records for name in self.needs)
+
+
+@cache
+def _fields(section: type[Section], d: str) -> dict[str, str]:
+    return file_keys(section, d)
+
+
+def value_of(rig: Rig, control: ControlName, key: str) -> Any:
+    """Return what a rig has under a key of a control, or of the flight."""
+    section, _, last = key.partition(".")
+    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+    return getattr(holder, field_of(rig, control, key)) if last else holder
+
+
+def field_of(rig: Rig, control: ControlName, key: str) -> str:
+    """Return the name of a key's field, without its unit."""
+    section, _, last = key.partition(".")
+    d = unit_of(control)
+    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+    assert isinstance(holder, Section), key
+    return _fields(type(holder), d)[last.format(d=d)]
+
+
+def apply(
+    rig: Rig, control: ControlName, effects: Sequence[Effect], values: Mapping[str, float]
+) -> Rig:
+    """Return the rig with effects added; `values` by "effect.parameter".
+
+    The host's own values stay: its G_B and F_BO are pinned to the nominal. Raises InputError
+    where the physics cannot give such a rig.
+    """
+    changes: dict[str, Any] = {}
+    for effect in effects:
+        for p in effect.parameters:
+            value = values.get(effect.value_key(p), 0.0)
+            changes[p.key] = p.entered(p.nominal(rig, control), value)
+    changes |= _no_less_than_running(rig, control, changes)
+    data = rig.controls[control]
+    changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
+    changes["compensation.breakout_N"] = data.assumed_breakout
+    d = unit_of(control)
+    return rig.changed({_dotted(key, control).format(d=d): new for key, new in changes.items()})
+
+
+def possible(
+    rig: Rig, control: ControlName, effects: Sequence[Effect], values: Mapping[str, float]
+) -> Rig | None:
+    """Return the rig with effects added, or None where the physics cannot give it."""
+    try:
+        return apply(rig, control, effects, values)
+    except InputError:
+        return None
+
+
+def _dotted(key: str, control: ControlName) -> str:
+    return key if key.startswith("flight.") else f"controls.{control}.{key}"
+
+
+FRICTION, BREAKAWAY = "loader.friction_N", "loader.breakaway_N"
+
+
+def _no_less_than_running(
+    rig: Rig, control: ControlName, changes: Mapping[str, Any]
+) -> dict[str, float]:
+    """Return the breakaway raised to the running friction, where there is one below it.
+
+    That is what friction does with it; in a rig file it would be refused.
+    """
+    if FRICTION not in changes and BREAKAWAY not in changes:
+        return {}
+    running = float(changes.get(FRICTION, value_of(rig, control, FRICTION)))
+    breakaway = float(changes.get(BREAKAWAY, value_of(rig, control, BREAKAWAY)))
+    return {BREAKAWAY: running} if 0.0 < breakaway < running else {}

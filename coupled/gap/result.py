@@ -1,0 +1,165 @@
+"""What a diagnosis found, as data; each result makes its own part of the JSON by `as_dict`.
+
+Keys are those of the contract. SI units; a gap is a residual's rms over its noise floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from coupled.errors import InputError
+from coupled.gap.output import explained_below
+from coupled.gap.thresholds import GUILTY_FROM
+from coupled.gap.where import Remains, Where
+
+# Of the JSON that is written; one without a format was written before formats had numbers.
+FORMAT = 1
+Verdict = Literal["no_gap", "effect", "ambiguous", "unexplained"]
+
+
+def check_format(table: Mapping[str, Any], file: object) -> None:
+    """Refuse a diagnosis of a newer format than this version reads; older ones are read."""
+    made = table.get("format", 0)
+    if not isinstance(made, int) or isinstance(made, bool) or made < 0:
+        raise InputError(file, "format", f"is no number of a format; this version writes {FORMAT}")
+    if made > FORMAT:
+        problem = f"is {made}, of a newer version of coupled; this one reads up to {FORMAT}"
+        raise InputError(file, "format", problem)
+
+
+@dataclass(frozen=True)
+class StageResult:
+    """One stage. `gap` None: it was not judged, for the channels `missing` or the reason `why`.
+
+    `settled` is the gap with the settings within their tolerance, `left` that with the effects
+    found; `limit` the gap up to which noise may be all there is. `shown_in` names the stages in
+    whose gaps a fault of this one would show, where it has no residual of its own.
+    """
+
+    name: str
+    gap: float | None = None
+    settled: float | None = None
+    limit: float | None = None
+    left: float | None = None
+    guilty: bool = False
+    where: Where | None = None
+    remains: Remains | None = None
+    missing: tuple[str, ...] = ()
+    why: str = ""
+    shown_in: tuple[str, ...] = ()
+
+    @property
+    def judged(self) -> bool:
+        """Whether the record let the stage be judged."""
+        return self.gap is not None
+
+    @property
+    def explained_below(self) -> float:
+        """The gap up to which the effects found explain the stage."""
+        if self.settled is None or self.limit is None:
+            return GUILTY_FROM if self.limit is None else self.limit
+        return explained_below(self.settled, self.limit)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it still holds structure that the effects found do not explain."""
+        return self.left is not None and self.left > self.explained_below
+
+    @property
+    def within_settings(self) -> bool:
+        """Whether only settings within their tolerance widen it beyond its limit."""
+        if self.gap is None or self.settled is None or self.limit is None or self.guilty:
+            return False
+        return self.settled <= self.limit < self.gap
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        if self.gap is None:
+            found: dict[str, Any] = {"judged": False, "missing": list(self.missing)}
+            return found | ({"why": self.why} if self.why else {})
+        found = {"gap": self.gap}
+        numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}
+        found |= {name: number for name, number in numbers.items() if number is not None}
+        found["guilty"] = self.guilty
+        if self.where is not None:
+            found["where"] = self.where.as_dict()
+        if self.remains is not None:
+            found["remains"] = self.remains.as_dict()
+        return found
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A parameter with its 95 % interval; an end is None where nothing determines it."""
+
+    name: str
+    value: float
+    low: float | None
+    high: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"value": self.value, "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True)
+class EffectResult:
+    """An effect found, with the probability that it is the one."""
+
+    name: str
+    stage: str
+    probability: float
+    parameters: tuple[ParameterEstimate, ...]
+
+    @property
+    def value(self) -> float | None:
+        """The value of its first parameter; None of an effect without a number."""
+        return self.parameters[0].value if self.parameters else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "name": self.name,
+            "stage": self.stage,
+            "probability": self.probability,
+            "parameters": {p.name: p.as_dict() for p in self.parameters},
+        }
+
+
+@dataclass(frozen=True)
+class SettingResult:
+    """What a setting of the nominal rig was found to be, over its nominal value."""
+
+    name: str
+    stage: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What records say of a rig: where it departs from them, by which effects, and how far.
+
+    `stages` are in the order of the chain, `effects` the largest first; `rivals` are groups of
+    effects that the records cannot tell apart.
+    """
+
+    control: str
+    verdict: Verdict
+    stages: tuple[StageResult, ...]
+    effects: tuple[EffectResult, ...]
+    rivals: tuple[tuple[str, ...], ...]
+    settings: tuple[SettingResult, ...]
+
+    def stage(self, name: str) -> StageResult:
+        """Return a stage by its name; KeyError where the records have none of it."""
+        for stage in self.stages:
+            if stage.name == name:
+                return stage
+        raise KeyError(name)
+
+    @property
+    def guilty(self) -> tuple[str, ...]:
+        """The names of the guilty stages."""
+        return tuple(stage.name for stage in self.stages if stage.guilty)

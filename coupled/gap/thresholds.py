@@ -1,0 +1,110 @@
+"""Every threshold of the diagnosis, in the order in which it runs, and what each was set on.
+
+"Blind trials" are records of `coupled blind make`, with the seeds that docs/diagnosis.md and
+docs/decisions.md name; a score is published on a set on which none of these was set. "Chosen"
+says that a value was set by judgement and that no count is known to stand behind it.
+"""
+
+from __future__ import annotations
+
+# Records that are refused (`checks`).
+OTHER_RIG = 2.0  # chosen: factor on the gradient from which a rig file is another rig's
+OTHER_SPEED = 0.03  # chosen: relative error of the trimmed airspeed, likewise
+OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
+STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
+SHORTEST_RECORD_s = 10.0  # four stretches of 2.5 s: two to fit, two to hold out
+
+# Noise and rounding of a channel (`output`).
+ECHO_FRAMES = 12  # chosen: a tenth of a second at 120 Hz, over which noise may echo
+ROUNDED = 3.0  # of the noise, from which even steps are a ramp's: told pressures had even steps
+ROUNDING_SPAN = 1e-6  # chosen: of a channel's span, the least that a file's figures keep
+UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
+
+# Halves of a record: fitted and held out (`output`).
+STRETCH_s = 2.5  # chosen: longer than a residual's memory, with enough stretches in 20 s
+SHORTEST_STRETCH_s = 0.25  # chosen: the shortest to which one is cut
+STRETCH_POWER = 0.125  # of the residual's power, from which a stretch is cut; blind trials 6 to 8
+
+# What noise alone may leave of a stage (`output`).
+GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at up to 1.1
+NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
+SMOOTHING_LOST = 0.15  # at kinks of an input; a bench told its q̄ in ramps stands at 1.15
+
+# Inputs of the stages (`stages`, `airframe`, `surfaces`).
+ECHO_SHARE = 0.1  # of G_T's noise that echoes q̄'s, from which the host made it of q̄ as recorded
+PRELOAD_UNSURE = 8.0  # chosen: of a channel's noise about neutral, where the preload's side is open
+SURFACE_KNOWN = 1e-4  # chosen: of its span, to which the model's map of commands gives a position
+FLIGHT_KNOWN = 1e-4  # chosen: of its span, to which measured surfaces replay the motion
+SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axis has no spring
+RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts
+NOISE_TRIES = 4  # chosen: samples of the input's noise that are carried through a stage
+SURFACE_SHAKE_s = 1.0  # chosen: for so long each of the other controls is held off neutral
+SURFACE_SHAKE = 0.1  # chosen: of its travel
+SURFACE_MOVES_rad = 1e-4  # chosen: from which the aircraft moves a surface itself
+LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is lost; chosen
+STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
+
+# Settings of the nominal rig (`case`).
+SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
+
+# Fitting (`fit`).
+DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls between its jumps
+MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, another integrator
+FIT_ITERATIONS = 40  # chosen
+DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
+
+# Screening (`screen`).
+SCREENED = 6  # chosen: candidates fitted in a round
+SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
+SCREEN_FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
+SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which a size does something
+
+# Choosing (`choose`).
+LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it
+RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only answer
+NO_GAP_LEFT = 0.01  # floors²: a tenth of the floor is no gap to close; chosen
+MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leave
+SIMPLER_GAIN = 6.0  # chosen: by which more numbers must win in the loader where fewer close the gap
+SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dry friction is exact
+FAINT_GAP = 2.0  # under which the law of dry friction is open: 5 of 67 blind records, seeds 2 to 6
+LAW_GAIN = 12.0  # by which the richer law must win there; the same records
+FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
+NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen
+MOST_EFFECTS = 4  # chosen: effects in one answer
+
+# Probabilities (`diagnose`).
+SURE = 0.97  # share of what the search was sure of that was right in blind trials
+DOUBT = 0.3  # a decision: structure is left, and an effect found may only imitate it
+
+# Where a gap lies (`where`).
+WHERE_WINDOW_s = 0.5  # chosen: windows whose rms tells the onset
+WHERE_LOUD = 2.0  # chosen: floors from which a window shows the gap
+WHERE_SHARE = 0.05  # chosen: least share of the variance that is worth saying
+NO_SIGN = 0.05  # chosen: of a signal's rms, under which its sign is not sure
+WHERE_MOST = 4  # chosen: signals that are named
+SPECTRUM_s = 8.0  # chosen: length of a periodogram
+
+# What a model free in form takes (`flexible`).
+BENDS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)  # chosen: quantiles where a function may bend
+LAGS_s = (0.03, 0.1, 0.3, 1.0)  # chosen: of the copies of a signal
+RIDGES = tuple(10.0**k for k in range(-7, 3))  # chosen; held-out stretches decide among them
+FLAT = 1e-3  # chosen: share of its spread under which a part does not determine a function
+
+# How far the gap shrinks (`shrink`).
+BOOTSTRAPS = 400  # chosen: draws of a bootstrap interval
+FEW_STRETCHES = 8  # under which a bootstrap interval is not to be relied on; chosen
+
+# What size would have shown (`power`).
+POWER_DECADES = 3  # chosen: to either side of a fit's start
+POWER_HALVINGS = 5  # of the decade where an effect begins to show: to 7 %
+SETTING_NUDGE = 1.01  # chosen: factor by which a setting's signature is taken
+
+# The next test (`proposal`), and the flight again (`flown`).
+TEST_s = 15.0  # chosen: length of a test
+TEST_EDGE_s = 0.25  # chosen: in which a hand can begin or end a push
+SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
+TOLD_EVERY = 12  # chosen: frames between the points at which a bench is told q̄
+
+# What the summary says (`summary`).
+ONSET_s = 5.0  # chosen: a gap that begins later has a beginning
+FREE_LEAST = 5  # chosen: %, under which a model free in form explains nothing
