@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,13 +22,14 @@ from coupled.campaign.flights import fly_planned, fly_sweep
 from coupled.campaign.journal import JOURNAL, opened
 from coupled.campaign.labels import parameter_label
 from coupled.campaign.plan import SweepPlan, planned_flights, read_plan
-from coupled.campaign.sweep import write_table
+from coupled.campaign.sweep import sweep, write_table
 from coupled.errors import InputError
+from coupled.files import unfinished_name
 from coupled.parallel import Here, executor
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
 from tests.campaign.test_check import BENCH
-from tests.support.processes import begun, kill
+from tests.support.processes import begun, ended, kill
 from tests.test_cli import SHORT, coupled, files
 
 BEND = "rig.controls.column.loader.bend_m_per_N"
@@ -120,7 +122,7 @@ def test_one_worker_and_two_make_the_same_bytes(folder: Path) -> None:
     write_table(flown(plan_of(folder), folder / "one"), folder / "one.parquet")
     assert (folder / "one.parquet").read_bytes() == (folder / "two/table.parquet").read_bytes()
     again = coupled(folder, "sweep", "s.toml", "--folder", "two", "--json", "-", "-j", "1")
-    assert "18 flights are there already" in again.stderr
+    assert "all 18 flights are there already; none is flown again" in again.stderr
     assert len(json.loads(again.stdout)) == 18
 
 
@@ -157,6 +159,96 @@ def test_a_killed_sweep_goes_on_and_repeats_no_flight(folder: Path) -> None:
     }
     for number, row in fresh.items():
         assert found.row(number, named=True) == row
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_workers_end_with_an_interrupted_sweep_and_what_is_flown_is_kept(
+    folder: Path, how: signal.Signals
+) -> None:
+    process = begun_sweep(folder, workers=2)
+    os.kill(process.pid, how)
+    assert process.wait(timeout=30) != 0
+    ended(process)
+    journal = (folder / "o" / JOURNAL).read_text()
+    assert journal.endswith("\n")
+    assert 5 <= journal.count("\n") - 1 < 120
+    with opened(folder / "o", read_plan(folder / "many.toml")) as kept:
+        assert len(kept.done) == journal.count("\n") - 1
+
+
+def test_an_interruption_waits_for_no_worker() -> None:
+    begin = time.monotonic()
+    with pytest.raises(SystemExit), executor(2) as pool:
+        futures = [pool.submit(time.sleep, 60.0) for _ in range(2)]
+        pool.submit(int).add_done_callback(lambda future: None)
+        while not all(future.running() for future in futures):
+            time.sleep(0.01)
+        raise SystemExit(143)
+    assert time.monotonic() - begin < 30.0  # of 60 s that each worker would sleep
+
+
+def test_what_a_killed_sweep_left_half_written_is_cleared(folder: Path) -> None:
+    """A kill before the first line leaves the lock and a part: the folder is the sweep's still."""
+    (folder / "o").mkdir()
+    (folder / "o" / ".lock").touch()
+    name = unfinished_name(".parquet").replace(f"-{os.getpid()}-", f"-{gone()}-")
+    (folder / "o" / name).write_text("half")
+    with opened(folder / "o", plan_of(folder)) as journal:
+        assert not journal.done
+    assert files(folder / "o") == {".lock", JOURNAL}
+
+
+def gone() -> int:
+    """Return the number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ('{"flight": 3}', f"line 3: lacks {BEND}"),
+        ("[1, 2]", "line 3: is no flight"),
+        ("{", "line 3: is not JSON"),
+        ("", "line 3: is not JSON"),
+        ('{"flight": 18, OTHERS}', "line 3: flight 18 is none of the sweep's 0 to 17"),
+        ('{"flight": -1, OTHERS}', "line 3: flight -1 is none of the sweep's"),
+        ('{"flight": true, OTHERS}', "line 3: flight True is none"),
+        ('{"flight": 0, OTHERS}', "line 3: duplicate flight 0"),
+        ('{"flight": 1, OTHERS, "loss": "much"}', "line 3: loss is 'much'"),
+        ('{"flight": 1, OTHERS, "seed": 0.5}', "line 3: seed is 0.5"),
+    ],
+)
+def test_a_journal_that_was_meddled_with_is_one_line(folder: Path, line: str, says: str) -> None:
+    plan = plan_of(folder)
+    entry = fly_planned(plan, planned_flights(plan)[0])
+    with opened(folder / "o", plan) as journal:
+        journal.add(entry)
+    others = json.dumps({k: v for k, v in entry.as_dict(plan.columns).items() if k != "flight"})
+    with (folder / "o" / JOURNAL).open("a") as file:
+        file.write(line.replace("OTHERS", others[1:-1]) + "\n")
+    with pytest.raises(InputError) as fault, opened(folder / "o", plan):
+        pass
+    assert says in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_a_sweep_in_as_few_words(folder: Path) -> None:
+    """From tables or a file, with no folder kept or one to go on in."""
+    table = {
+        "name": "s",
+        "run": str(folder / "push.toml"),
+        "configurations": ["uncompensated"],
+        "keep": ["loss"],
+        "vary": [{"key": "pilot.column.force_N", "values": [20.0, 40.0]}],
+    }
+    found = sweep(table, workers=1)
+    assert found.to_polars()["pilot.column.force_N"].to_list() == [20.0, 40.0]
+    assert (found.found, found.indices, found.limits) == (0, (), ())
+    kept = sweep(table, folder / "o", workers=1)
+    assert kept.to_polars().equals(found.to_polars())
+    assert sweep(table, folder / "o", workers=1).found == 2
 
 
 def test_two_sweeps_into_one_folder_are_one_line(folder: Path) -> None:
@@ -241,6 +333,8 @@ def changed(old: str, new: str) -> str:
         (changed('name = "s"', 'name = "s"\nsamples = 3'), "samples: is given with sobol"),
         (changed('name = "s"', 'name = "s"\ncase = "x"'), "case: no 'x'; known: push"),
         (changed('keep = ["loss"]', 'keep = ["los"]'), "keep.0: input should be"),
+        (changed(ASSUMED, "rig.controls.column.sensing.force_scal"), "vary[0].also: rig.controls"),
+        (changed(ASSUMED, "pilot.column.nothing"), "vary[0].also: pilot.column.nothing = 2e-05"),
         (changed("push.toml", "nothing"), "nothing: is no shipped run"),
         ('name = "s"\nrun = "push.toml"\n', "vary: is missing"),
         ('name = "s"\nrun = "push.toml"\nvary = 3\n', "each is written [[vary]]"),

@@ -32,6 +32,11 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     """Kill a command that has no time to clean up; its workers must end with it."""
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
+    ended(process)
+
+
+def ended(process: subprocess.Popen[bytes]) -> None:
+    """Wait until nothing of a command's group of processes is left."""
     patience = time.monotonic() + 30.0
     while True:
         try:
