@@ -54,7 +54,7 @@ def made(
     flown = nominal.flight is not None
     told = ("column", "dynamic")
     noise = {name: level for name, level in NOISE.items() if flown or name.startswith(told)}
-    real = real.model_copy(update={"noise": noise})
+    real = real.changed({"noise": noise})
     t, force = pushes(seed)
     rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
     (folder / "force.csv").write_text("time_s,column_force_N\n" + rows)
