@@ -37,7 +37,7 @@ class Given(Section):
         plain = {key: _plain(value) for key, value in values.items()}
         known_keys(plain, keys, name, "")
         for key, value in plain.items():
-            _refuse_huge(value, name, key)
+            _refuse_unreal(value, name, key)
         try:
             super().__init__(**plain)
         except ValidationError as error:
@@ -53,6 +53,7 @@ def _plain(value: Any) -> Any:
 
 S = TypeVar("S", bound=Section)
 LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
+SMALLEST = 1e-30  # nor any but zero smaller
 MOST_TOML_bytes = 2**20  # tomllib takes seconds for a MiB
 MOST_DOTS = 100  # in a dotted key; tomllib's time grows with their square
 
@@ -177,11 +178,12 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
     values = {}
     for key, given in table.items():
         value = given
-        _refuse_huge(value, file, f"{path}.{key}" if path else key)
         kind = section.model_fields[keys[key]].annotation
         dotted = f"{path}.{key}" if path else key
         if isinstance(kind, type) and issubclass(kind, Section):
             value = build(kind, value, file, dotted, d)
+        else:
+            _refuse_unreal(value, file, dotted)
         values[keys[key]] = value
     try:
         return section(**values)
@@ -221,11 +223,12 @@ def changed(
             kind = _section_of(fields[keys[key]].annotation)
             if kind is not None and isinstance(value, Mapping):
                 value = build(kind, dict(value), file, dotted, d)
-            _refuse_huge(value, file, dotted)
+            _refuse_unreal(value, file, dotted)
         elif isinstance(before, Section):
             value = changed(before, inner, file, dotted, d)
         elif isinstance(before, dict):
             value = {**before, **inner}
+            _refuse_unreal(inner, file, dotted)
         else:
             raise InputError(
                 file, f"{dotted}.{next(iter(inner))}", "leads through a value, not a table"
@@ -243,10 +246,15 @@ def _section_of(annotation: Any) -> type[Section] | None:
     return next((k for k in kinds if isinstance(k, type) and issubclass(k, Section)), None)
 
 
-def _refuse_huge(value: Any, file: object, key: str) -> None:
-    for number in value if isinstance(value, list) else [value]:
-        if isinstance(number, (int, float)) and LARGEST < abs(number) < float("inf"):
+def _refuse_unreal(value: Any, file: object, key: str) -> None:
+    values = value.values() if isinstance(value, dict) else value
+    for number in values if isinstance(value, (list, dict)) else [value]:
+        if not isinstance(number, (int, float)):
+            continue
+        if LARGEST < abs(number) < float("inf"):
             raise InputError(file, key, f"{_shown(number)} is larger than any real one")
+        if 0.0 < abs(number) < SMALLEST:
+            raise InputError(file, key, f"{_shown(number)} is smaller than any real one; give 0")
 
 
 def _first_fault(

@@ -34,11 +34,17 @@ def stage(function: F) -> F:
 
 
 def entry(function: F) -> F:
-    """Compile a function that Python calls, and keep the result on disk."""
+    """Compile a function that Python calls, and keep the result on disk.
+
+    Where no folder can be written (a read-only install without a writable home, and no
+    NUMBA_CACHE_DIR set) it is compiled at its first call in every process instead.
+    """
     chosen = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
         return cast(F, numba.njit(cache=True)(function))
+    except RuntimeError:  # numba's, for a function without a place for its cache
+        return cast(F, numba.njit(function))
     finally:
         config.CACHE_DIR = chosen
 

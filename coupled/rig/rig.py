@@ -27,7 +27,7 @@ from coupled.schema import Section, build, changed, grouped, known_keys, quantit
 class Rig(Section):
     """A control-loading rig, and the aircraft that it is coupled to.
 
-    Without `flight` it is a bench: q̄ is told, and there is no aircraft. `noise` gives
+    Without `flight` it is a bench: q̄ is given, and there is no aircraft. `noise` gives
     the standard deviation of a channel's white noise by the channel's name.
     """
 
@@ -186,12 +186,15 @@ def _check_converters(control: Control, file: object, path: str, d: str) -> None
     for name, scale in scales.items():
         if scale <= 0.0:
             raise InputError(file, f"{key}.{name}", "must be given where word_length_bits is")
-    if sensing.s1 * control.travel * sensing.deflection_scale > sensing.full_scale:
+    travel = control.travel * sensing.deflection_scale  # as the transducer's scale has it read
+    if sensing.s1 * travel > sensing.full_scale:
+        off = f" at deflection_scale = {sensing.deflection_scale:g}"
         raise InputError(
             file,
             f"{key}.s1_V_per_{d}",
-            f"full travel is {sensing.s1 * control.travel:.4g} V, beyond the converter's"
-            f" {sensing.full_scale:g} V; give at most {sensing.full_scale / control.travel:.4g}",
+            f"full travel reads {sensing.s1 * travel:.4g} V"
+            f"{off if sensing.deflection_scale != 1.0 else ''}, beyond the converter's"
+            f" {sensing.full_scale:g} V; give at most {sensing.full_scale / travel:.4g}",
         )
 
 

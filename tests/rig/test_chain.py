@@ -23,7 +23,7 @@ from coupled.rig.replay import (
 )
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_line, static_point
-from tests.support.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
 SCHEDULE = "controls.column.schedule"
 
@@ -151,10 +151,10 @@ def test_under_that_break_the_grip_moves_by_the_bend_alone() -> None:
 
 
 @given(
-    bend=st.floats(0.0, 1.55e-4),
-    breakout=st.floats(0.0, 200.0),
+    bend=amounts(1.55e-4),
+    breakout=amounts(200.0),
     at=st.floats(0.001, 0.1),
-    gradients=st.tuples(st.floats(0.0, 6400.0), st.floats(0.0, 6400.0)),
+    gradients=st.tuples(amounts(6400.0), amounts(6400.0)),
 )
 def test_f_mod_is_the_force_specified_less_that_of_the_loader(
     bend: float, breakout: float, at: float, gradients: tuple[float, float]
@@ -242,7 +242,7 @@ def test_the_reports_losses(deflection_in: float, gradient_lb_per_in: float, los
 
 def servo(changes: dict[str, Any], computed: np.ndarray, force: np.ndarray | float = 0.0) -> Any:
     rig = bench({"bend_m_per_N": 0.0, "controls.column.compensation.bend_m_per_N": 0.0, **changes})
-    rig = rig.model_copy(update={"frame_rate": 2000.0})
+    rig = rig.changed({"frame_rate_Hz": 2000.0})
     return replay_linkage(rig, "column", computed, np.zeros_like(computed) + force)
 
 

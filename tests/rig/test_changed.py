@@ -14,7 +14,7 @@ from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, read_rig, rig_from_table
 from coupled.schema import load_toml
-from tests.support.rigs import BENCH, bench
+from tests.support.rigs import BENCH, amounts, bench
 
 LOADER = "controls.column.loader"
 
@@ -43,7 +43,7 @@ def test_a_change_is_refused_as_in_a_file(changes: dict[str, Any], key: str, wor
     assert fault.value.file == "test-bench"
 
 
-@given(st.floats(0.1, 10.0), st.floats(0.0, 0.01), st.booleans())
+@given(st.floats(0.1, 10.0), amounts(0.01), st.booleans())
 def test_a_changed_rig_is_that_of_the_changed_file(mass: float, play: float, on: bool) -> None:
     changes = {
         f"{LOADER}.mass_kg": mass,

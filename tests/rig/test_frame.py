@@ -14,7 +14,7 @@ from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
 from coupled.record.record import Record
 from coupled.schema import build
-from tests.support.rigs import G_STIFF, K_REPORT, bench
+from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
 
 def run(
@@ -26,7 +26,7 @@ def run(
     seed: int = 0,
     frame_rate: float = 100.0,
 ) -> Record:
-    rig = bench(changes).model_copy(update={"frame_rate": frame_rate})
+    rig = bench(changes).changed({"frame_rate_Hz": frame_rate})
     if configuration:
         rig = configure(rig, configuration)
     profile = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[q])
@@ -67,9 +67,9 @@ def test_the_loader_does_not_depend_on_the_frame_rate() -> None:
 
 
 @given(
-    share=st.floats(0.0, 0.6),
+    share=amounts(0.6),
     force=st.floats(5.0, 150.0),
-    q=st.floats(0.0, 5000.0),
+    q=amounts(5000.0),
 )
 @settings(max_examples=25, deadline=None)
 def test_compensated_the_host_always_has_the_true_deflection(

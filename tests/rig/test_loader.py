@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupled.rig.replay import drive_loader
-from tests.support.rigs import bench, push
+from tests.support.rigs import amounts, bench, push
 
 M, C, K = 4.0, 75.0, 560.0
 PLAIN = {"bend_m_per_N": 0.0, "controls.column.compensation.bend_m_per_N": 0.0}
@@ -141,12 +141,11 @@ def test_it_converges_with_second_order_through_stick_slip_and_neutral(
 ) -> None:
     errors = []
     reference = None
-    for rate in (128_000.0, 16_000.0, 8_000.0, 4_000.0):
-        rig = bench({**PLAIN, **settings_, "damping_N_s_per_m": 20.0}).model_copy(
-            update={"frame_rate": rate, "loader_rate": rate}
-        )
+    for rate in (96_000.0, 16_000.0, 8_000.0, 4_000.0):
+        rig = bench({**PLAIN, **settings_, "damping_N_s_per_m": 20.0})
+        rig = rig.changed({"loader_rate_Hz": rate})
         x = push(rig, lambda t: 45.0 * np.sin(4.0 * t) + 10.0 * t, 3.0)
-        x = x[:: round(rate / 1000.0)]
+        x = x[::2]
         if reference is None:
             reference = x
         else:
@@ -165,11 +164,11 @@ def test_it_is_stable_where_an_explicit_scheme_is_not() -> None:
 @settings(max_examples=60, deadline=None)
 @given(
     mass=st.floats(0.2, 20.0),
-    damping=st.floats(0.0, 200.0),
-    friction=st.floats(0.0, 20.0),
-    breakaway=st.floats(0.0, 10.0),
-    breakout=st.floats(0.0, 20.0),
-    cubic=st.floats(0.0, 1e5),
+    damping=amounts(200.0),
+    friction=amounts(20.0),
+    breakaway=amounts(10.0),
+    breakout=amounts(20.0),
+    cubic=amounts(1e5),
     force=st.floats(-400.0, 400.0),
 )
 def test_released_it_never_gains_energy_nor_leaves_its_stops(

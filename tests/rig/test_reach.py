@@ -82,7 +82,7 @@ def test_the_grip_comes_to_the_reach_as_a_clamp_does() -> None:
 
 @pytest.mark.parametrize("configuration", ["uncompensated", "compensated"])
 def test_a_reach_never_makes_a_hand_stronger(configuration: Configuration) -> None:
-    rig = read_rig(shipped_rigs()["737"]).model_copy(update={"flight": None})
+    rig = read_rig(shipped_rigs()["737"]).changed({"flight": None})
     hand = {"kind": "doublet", "force_N": 900.0, "half_period_s": 0.4, "rise_s": 0.35}
     bent = configure(rig, configuration)
     free = pushed(bent, hand, q=15_000.0)["column_force_N"]
@@ -98,7 +98,7 @@ def test_every_rig_stands_still_at_the_reach(name: str) -> None:
     for control, data in rig.controls.items():
         pressures = data.schedule.dynamic_pressure
         for configuration in ("uncompensated", "compensated"):
-            made = configure(rig, configuration).model_copy(update={"flight": None})
+            made = configure(rig, configuration).changed({"flight": None})
             key = f"reach_{unit_of(control)}"
             hand = {"kind": "step", "force_N": 1500.0, key: 0.8 * data.travel}
             record = pushed(made, hand, control, 0.5 * (pressures[0] + pressures[-1]))

@@ -32,7 +32,7 @@ def test_a_rig_written_is_read_back_the_same(name: str, tmp_path: Path) -> None:
     path = tmp_path / "again.toml"
     path.write_text(rig_text(rig, "A copy.\nOf two lines."), encoding="utf-8")
     assert read_rig(path) == rig
-    noisy = rig.model_copy(update={"noise": {"column_force_N": 0.1}})
+    noisy = rig.changed({"noise": {"column_force_N": 0.1}})
     path.write_text(rig_text(noisy), encoding="utf-8")
     assert read_rig(path) == noisy
 
@@ -42,6 +42,17 @@ def test_a_rig_written_is_read_back_the_same(name: str, tmp_path: Path) -> None:
     [
         (f"{LOADER}.mass_kg", 0.0, "greater than 0"),
         (f"{LOADER}.mass_kg", "4", "valid number"),
+        (f"{LOADER}.mass_kg", True, "valid number"),
+        (f"{LOADER}.mass_kg", 1e-320, "smaller than any real one"),
+        (f"{LOADER}.bend_m_per_N", 5e-324, "smaller than any real one"),
+        (f"{LOADER}.arc_geometry", 1, "valid boolean"),
+        (f"{SCHEDULE}.total_gradient_N_per_m", [560.0, True], "valid number"),
+        (f"{SCHEDULE}.total_gradient_N_per_m", [1e-310, 560.0], "smaller than any real one"),
+        ("controls.column.travel_m", 1e-320, "smaller than any real one"),
+        ("controls.column.sensing.word_length_bits", True, "valid integer"),
+        ("controls.column.sensing.word_length_bits", 12.0, "valid integer"),
+        ("noise.column_force_N", True, "valid number"),
+        ("noise.column_force_N", 1e-320, "smaller than any real one"),
         (f"{LOADER}.damping_N_s_per_m", -1.0, "greater than or equal to 0"),
         (f"{LOADER}.bend_m_per_N", float("nan"), "finite"),
         (f"{LOADER}.bend_m_per_N", float("inf"), "finite"),
@@ -89,6 +100,20 @@ def test_a_fault_is_one_line_with_its_key(key: str, value: Any, says: str) -> No
     assert key.rsplit(".", maxsplit=1)[-1] in text
     assert says in text
     assert "\n" not in text
+
+
+def test_a_converter_is_held_against_what_the_scale_makes_of_the_travel() -> None:
+    """500 V/m on 0.1778 m is 88.9 V, and 222 V as a scale of 2.5 has it read: beyond 200 V."""
+    sensing = "controls.column.sensing"
+    scales = {"s1_V_per_m": 500.0, "s2_V_per_N": 0.2, "s3_V_per_N": 0.2}
+    table = {"word_length_bits": 12, "full_scale_V": 200.0, "deflection_scale": 2.5, **scales}
+    with pytest.raises(InputError) as caught:
+        bench({sensing: table})
+    assert "s1_V_per_m: full travel reads 222.2 V at deflection_scale = 2.5" in str(caught.value)
+    assert "beyond the converter's 200 V; give at most 449.9" in str(caught.value)
+    assert bench({sensing: {**table, "s1_V_per_m": 449.9}})
+    with pytest.raises(InputError, match=r"reads 213\.4 V, beyond"):
+        bench({sensing: {**table, "s1_V_per_m": 1200.0, "deflection_scale": 1.0}})
 
 
 @pytest.mark.parametrize("where", [LOADER, HOST])

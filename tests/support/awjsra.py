@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
 
 HOME = aircraft_folder() / "awjsra"
@@ -36,9 +37,9 @@ def validation() -> ModuleType:
 def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
     """Return the aircraft trimmed as its rig file says, but for what is given."""
     assert RIG.flight is not None
-    changes = {**flight, "properties": {**RIG.flight.properties, **(properties or {})}}
-    rig = RIG.model_copy(update={"flight": RIG.flight.model_copy(update=changes)})
-    return validation().trimmed(rig)
+    values = {**dict(RIG.flight), **flight}
+    values["properties"] = {**RIG.flight.properties, **(properties or {})}
+    return validation().trimmed(RIG.changed({"flight": Flight(**values)}))
 
 
 def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:

@@ -6,6 +6,8 @@ import copy
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 from numpy.typing import NDArray
 
 from coupled.rig.replay import drive_loader
@@ -50,12 +52,17 @@ def bench(changes: dict[str, Any] | None = None, table: dict[str, Any] = BENCH) 
     return rig_from_table(table, "test")
 
 
+def amounts(most: float) -> SearchStrategy[float]:
+    """Return a strategy for nought, or an amount that a rig may have, up to `most`."""
+    return st.just(0.0) | st.floats(1e-9 * most, most)
+
+
 def push(rig: Rig, force: Any, seconds: float, gradient: float = 560.0) -> NDArray[np.float64]:
-    """Return δc at every node, from rest, while `force` pushes: a constant, or of time."""
-    rate = rig.frame_rate * rig.substeps
-    fine = rig.model_copy(update={"frame_rate": rate, "loader_rate": rate})
-    times = np.arange(round(seconds * rate) + 1) / rate
+    """Return δc at 2 kHz, from rest, while `force` pushes: a constant, or of time."""
+    fine = rig.changed({"frame_rate_Hz": 2000.0})
+    frames = round(seconds * fine.frame_rate)
+    times = np.arange(frames * fine.substeps + 1) / (fine.frame_rate * fine.substeps)
     wanted = force(times) if callable(force) else force
     nodes = np.asarray(wanted, dtype=float) * np.ones_like(times)
-    zeros = np.zeros_like(times)
+    zeros = np.zeros(frames + 1)
     return drive_loader(fine, "column", nodes, zeros + gradient, zeros)[0]

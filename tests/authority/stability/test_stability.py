@@ -30,7 +30,7 @@ from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.support.rigs import BENCH, G_STIFF, K_REPORT, bench
+from tests.support.rigs import BENCH, G_STIFF, K_REPORT, amounts, bench
 from tests.test_cli import files
 
 MASS, DAMPING = 4.0, 75.0
@@ -132,7 +132,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
     mass=st.floats(0.5, 10.0),
     ratio=st.floats(0.05, 1.5),
     share=st.floats(0.05, 0.9),
-    belief=st.floats(0.0, 1.05),
+    belief=amounts(1.05),
     servo_Hz=st.floats(5.0, 60.0),
     frame_s=st.floats(0.002, 0.1),
     arm=st.floats(0.0, 3.0),

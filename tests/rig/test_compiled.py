@@ -1,0 +1,66 @@
+"""Compiled code is kept on disk where there is a place for it, and flies without one."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import coupled
+
+REPLAY = """
+import numpy as np
+from coupled.rig.replay import replay_schedule
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+rig = read_rig(shipped_rigs()["c172p"])
+print(replay_schedule(rig, "column", np.array([0.0]))[0])
+"""
+
+
+def replay(package: Path, **settings: str) -> subprocess.CompletedProcess[str]:
+    """Replay a schedule by a copy of the package whose folders take no files."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA_", "XDG_"))}
+    environment = {**kept, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", REPLAY]
+    return subprocess.run(
+        command,
+        env={**environment, **settings},
+        cwd=package.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def copy_of_the_package(to: Path) -> Path:
+    """Copy the package; a file stands where each room's cache would be, as on read-only media."""
+    source = Path(coupled.__file__).parent
+    package = shutil.copytree(
+        source, to / "coupled", ignore=shutil.ignore_patterns("__pycache__"), symlinks=True
+    )
+    for data in ("aircraft", "runs"):
+        (to / data).symlink_to(source.parent / data)
+    for room in [package, *package.rglob("*/")]:
+        if room.is_dir():
+            (room / "__pycache__").touch()
+    return package
+
+
+def test_without_a_place_for_the_cache_it_flies_from_memory(tmp_path: Path) -> None:
+    package = copy_of_the_package(tmp_path)
+    (package / "nowhere.txt").touch()
+    done = replay(package, HOME=str(package / "nowhere.txt"))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert float(done.stdout) > 0.0
+
+
+def test_a_cache_folder_that_is_set_is_used(tmp_path: Path) -> None:
+    package = copy_of_the_package(tmp_path)
+    (package / "nowhere.txt").touch()
+    chosen = tmp_path / "cache"
+    done = replay(package, HOME=str(package / "nowhere.txt"), NUMBA_CACHE_DIR=str(chosen))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(chosen.rglob("*.nbi"))
