@@ -29,8 +29,8 @@ from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.schema import load_toml
+from tests.support.commands import coupled, files
 from tests.support.processes import begun, kill
-from tests.test_cli import coupled, files
 
 RECORDS, SEED = 3, 3
 

@@ -22,28 +22,11 @@ from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 from coupled.resources import shipped_runs
 from coupled.schema import build
-from tests.test_cli import coupled, files
-
-BENCH = """
-name = "push"
-card = "A push on the bench."
-rig = "bench"
-duration_s = 2.0
-configurations = ["rigid", "compensated"]
-
-[bench]
-time_s = [0.0]
-dynamic_pressure_Pa = [3000.0]
-
-[pilot.column]
-kind = "ramp"
-start_s = 0.5
-force_N = 40.0
-ramp_s = 1.0
-"""
+from tests.support.commands import coupled, files
+from tests.support.runs import PUSH
 
 
-def written(folder: Path, *expectations: str, text: str = BENCH) -> Path:
+def written(folder: Path, *expectations: str, text: str = PUSH) -> Path:
     path = folder / "push.toml"
     path.write_text(text + "".join(f"\n[[expect]]\n{each}\n" for each in expectations))
     return path

@@ -18,9 +18,9 @@ from coupled.gap.smooth import smoothed
 from coupled.gap.words import in_words
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
-from tests.reference.test_records import FOUNDERS, OWN, RECORDS, available
+from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
-from tests.test_cli import ROOT, coupled
+from tests.support.records import FOUNDERS, OWN, RECORDS, available
 
 SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "coulomb_friction", {"friction_N": 2.0}),

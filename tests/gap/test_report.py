@@ -17,9 +17,9 @@ from coupled.gap.words import in_words
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.reference.test_records import FOUNDERS
+from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
-from tests.test_cli import coupled
+from tests.support.records import FOUNDERS
 
 REAL = FOUNDERS.parent / "real"
 

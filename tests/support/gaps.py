@@ -15,7 +15,7 @@ from coupled.flight.runfile import read_run
 from coupled.gap.effects import BY_NAME, apply
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from tests.reference.test_records import NOISE
+from tests.support.records import NOISE
 from tests.support.rigs import BENCH, bench
 
 LONG_s = 40.0
