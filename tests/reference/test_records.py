@@ -137,8 +137,8 @@ def test_surface_and_airframe(case: Case) -> None:
         flown.append(airframe.motion())
         airframe.step((command, 0.0, 0.0))
     motion = np.array(flown)
-    names = ("dynamic_pressure_Pa", "load_factor", "elevator_rad", "pitch_rate_rad_per_s")
-    names += ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
+    names = ["dynamic_pressure_Pa", "load_factor", "elevator_rad", "pitch_rate_rad_per_s"]
+    names += ["alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m"]
     for i, name in enumerate(names):
         left = case[name] - motion[:, i]
         assert rms(left) <= 1.1 * white(left), name
