@@ -337,6 +337,7 @@ def cluster(folder: Path, workers: int) -> Iterator[str]:
         process.communicate(timeout=30)
 
 
+@pytest.mark.slow
 def test_a_cluster_of_two_workers_makes_the_same_table(folder: Path) -> None:
     plan = plan_of(folder)
     with (
