@@ -1,7 +1,35 @@
-"""Settings of all tests."""
+"""Settings of all tests: how many run at once, and where their compiled physics is kept."""
 
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 # A machine that does other work is no fault of the code: the suite's own time is watched instead.
 settings.register_profile("coupled", deadline=None)
 settings.load_profile("coupled")
+
+WORKER = os.environ.get("PYTEST_XDIST_WORKER")
+if WORKER:
+    # Two processes that compile into one cache at once can mistake each other's code.
+    kept = Path(__file__).parents[1] / ".pytest_cache" / "kernels" / WORKER
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(kept))
+    # A worker has one core: threads of linear algebra would fight for it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+MOST_WORKERS = 4
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return how many workers share the whole suite, one a core; a chosen part of it needs none.
+
+    Nor do benchmarks: what runs beside a measurement is measured, too.
+    """
+    chosen = config.args_source is not pytest.Config.ArgsSource.TESTPATHS
+    measuring = config.option.markexpr == "bench"
+    if chosen or measuring or config.option.keyword or config.option.capture == "no":
+        return 0
+    return min(MOST_WORKERS, len(os.sched_getaffinity(0)))

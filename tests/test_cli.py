@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,43 +14,31 @@ from coupled.plots.flights import draw_record
 from coupled.plots.saving import save
 from coupled.record.channels import record_channels
 from coupled.record.record import read_record
-
-ROOT = Path(__file__).parents[1]
-SHORT = """
-name = "short"
-card = "A short pull."
-rig = "report-column"
-duration_s = 2.0
-configurations = ["rigid", "compensated"]
-
-[pilot.column]
-kind = "step"
-start_s = 0.2
-force_N = 40.0
-"""
-
-
-def coupled(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
-    return subprocess.run(
-        [sys.executable, "-m", "coupled", *words],
-        check=False,
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-
-
-def files(folder: Path) -> set[str]:
-    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+from tests.support.commands import ROOT, coupled, coupled_anew, files
+from tests.support.runs import SHORT
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "short.toml").write_text(SHORT)
     return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["compare", "short.toml", "--no-figure"], 0),
+        (["check", "short.toml"], 2),
+        (["fly", "short.toml", "-o", "a.xls"], 2),
+        (["nonsense"], 2),
+    ],
+    ids=lambda given: given[0] if isinstance(given, list) else str(given),
+)
+def test_a_shell_meets_what_these_tests_meet(folder: Path, words: list[str], code: int) -> None:
+    """Most tests give a command in their own process; a Python of its own says the same."""
+    here, anew = coupled(folder, *words), coupled_anew(folder, *words)
+    assert (here.returncode, here.stdout, here.stderr) == (code, anew.stdout, anew.stderr)
+    assert anew.returncode == code
 
 
 def test_help_has_examples_and_takes_no_physics_to_show(folder: Path) -> None:
@@ -109,7 +96,7 @@ def test_a_flight_that_ends_early_says_so_and_exits_with_1(folder: Path) -> None
     text = SHORT.replace("force_N = 40.0", "force_N = -80.0").replace("= 2.0", "= 30.0")
     text += '\n[[case]]\nlabel = "low"\nrig = { "flight.altitude_m" = 60.0 }\n'
     (folder / "short.toml").write_text(text)
-    done = coupled(folder, "fly", "short.toml", "-o", "r.csv")
+    done = coupled_anew(folder, "fly", "short.toml", "-o", "r.csv")
     assert done.returncode == 1
     assert "ended early: the aircraft met the ground at" in done.stderr
     assert json.loads((folder / "r.manifest.json").read_text())["ended_early"]["time_s"] > 0.5

@@ -1,11 +1,10 @@
 """Every command and every output printed in the README, run and compared.
 
-`python tests/test_readme.py` writes the outputs anew after a change that is meant.
+`python -m tests.test_readme` writes the outputs anew after a change that is meant.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import subprocess
@@ -15,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.support.commands import ROOT, coupled
+
 README = ROOT / "README.md"
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.M | re.S)
 PYTHON = re.compile(r"^```python\n(.*?)^```\n+prints\n+```text\n(.*?)^```$", re.M | re.S)
@@ -35,18 +35,8 @@ def run(command: str, folder: Path) -> str:
     """Return what a command prints, as on a terminal of 80 columns."""
     words = shlex.split(command)
     assert words[0] == "coupled"
-    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "TERM": "dumb"}
-    done = subprocess.run(
-        [sys.executable, "-m", "coupled", *words[1:]],
-        check=False,
-        cwd=folder,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=300,
-    )
-    return trimmed(done.stdout)
+    done = coupled(folder, *words[1:])
+    return trimmed(done.stdout + done.stderr)
 
 
 def run_python(code: str, folder: Path) -> str:

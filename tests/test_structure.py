@@ -182,3 +182,13 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     graph = {name: depends_on(path, set(modules)) - {name} for name, path in modules.items()}
     found = circles(graph)
     assert found <= KNOWN_CIRCLES, [sorted(circle) for circle in found - KNOWN_CIRCLES]
+
+
+TESTS = sorted(Path(__file__).parent.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda p: str(p.relative_to(PACKAGE.parent)))
+def test_what_tests_share_lies_in_their_support(path: Path) -> None:
+    """No test module imports another: who moves one would break it unseen."""
+    for name in imports(path):
+        assert not name.startswith("tests.") or name.startswith("tests.support"), name

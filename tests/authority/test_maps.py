@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +13,7 @@ from coupled.cli import app
 from coupled.record.csvfile import read_columns
 from coupled.resources import find, shipped_rigs
 from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled
 from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
@@ -80,14 +78,7 @@ def test_a_map_of_nothing_is_one_line_and_writes_nothing(
     tmp_path: Path, words: list[str], says: str
 ) -> None:
     (tmp_path / "alien.csv").write_text("time_s,column_force_N\n0.0,1.0\n0.1,1.0\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "coupled", "map", *words],
-        check=False,
-        cwd=tmp_path,
-        env={**os.environ, "COLUMNS": "200", "NO_COLOR": "1"},
-        capture_output=True,
-        text=True,
-    )
+    done = coupled(tmp_path, "map", *words, columns=200)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1

@@ -8,28 +8,18 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import pytest
 
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.runfile import read_run
+from tests.support.runs import shortened
 
 pytestmark = pytest.mark.bench
 
 FRAMES = 4800
 ROUNDS = 9
-
-
-def of(run: str, controls: int, frames: int) -> Manoeuvre:
-    """Return a shipped run with its first controls only, of so many frames."""
-    scenario = read_run(run)[0]
-    names = list(scenario.rig.controls)[:controls]
-    rig = scenario.rig.changed({"controls": {name: scenario.rig.controls[name] for name in names}})
-    pilots = {name: pilot for name, pilot in scenario.pilots.items() if name in names}
-    return replace(scenario, rig=rig, pilots=pilots, duration_s=frames / rig.frame_rate)
 
 
 def flown_s(scenario: Manoeuvre) -> float:
@@ -52,7 +42,7 @@ def bare_s(scenario: Manoeuvre) -> float:
 @pytest.mark.parametrize(("controls", "most"), [(1, 1.5), (3, 2.0)])
 @pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
 def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, most: float) -> None:
-    long, short = of(run, controls, FRAMES), of(run, controls, 1)
+    long, short = shortened(run, controls, FRAMES), shortened(run, controls, 1)
     flown_s(short)
     bare, flown, start = [], [], []
     ratio = most + 1.0
@@ -73,13 +63,13 @@ def test_a_60_s_flight_and_its_record_fit_in_60_mb(tmp_path: object) -> None:
     code = f"""
 import resource, sys
 from pathlib import Path
-from tests.benchmarks.test_frame_cost import of
+from tests.support.runs import shortened
 from coupled.flight.loop import fly
 from coupled.record.record import write_record
-fly(of("three-controls", 3, 10))
-write_record(fly(of("three-controls", 3, 10)), Path({str(tmp_path)!r}) / "a.csv")
+fly(shortened("three-controls", 3, 10))
+write_record(fly(shortened("three-controls", 3, 10)), Path({str(tmp_path)!r}) / "a.csv")
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-write_record(fly(of("three-controls", 3, 7200)), Path({str(tmp_path)!r}) / "b.csv")
+write_record(fly(shortened("three-controls", 3, 7200)), Path({str(tmp_path)!r}) / "b.csv")
 print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 """
     done = subprocess.run(
@@ -90,8 +80,8 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 
 
 def test_a_second_start_takes_under_2_s() -> None:
-    code = "from coupled.flight.loop import fly"
-    code += "from tests.benchmarks.test_frame_cost import of; fly(of('pull-up-c172p', 1, 2))"
+    code = "from coupled.flight.loop import fly;"
+    code += "from tests.support.runs import shortened; fly(shortened('pull-up-c172p', 1, 2))"
     taken = []
     for _ in range(4):
         start = time.perf_counter()

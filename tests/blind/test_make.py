@@ -23,14 +23,14 @@ from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.errors import InputError
-from coupled.gap.effects import BY_NAME
+from coupled.gap.library import BY_NAME
 from coupled.record.record import read_record
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 from coupled.schema import load_toml
+from tests.support.commands import coupled, files
 from tests.support.processes import begun, kill
-from tests.test_cli import coupled, files
 
 RECORDS, SEED = 3, 3
 

@@ -15,7 +15,7 @@ from coupled.blind.trials.result import Share
 from coupled.blind.trials.score import score, share
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
 from coupled.errors import InputError
-from tests.test_cli import coupled, files
+from tests.support.commands import coupled, files
 
 Table = dict[str, Any]
 FACTOR = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,6 @@ def test_without_s2_the_feel_is_not_known_and_a_soft_structure_tells_nothing() -
     assert found is not None
     assert found.felt is None
     place = "controls.column"
-    stiff = {f"{place}.schedule.total_gradient_N_per_m": [560.4] * 3 + [1.1 / K]}
+    stiff: dict[str, Any] = {f"{place}.schedule.total_gradient_N_per_m": [560.4] * 3 + [1.1 / K]}
     stiff |= {f"{place}.{which}.bend_m_per_N": 0.0 for which in ("loader", "compensation")}
     assert expected(fit, None, report_rig().changed(stiff).controls["column"]) is None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.authority.compare import compare
+from coupled.authority.compare import Outcome, compare
 from coupled.calibration.accuracy import deflection_off, felt_off
 from coupled.calibration.assumed import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, _meters_rig, _null, take_readings
@@ -20,6 +20,7 @@ from coupled.calibration.estimate import perfect_instruments, usual_instruments
 from coupled.calibration.plan import stations
 from coupled.errors import InputError
 from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Configuration
 from coupled.flight.pilot.base import Start
 from coupled.flight.runfile import read_run
 from coupled.record.channels import ControlName
@@ -91,7 +92,8 @@ def test_the_bench_is_the_rig_that_flies() -> None:
     pressure = flown["dynamic_pressure_Pa"]
     action = scenario.pilots["column"].act(rig, "column", Start(0.0))
     frames = scenario.frames
-    times = np.arange(frames * rig.substeps + 1) * (1.0 / (rig.frame_rate * rig.substeps))
+    nodes = np.arange(frames * rig.substeps + 1, dtype=np.float64)
+    times = nodes * (1.0 / (rig.frame_rate * rig.substeps))
     assert action.force is not None
     response = run_control(rig, "column", action.force(times), pressure)
     np.testing.assert_array_equal(response.computed, flown["column_computed_m"])
@@ -201,7 +203,7 @@ def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
     assert found.accused < 0.03
 
 
-def flown(rig: Rig, configuration: str) -> Any:
+def flown(rig: Rig, configuration: Configuration) -> Outcome:
     base = read_run("worst-case")[0]
     [flight] = compare([replace(base, rig=rig, configurations=(configuration,))])
     return flight.outcome

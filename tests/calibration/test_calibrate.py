@@ -97,9 +97,14 @@ def test_a_control_held_at_one_deflection_tells_k_by_its_gradients() -> None:
 
 def test_a_supply_against_the_hand_is_named() -> None:
     good = readings(*grid())
-    null = {"null_v1": [9.0, 8.0], "null_v2": [5.0, -4.0], "null_v3": [5.0, 4.0]}
-    arrays = {name: np.array(values) for name, values in null.items()}
-    r = replace(good, null_row=np.array([27, 28]), null_side=np.ones(2), **arrays)
+    r = replace(
+        good,
+        null_row=np.array([27, 28]),
+        null_side=np.ones(2),
+        null_v1=np.array([9.0, 8.0]),
+        null_v2=np.array([5.0, -4.0]),
+        null_v3=np.array([5.0, 4.0]),
+    )
     with pytest.raises(InputError, match="row 28: v2_V: has another sign than v3"):
         fit(r)
 

@@ -17,9 +17,9 @@ from coupled.plots.readings import plus_minus
 from coupled.plots.saving import save
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled, files
 from tests.support.readings import CSV, K
 from tests.support.rigs import bench as bench_rig
-from tests.test_cli import coupled, files
 
 
 @pytest.fixture

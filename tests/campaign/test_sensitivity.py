@@ -18,7 +18,7 @@ from coupled.cli import app
 from coupled.errors import InputError
 from coupled.parallel import Here
 from coupled.resources import shipped_sweeps
-from tests.campaign.test_check import BENCH
+from tests.support.runs import PUSH
 
 K_LOW, K_HIGH, SLOPE_LOW, SLOPE_HIGH = 4e-5, 1.6e-4, 0.5, 1.0
 SWEEP = f"""
@@ -126,7 +126,7 @@ def test_flown_losses_have_the_indices_of_their_closed_form(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "push.toml").write_text(BENCH + STRAIGHT)
+    (tmp_path / "push.toml").write_text(PUSH + STRAIGHT)
     (tmp_path / "s.toml").write_text(SWEEP)
     plan = read_plan(tmp_path / "s.toml")
     assert len(planned_flights(plan)) == 64 * 4
@@ -145,7 +145,7 @@ def test_flown_losses_have_the_indices_of_their_closed_form(
 
 @pytest.mark.parametrize("samples", ["100", "4"])
 def test_samples_are_a_power_of_two(tmp_path: Path, samples: str) -> None:
-    (tmp_path / "push.toml").write_text(BENCH + STRAIGHT)
+    (tmp_path / "push.toml").write_text(PUSH + STRAIGHT)
     (tmp_path / "s.toml").write_text(SWEEP.replace("samples = 64", f"samples = {samples}"))
     with pytest.raises(InputError, match="samples: is a power of two from 8 with sensitivity"):
         read_plan(tmp_path / "s.toml")

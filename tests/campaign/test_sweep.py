@@ -28,9 +28,9 @@ from coupled.files import unfinished_name
 from coupled.parallel import Here, executor
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
-from tests.campaign.test_check import BENCH
+from tests.support.commands import coupled, files
 from tests.support.processes import begun, ended, kill
-from tests.test_cli import SHORT, coupled, files
+from tests.support.runs import PUSH, SHORT
 
 BEND = "rig.controls.column.loader.bend_m_per_N"
 ASSUMED = "rig.controls.column.compensation.bend_m_per_N"
@@ -67,7 +67,7 @@ spread = "log"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "push.toml").write_text(BENCH)
+    (tmp_path / "push.toml").write_text(PUSH)
     (tmp_path / "short.toml").write_text(SHORT)
     (tmp_path / "s.toml").write_text(GRID)
     return tmp_path
@@ -377,7 +377,7 @@ def test_another_sweep_does_not_go_on_in_a_folder(folder: Path) -> None:
     other = plan_of(folder, changed("2e-5", "3e-5"))
     with pytest.raises(InputError, match="holds another sweep"):
         flown(other, folder / "o")
-    (folder / "push.toml").write_text(BENCH.replace("ramp_s = 1.0", "ramp_s = 0.9"))
+    (folder / "push.toml").write_text(PUSH.replace("ramp_s = 1.0", "ramp_s = 0.9"))
     with pytest.raises(InputError, match="holds another sweep"):
         flown(plan_of(folder), folder / "o")
     (folder / "o" / JOURNAL).write_text("nonsense\n")
@@ -431,6 +431,7 @@ def cluster(folder: Path, workers: int) -> Iterator[str]:
         process.communicate(timeout=30)
 
 
+@pytest.mark.slow
 def test_a_cluster_of_two_workers_makes_the_same_table(folder: Path) -> None:
     plan = plan_of(folder)
     with (

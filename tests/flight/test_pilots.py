@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.loop import fly
@@ -46,7 +47,7 @@ def scenario(
     return read_run(str(path))[0]
 
 
-def measured(record: Record, flown: np.ndarray, pilot: Track) -> tuple[float, float]:
+def measured(record: Record, flown: NDArray[np.float64], pilot: Track) -> tuple[float, float]:
     """Return crossover in rad/s and phase margin in rad of the open loop, Y/(R − Y).
 
     From the amplitudes at the sines of the target over the record's last whole period.
@@ -56,8 +57,8 @@ def measured(record: Record, flown: np.ndarray, pilot: Track) -> tuple[float, fl
     waves = [wave(rate * t) for rate in pilot.sine_rates_rad_per_s for wave in (np.sin, np.cos)]
     basis = np.column_stack((np.ones(rows), t - t.mean(), *waves))
 
-    def amplitudes(signal: np.ndarray) -> np.ndarray:
-        found = np.linalg.lstsq(basis, signal[-rows:], rcond=None)[0][2:]
+    def amplitudes(signal: NDArray[np.float64]) -> NDArray[np.complex128]:
+        found: NDArray[np.float64] = np.linalg.lstsq(basis, signal[-rows:], rcond=None)[0][2:]
         return found[::2] + 1j * found[1::2]
 
     y, r = amplitudes(flown), amplitudes(pilot.target(record.time_s))

@@ -30,8 +30,8 @@ from coupled.plots.signals import SIGNALS
 from coupled.plots.signatures import draw_signature
 from coupled.record.record import Record, write_record
 from coupled.rig.rig import Rig
+from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
-from tests.test_cli import coupled
 
 Case = tuple[Rig, Record, tuple[Output, ...]]
 UNIT = re.compile(r", (%|%/s|1|°|°/s|g|N|N/m|m/s|m/s²|mm|mm/s|cm|cm/s|µm|kPa|kPa/s|s|Hz)$")

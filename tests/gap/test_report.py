@@ -15,9 +15,9 @@ from coupled.gap.library import BY_NAME
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
-from tests.reference.test_records import FOUNDERS
+from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
-from tests.test_cli import coupled
+from tests.support.records import FOUNDERS
 
 REAL = FOUNDERS.parent / "real"
 
@@ -27,6 +27,7 @@ def without(record: Record, *names: str) -> Record:
     return Record(tuple(keep), np.column_stack([record[name] for name in keep]))
 
 
+@pytest.mark.slow
 def test_three_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     effect = {"backlash": {"play_{d}": 1.2e-4}}
@@ -135,7 +136,8 @@ def test_a_folder_is_diagnosed_by_one_command(tmp_path: Path) -> None:
     (tmp_path / "rigs").mkdir()
     (tmp_path / "rigs" / "mine.toml").write_text(rig_text(nominal, "a bench"))
     for name, effect in (("a", {"backlash": {"play_{d}": 1e-3}}), ("b", {})):
-        write_record(made(tmp_path, nominal, effect, 4), tmp_path / f"{name}.csv")
+        record = made(tmp_path, nominal, effect, 4)
+        write_record(record.between(0.0, 15.0), tmp_path / f"{name}.csv")
     (tmp_path / "records.toml").write_text('a = "mine"\nb = "mine"\n')
     done = coupled(tmp_path, "diagnose", ".", "--output", "found")
     assert done.returncode == 0, done.stderr

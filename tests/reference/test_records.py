@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,29 +29,9 @@ from coupled.rig.replay import (
 )
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from tests.support.records import FOUNDERS, NOISE, OWN, RECORDS, available
 
 Floats = NDArray[np.float64]
-FOUNDERS = Path(__file__).parents[3] / "shared" / "rig"
-OWN = "flown here"
-RECORDS = {
-    "clean-c172p": "c172p",
-    "clean-737-compensated": "737-compensated",
-    "clean-bench": "bench",
-}
-NOISE = {
-    "column_force_N": 0.15,
-    "column_computed_m": 2e-5,
-    "column_deflection_m": 4e-5,
-    "column_modifying_force_N": 0.05,
-    "dynamic_pressure_Pa": 1.0,
-    "elevator_rad": 1.5e-4,
-    "pitch_rate_rad_per_s": 2e-4,
-    "alpha_rad": 4e-4,
-    "pitch_rad": 2e-4,
-    "load_factor": 4e-3,
-    "true_airspeed_m_per_s": 0.05,
-    "altitude_m": 0.2,
-}
 
 
 @dataclass(frozen=True)
@@ -62,10 +41,6 @@ class Case:
 
     def __getitem__(self, channel: str) -> Floats:
         return self.record[channel]
-
-
-def available() -> list[str]:
-    return [OWN, *(RECORDS if FOUNDERS.is_dir() else [])]
 
 
 @pytest.fixture(scope="module", params=available())
@@ -162,8 +137,8 @@ def test_surface_and_airframe(case: Case) -> None:
         flown.append(airframe.motion())
         airframe.step((command, 0.0, 0.0))
     motion = np.array(flown)
-    names = ("dynamic_pressure_Pa", "load_factor", "elevator_rad", "pitch_rate_rad_per_s")
-    names += ("alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m")
+    names = ["dynamic_pressure_Pa", "load_factor", "elevator_rad", "pitch_rate_rad_per_s"]
+    names += ["alpha_rad", "pitch_rad", "true_airspeed_m_per_s", "altitude_m"]
     for i, name in enumerate(names):
         left = case[name] - motion[:, i]
         assert rms(left) <= 1.1 * white(left), name

@@ -16,7 +16,7 @@ from coupled.gap.effect import apply
 from coupled.gap.library import BY_NAME
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from tests.reference.test_records import NOISE
+from tests.support.records import NOISE
 from tests.support.rigs import BENCH, bench
 
 LONG_s = 40.0

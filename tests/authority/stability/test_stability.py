@@ -30,8 +30,8 @@ from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
+from tests.support.commands import files
 from tests.support.rigs import BENCH, G_STIFF, K_REPORT, amounts, bench
-from tests.test_cli import files
 
 MASS, DAMPING = 4.0, 75.0
 

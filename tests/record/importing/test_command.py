@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +11,7 @@ import pytest
 from coupled.cli import app
 from coupled.errors import InputError
 from coupled.record.record import read_record
+from tests.support.commands import coupled
 from tests.support.logs import (
     FORCE_N,
     MAP,
@@ -21,18 +19,6 @@ from tests.support.logs import (
     edited,
     imported,
 )
-
-
-def coupled(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "coupled", *words],
-        check=False,
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "80", "NO_COLOR": "1"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
 
 
 def test_the_command_writes_a_record_and_says_what_it_thinks(tmp_path: Path) -> None:

@@ -1,0 +1,95 @@
+"""Commands given as a user gives them: in a folder, with words, on a terminal of 80 columns."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+from unittest.mock import patch
+
+from coupled.cli import main
+
+ROOT = Path(__file__).parents[2]
+TERMINAL = {"COLUMNS": "80", "NO_COLOR": "1"}
+HANDLED = (signal.SIGINT, signal.SIGTERM)
+
+
+def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.CompletedProcess[str]:
+    """Give a command in this process, where all is imported and compiled; return what came.
+
+    Standard output and error are files under the command, also for a library in C.
+    """
+    with (
+        patch.dict(os.environ, {**TERMINAL, "COLUMNS": str(columns)}),
+        patch.object(sys, "argv", ["coupled", *words]),
+        _standing_in(folder),
+        _to_file("stdout", 1) as out,
+        _to_file("stderr", 2) as err,
+    ):
+        try:
+            main()
+            code = 0
+        except SystemExit as end:
+            assert isinstance(end.code, int)
+            code = end.code
+        texts = [_read(file) for file in (out, err)]
+    return subprocess.CompletedProcess(words, code, *texts)
+
+
+def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Give a command to a Python of its own, as from a shell; return what came."""
+    return subprocess.run(
+        [sys.executable, "-m", "coupled", *words],
+        check=False,
+        cwd=folder,
+        env={**os.environ, **TERMINAL},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def files(folder: Path) -> set[str]:
+    """Return the files that lie in a folder and below."""
+    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+
+
+@contextmanager
+def _standing_in(folder: Path) -> Iterator[None]:
+    """Stand in a folder; put back what a command sets for its whole process."""
+    before, handlers = Path.cwd(), [signal.getsignal(each) for each in HANDLED]
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+        for each, handler in zip(HANDLED, handlers, strict=True):
+            signal.signal(each, handler)
+
+
+@contextmanager
+def _to_file(name: str, descriptor: int) -> Iterator[TextIO]:
+    """Turn a standard stream, and what lies under it, to a file."""
+    stream: TextIO = getattr(sys, name)
+    stream.flush()
+    kept = os.dup(descriptor)
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as file:
+        os.dup2(file.fileno(), descriptor)
+        try:
+            with patch.object(sys, name, file):
+                yield file
+        finally:
+            os.dup2(kept, descriptor)
+            os.close(kept)
+
+
+def _read(file: TextIO) -> str:
+    file.flush()
+    file.seek(0)
+    return file.read()

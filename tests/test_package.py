@@ -1,0 +1,59 @@
+"""What is built from a clone: the package, its aircraft and runs, and no more."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+from tests.support.commands import ROOT
+
+pytestmark = pytest.mark.slow
+
+
+def tracked(*folders: str) -> set[str]:
+    """Return the files of these folders that stand under version control."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", *folders], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    return {name for name in listed.stdout.split("\0") if name}
+
+
+def test_a_wheel_holds_the_package_its_aircraft_and_runs(tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(tmp_path)]
+    subprocess.run([*pip, str(ROOT)], check=True, timeout=300)
+    [wheel] = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+        archive.extractall(tmp_path / "installed")
+    wanted = tracked("coupled")
+    wanted |= {f"coupled/shipped/{name}" for name in tracked("aircraft", "runs")}
+    assert names == {name for name in wanted if "/withheld/" not in name}
+    assert "coupled/py.typed" in names
+    shipped = "from coupled.resources import *; print(len(shipped_runs()), len(shipped_rigs()))"
+    done = subprocess.run(
+        [sys.executable, "-c", shipped],
+        cwd=tmp_path / "installed",
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    runs, rigs = map(int, done.stdout.split())
+    assert runs == len([n for n in names if PurePosixPath(n).match("shipped/runs/*.toml")])
+    assert rigs == len([n for n in names if PurePosixPath(n).match("shipped/aircraft/*/*.toml")])
+
+
+def test_a_source_distribution_holds_what_a_clone_has(tmp_path: Path) -> None:
+    build = "import sys, hatchling.build; hatchling.build.build_sdist(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", build, str(tmp_path)], cwd=ROOT, check=True, timeout=300)
+    [archive] = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as files:
+        names = {name.partition("/")[2] for name in files.getnames()}
+    folders = ("coupled", "aircraft", "runs", "tests", "docs", "README.md", "pyproject.toml")
+    missing = tracked(*folders) - names
+    assert missing == set()
+    assert not {name for name in names if "__pycache__" in name or name.endswith(".pyc")}
