@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, give_json, out, progress, say
-from coupled.errors import InputError
-from coupled.files import check_target, write_text
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.errors import InputError, shown
+from coupled.files import check_target, check_targets, write_text
+from coupled.outputs import Outputs
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
 
@@ -76,13 +77,15 @@ def diagnose(
     whole, read = _diagnose(records, rig_file, name)
     if power:
         whole.found["power"] = _power(whole)
+    with Outputs() as outputs:
+        if improve is not None:
+            _write_improved(outputs.at(improve), whole, rig_file, read)
+        if plots is not None:
+            _draw(outputs.folder(plots), whole, read)
+        keep_json(whole.found, json_file, outputs)
     if json_file != "-":
-        _print(whole)
-    if improve is not None:
-        _write_improved(improve, whole, rig_file, read, json_file != "-")
-    if plots is not None:
-        _draw(plots, whole, read, json_file != "-")
-    give_json(whole.found, json_file)
+        _print(whole, improve, drawn)
+    print_json(whole.found, json_file)
 
 
 def _control(word: str, file: Path) -> ControlName:
@@ -119,7 +122,7 @@ def _power(whole: Diagnosis) -> list[dict[str, Any]]:
     return power(whole.choice.settled.rig, whole.control, whole.outputs)
 
 
-def _print(whole: Diagnosis) -> None:
+def _print(whole: Diagnosis, improve: Path | None, drawn: list[Path]) -> None:
     from coupled.cli.tables.gaps import print_closed_loop, print_power, print_stages
     from coupled.gap.words import in_words
 
@@ -128,19 +131,21 @@ def _print(whole: Diagnosis) -> None:
     print_closed_loop(out, whole.found)
     if "power" in whole.found:
         print_power(out, whole.found["power"])
+    if improve is not None:
+        say(f"improved rig: {improve}")
+    for figure in drawn:
+        say(f"figure: {figure}")
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record], aloud: bool
+    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
     from coupled.gap.words import in_words
     from coupled.rig.rigwrite import rig_text
 
-    names = ", ".join(Path(name).name for name in records)
-    remark = f"{rig_file.name} with what was found in {names}:\n"
+    names = ", ".join(shown(Path(name).name) for name in records)
+    remark = f"{shown(rig_file.name)} with what was found in {names}:\n"
     write_text(path, rig_text(whole.improved, remark + in_words(whole.found, whole.control)))
-    if aloud:
-        say(f"improved rig: {path}")
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:
@@ -152,20 +157,19 @@ def _plot_targets(folder: Path | None) -> list[Path]:
     return [folder / name for name in FIGURES]
 
 
-def _draw(folder: Path, whole: Diagnosis, records: dict[str, Record], aloud: bool) -> None:
+def _draw(folder: Path, whole: Diagnosis, records: dict[str, Record]) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
     for file, figure in draw_diagnosis(whole, records).items():
         save(figure, folder / file)
-        if aloud:
-            say(f"figure: {folder / file}")
 
 
 def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None:
     """Diagnose every record of a folder, each alone; print and write a summary."""
     from coupled.cli.tables.gaps import print_summary
-    from coupled.gap.batch import jobs, run_all, summary
+    from coupled.gap.batch import LIST, jobs, run_all, summary
+    from coupled.record.record import manifest_path
 
     if len(folders) > 1:
         raise InputError(folders[1], "", "a folder of records is diagnosed by itself")
@@ -174,7 +178,9 @@ def _diagnose_folder(folders: list[Path], rig: str, output: Path | None) -> None
     if output is None:
         raise InputError(folders[0], "--output", "is missing: the folder for the diagnoses")
     todo = jobs(folders[0], output)
-    check_target(output / "summary.csv")
+    read = [file for job in todo for file in (job.record, manifest_path(job.record), job.rig)]
+    targets = [*(job.out for job in todo), output / "summary.csv"]
+    check_targets(targets, [folders[0] / LIST, *read])
     with progress() as advance:
         found = run_all(todo, advance)
     write_text(output / "summary.csv", summary(found))
