@@ -117,16 +117,19 @@ def _too_large(path: Path, most_bytes: int) -> InputError:
     return InputError(path, "", f"is larger than {size}, the most that is read here")
 
 
-def check_target(path: Path, inputs: Iterable[Path] = ()) -> None:
+_READ = "is a file that this command reads; give another to write"
+
+
+def check_target(path: Path, inputs: Iterable[Path] = (), why: str = _READ) -> None:
     """Refuse a file that could not be written, before the work that it is to hold.
 
     Nothing is made or changed. `inputs` are files that must not be overwritten, under
-    whatever name or link they are given.
+    whatever name or link they are given; `why` is what is said of one of them.
     """
-    check_targets([path], inputs)
+    check_targets([path], inputs, why)
 
 
-def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = (), why: str = _READ) -> None:
     """Refuse files of which one could not be written, is an input, or is meant twice."""
     read = {identity for path in inputs for identity in _identities(path)}
     written: set[object] = set()
@@ -137,7 +140,7 @@ def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
             raise InputError(path, "", "cannot be written there") from None
         identities = _identities(path)
         if not read.isdisjoint(identities):
-            raise InputError(path, "", "is a file that this reads; give another to write")
+            raise InputError(path, "", why)
         if not written.isdisjoint(identities):
             raise InputError(path, "", "would be written twice; give each output its own file")
         written |= identities

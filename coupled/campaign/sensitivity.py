@@ -21,7 +21,7 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from coupled.files import write_whole
+from coupled.record.csvfile import write_table
 
 Floats = NDArray[np.float64]
 INDICES = "sensitivity.csv"
@@ -136,4 +136,4 @@ def _shares(whole: Floats, resampled: Floats) -> list[VarianceShare]:
 
 def write_indices(indices: Sequence[SobolIndex], path: Path) -> None:
     """Write the indices as CSV, a row an index, whole."""
-    write_whole(path, pl.DataFrame([index.as_dict() for index in indices]).write_csv)
+    write_table(pl.DataFrame([index.as_dict() for index in indices]), path)

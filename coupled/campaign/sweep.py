@@ -17,8 +17,8 @@ from coupled.campaign.journal import opened
 from coupled.campaign.plan import SweepPlan, plan_from_table, read_plan
 from coupled.campaign.sensitivity import SobolIndex, sensitivity
 from coupled.campaign.survival import SurvivalLimit, limits
-from coupled.files import write_whole
 from coupled.parallel import executor
+from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
 
 Progress = Callable[[str, int, int], None]
@@ -99,4 +99,4 @@ def judged(plan: SweepPlan, table: pl.DataFrame, found: int = 0) -> SweepResult:
 
 def write_table(found: pl.DataFrame, path: Path) -> None:
     """Write a table as Parquet, whole."""
-    write_whole(path, found.write_parquet)
+    csvfile.write_table(found, path)

@@ -1,20 +1,32 @@
 """The command line's frame: the app, its exit codes, and the options that commands share.
 
 Exit code 0 when all went well, 1 when a flight ended before its time, 2 for input that
-cannot be used (one line says why, and nothing is written).
+cannot be used or a place that cannot be written (one line says why, and no output is left
+in part), 130 and 143 when it was interrupted, 141 when the reader of its output has gone.
 """
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
 from coupled import __version__
-from coupled.cli.terminal import out, say_error
-from coupled.errors import InputError
+from coupled.cli.process import (
+    INTERRUPTED,
+    PIPE_CLOSED,
+    REFUSED,
+    Stop,
+    prepare_streams,
+    said_of,
+    silence_streams,
+)
+from coupled.cli.terminal import ReaderGoneError, out, say_error
+from coupled.errors import InputError, shown
 
 app = typer.Typer(
     add_completion=False,
@@ -35,22 +47,37 @@ JsonOption = Annotated[
 
 def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""
+    prepare_streams()
+    with Stop() as stop:
+        try:
+            code = _run()
+        except KeyboardInterrupt:  # a second one, while the first was dealt with
+            code = INTERRUPTED
+    silence_streams()
+    sys.exit(stop.exit_code or code)
+
+
+def _run() -> int:
+    """Return the exit code of the command that the user gave."""
     try:
         code = app(standalone_mode=False)
-    except InputError as error:
-        say_error(str(error))
-        code = 2
-    except TyperException as error:  # a word of the command line that it does not know
-        say_error(
-            " ".join(error.format_message().split()) + " (coupled --help shows what there is)"
-        )
-        code = 2
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code if isinstance(code, int) else 0
     except (typer.Abort, KeyboardInterrupt):
-        code = 130
-    except BrokenPipeError:
-        sys.stderr.close()
-        code = 1
-    sys.exit(code if isinstance(code, int) else 0)
+        return INTERRUPTED
+    except (ReaderGoneError, BrokenPipeError):
+        return PIPE_CLOSED
+    except InputError as error:
+        line = str(error)
+    except TyperException as error:  # a word of the command line that it does not know
+        words = " ".join(error.format_message().split())
+        line = shown(words, 400) + " (coupled --help shows what there is)"
+    except (OSError, MemoryError) as error:
+        line = said_of(error)
+    with contextlib.suppress(OSError):
+        say_error(line)
+    return REFUSED
 
 
 def _version(wanted: bool) -> None:
@@ -66,3 +93,7 @@ def _root(
     ] = False,
 ) -> None:
     """Fly a JSBSim aircraft through a compliant control loader."""
+    try:
+        Path.cwd()
+    except OSError:
+        raise InputError("working folder", "", "is gone; change to another") from None

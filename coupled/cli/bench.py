@@ -20,9 +20,10 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_stale,
 )
-from coupled.cli.terminal import check_json, give_json, out, progress, say
+from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
+from coupled.outputs import Outputs
 
 if TYPE_CHECKING:
     from coupled.calibration.bench import CalibrationBench
@@ -88,12 +89,13 @@ def bench(
         _repeat(made, repeat, seed, json_file)
         return
     readings = take_readings(made, seed)
-    write_readings(path, readings, name, inches)
+    table = {"readings": str(path), "rows": len(readings.row) + len(readings.null_row)}
+    with Outputs() as outputs:
+        write_readings(outputs.at(path), readings, name, inches)
+        keep_json(table, json_file, outputs)
     if json_file != "-":
         say(f"readings: {path}  ({len(readings.row)} readings, {len(readings.null_row)} nulls)")
-    give_json(
-        {"readings": str(path), "rows": len(readings.row) + len(readings.null_row)}, json_file
-    )
+    print_json(table, json_file)
 
 
 def _repeat(made: CalibrationBench, repeat: int, seed: int, json_file: str) -> None:

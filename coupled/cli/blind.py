@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, give_json, out, progress, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
+from coupled.outputs import Outputs
 
 blind = typer.Typer(no_args_is_help=True, help="Make sealed trials, and score their diagnoses.")
 app.add_typer(blind, name="blind")
@@ -85,13 +86,15 @@ def score(
     truth = read_key(key)
     check_seal(key, sealed)
     found = score_answers(read_answers(diagnoses, truth))
+    with Outputs() as outputs:
+        if figure is not None:
+            from coupled.plots.saving import save
+            from coupled.plots.trials import draw_score
+
+            save(draw_score(found), outputs.at(figure))
+        keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
         print_score(out, found)
-    if figure is not None:
-        from coupled.plots.saving import save
-        from coupled.plots.trials import draw_score
-
-        save(draw_score(found), figure)
-        if json_file != "-":
+        if figure is not None:
             say(f"figure: {figure}")
-    give_json(found.as_dict(), json_file)
+    print_json(found.as_dict(), json_file)

@@ -18,9 +18,10 @@ from coupled.cli.rigs import (
     instruments,
     rig_and_control,
 )
-from coupled.cli.terminal import check_json, give_json, out, say
-from coupled.errors import InputError
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
+from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
+from coupled.outputs import Outputs
 from coupled.record.channels import ControlName
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def calibrate(
         if readings is not None or figure is not None:
             raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
         wanted = (precision / 100.0, strongest, 1 if once else 2)
-        _plan(data, name, tools, wanted, (write, json_file))
+        _plan((file, data, name), tools, wanted, (write, json_file))
         return
     if readings is None:
         raise InputError("calibrate", "", "give a file of readings, or --plan for which to take")
@@ -103,27 +104,28 @@ def _calibrate(
     text = ""
     if write is not None:
         new = with_calibration(data, name, found, date, hardware)
-        text = rig_text(new, f"{file.name}, its {name} calibrated from {path.name}")
+        text = rig_text(new, f"{shown(file.name)}, its {name} calibrated from {shown(path.name)}")
         rig_from_table(loads_toml(text, write), write)  # a rig that cannot be flown is refused
+    with Outputs() as outputs:
+        if write is not None:
+            write_text(outputs.at(write), text)
+        if figure is not None:
+            from coupled.plots.readings import draw_readings
+            from coupled.plots.saving import save
+
+            save(draw_readings(found, shown(path.name)), outputs.at(figure))
+        keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
         print_calibration(out, found)
-    if write is not None:
-        write_text(write, text)
-        if json_file != "-":
+        if write is not None:
             say(f"calibrated rig: {write}")
-    if figure is not None:
-        from coupled.plots.readings import draw_readings
-        from coupled.plots.saving import save
-
-        save(draw_readings(found, path.name), figure)
-        if json_file != "-":
+        if figure is not None:
             say(f"figure: {figure}")
-    give_json(found.as_dict(), json_file)
+    print_json(found.as_dict(), json_file)
 
 
 def _plan(
-    rig: Rig,
-    control: ControlName,
+    of_rig: tuple[Path, Rig, ControlName],
     tools: Instruments,
     wanted: tuple[float, float, int],
     targets: tuple[Path | None, str],
@@ -131,12 +133,13 @@ def _plan(
     from coupled.calibration.plan import fewest, form, precision, stations
     from coupled.cli.tables.calibration import print_plan
 
-    (share, strongest, looks), (write, json_file) = wanted, targets
+    (file, rig, control), (write, json_file) = of_rig, targets
+    share, strongest, looks = wanted
     if write is not None:
         if write.suffix.lower() != ".csv":
             raise InputError(write, "--write", "a form for readings ends in .csv")
-        check_target(write)
-    check_json(json_file, [write] if write else [])
+        check_target(write, [file])
+    check_json(json_file, [file, *([write] if write else [])])
     sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
     grids = {
         size: precision(rig, control, stations(rig, control, *size, strongest), tools, looks)
@@ -145,12 +148,6 @@ def _plan(
     chosen = fewest(rig, control, tools, share, strongest, looks)
     design = [s for s, count in chosen for _ in range(count)]
     reached = precision(rig, control, design, tools, looks)
-    if json_file != "-":
-        print_plan(out, control, grids, chosen, reached)
-    if write is not None:
-        write_text(write, form(chosen, control, looks))
-        if json_file != "-":
-            say(f"form: {write}")
     table = {
         "half_width": reached.half_width,
         "bend": reached.bend,
@@ -160,4 +157,12 @@ def _plan(
             for (few, many), grid in grids.items()
         ],
     }
-    give_json(table, json_file)
+    with Outputs() as outputs:
+        if write is not None:
+            write_text(outputs.at(write), form(chosen, control, looks))
+        keep_json(table, json_file, outputs)
+    if json_file != "-":
+        print_plan(out, control, grids, chosen, reached)
+        if write is not None:
+            say(f"form: {write}")
+    print_json(table, json_file)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, err, give_json, out, progress, say
+from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
+from coupled.outputs import Outputs
 from coupled.resources import find, shipped_sweeps
 
 if TYPE_CHECKING:
@@ -44,13 +45,16 @@ def check(
     check_json(json_file, [*inputs, *([junit] if junit else [])])
     with progress() as advance:
         checked = check_runs(found, advance)
+    table = [verdict.as_dict() for verdict in checked.verdicts]
+    with Outputs() as outputs:
+        if junit is not None:
+            write_text(outputs.at(junit), junit_xml(checked.verdicts))
+        keep_json(table, json_file, outputs)
     if json_file != "-":
         print_verdicts(out, checked.verdicts)
-    if junit is not None:
-        write_text(junit, junit_xml(checked.verdicts))
-        if json_file != "-":
+        if junit is not None:
             say(f"JUnit XML: {junit}")
-    give_json([verdict.as_dict() for verdict in checked.verdicts], json_file)
+    print_json(table, json_file)
     if not checked.passed:
         raise typer.Exit(1)
 
@@ -129,13 +133,17 @@ def _show(found: SweepResult, target: Path, path: Path, json_file: str) -> None:
 
     asked, table = found.plan.sweep, found.table
     if found.indices:
-        write_indices(found.indices, target / INDICES)
         drawn = draw_sensitivity(found.indices)
     elif found.limits:
         drawn = draw_survival(asked.name, found.numeric_keys[0], found.limits)
     else:
         drawn = draw_sweep(table, found.plan.keys, asked.keep)
-    save(drawn, path)
+    rows = [index.as_dict() for index in found.indices] or table.to_dicts()
+    with Outputs() as outputs:
+        if found.indices:
+            write_indices(found.indices, outputs.at(target / INDICES))
+        save(drawn, outputs.at(path))
+        keep_json(rows, json_file, outputs)
     if json_file != "-":
         print_sweep(out, table, asked.keep)
         print_survival(out, found.limits)
@@ -144,5 +152,4 @@ def _show(found: SweepResult, target: Path, path: Path, json_file: str) -> None:
             print_indices(out, found.indices)
             say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
-    rows = [index.as_dict() for index in found.indices] or table.to_dicts()
-    give_json(rows, json_file)
+    print_json(rows, json_file)

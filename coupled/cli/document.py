@@ -9,9 +9,10 @@ import typer
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
-from coupled.cli.terminal import check_json, give_json, out, progress, say
-from coupled.errors import InputError
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.errors import InputError, shown
 from coupled.files import check_target
+from coupled.outputs import Outputs
 from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
 
@@ -62,15 +63,17 @@ def document(
             documents.append(gather(data, name, travels.get(name), advance))
     from coupled.plots.documentation import draw_pages
 
-    written = draw_pages(documents, fits, folder, pdf)
+    table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
+    with Outputs() as outputs:
+        written = draw_pages(documents, fits, outputs.folder(folder), outputs.at(pdf))
+        keep_json(table, json_file, outputs)
     if json_file != "-":
         for found in documents:
             print_checks(out, found.control, found.checks, every)
         if not travels:
             out.print("no aircraft: the surface's position is not judged\n")
         say(f"{len(written)} figures and {pdf.name} in {folder}")
-    table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
-    give_json(table, json_file)
+    print_json(table, json_file)
 
 
 def _fit_for(
@@ -89,7 +92,9 @@ def _fit_for(
     if readings is not None:
         if control != chosen[0]:
             return None
-        return fit(read_readings(readings, control), data, control, tools, readings), readings.name
+        return fit(read_readings(readings, control), data, control, tools, readings), shown(
+            readings.name
+        )
     try:
         grid = stations(rig, control, 5, 5)
     except InputError:

@@ -10,9 +10,19 @@ from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, app
 from coupled.cli.rigs import say_stale
-from coupled.cli.terminal import check_json, err, give_json, out, progress, say
-from coupled.errors import InputError
+from coupled.cli.terminal import (
+    check_json,
+    err,
+    give_json,
+    keep_json,
+    out,
+    print_json,
+    progress,
+    say,
+)
+from coupled.errors import InputError, shown
 from coupled.files import check_target
+from coupled.outputs import Outputs
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
 
 if TYPE_CHECKING:
@@ -45,20 +55,23 @@ def compare(
 
         check_format(path)
         check_target(path, inputs)
-    check_json(json_file, [*inputs, path])
+    check_json(json_file, inputs if no_figure else [*inputs, path])
     say_stale(cases[0].rig)
     with progress() as advance:
         flights = compare_flights(cases, advance)
+    table = [flight.outcome.as_dict() for flight in flights]
+    with Outputs() as outputs:
+        if not no_figure:
+            from coupled.plots.flights import draw_comparison
+            from coupled.plots.saving import save
+
+            save(draw_comparison(flights), outputs.at(path))
+        keep_json(table, json_file, outputs)
     if json_file != "-":
         print_comparison(out, flights)
-    if not no_figure:
-        from coupled.plots.flights import draw_comparison
-        from coupled.plots.saving import save
-
-        save(draw_comparison(flights), path)
-        if json_file != "-":
+        if not no_figure:
             say(f"figure: {path}")
-    give_json([flight.outcome.as_dict() for flight in flights], json_file)
+    print_json(table, json_file)
     _end(flights)
 
 
@@ -104,14 +117,16 @@ def fly(
     say_stale(manoeuvre.rig)
     with progress() as advance:
         record = fly_manoeuvre(manoeuvre, lambda done, total: advance(manoeuvre.label, done, total))
-    write_record(record, path)
     outcome = judge(manoeuvre, configuration or "as the rig file says", record)
+    with Outputs() as outputs:
+        write_record(record, outputs.at(path))
+        keep_json(outcome.as_dict(), json_file, outputs)
     if json_file != "-":
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
         for control, when in record.manifest["stop_first_met_s"].items():
             out.print(f"the {control} met its stop, first at {when:.2f} s")
-    give_json(outcome.as_dict(), json_file)
+    print_json(outcome.as_dict(), json_file)
     if outcome.ended_early:
         err.print(f"[yellow]ended early:[/] {outcome.ended_early}; the record so far is kept")
         raise typer.Exit(1)
@@ -133,7 +148,7 @@ def plot(
     path = figure or record.with_suffix(".png")
     check_format(path)
     check_target(path, [record])
-    save(draw_record(read_record(record), record.stem), path)
+    save(draw_record(read_record(record), shown(record.stem)), path)
     say(f"figure: {path}")
 
 

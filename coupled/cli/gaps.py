@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, give_json, out, progress, say
-from coupled.errors import InputError
-from coupled.files import check_target, write_text
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.errors import InputError, shown
+from coupled.files import check_target, check_targets, write_text
+from coupled.outputs import Outputs
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
 
@@ -74,13 +75,16 @@ def diagnose(
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name)
+    table = whole.as_dict(power) if json_file else {}
+    with Outputs() as outputs:
+        if improve is not None:
+            _write_improved(outputs.at(improve), whole, rig_file, read)
+        if plots is not None:
+            _draw(outputs.folder(plots), whole)
+        keep_json(table, json_file, outputs)
     if json_file != "-":
-        _print(whole, power)
-    if improve is not None:
-        _write_improved(improve, whole, rig_file, read, json_file != "-")
-    if plots is not None:
-        _draw(plots, whole, json_file != "-")
-    give_json(whole.as_dict(power) if json_file else {}, json_file)
+        _print(whole, power, improve, drawn)
+    print_json(table, json_file)
 
 
 def _control(word: str, file: Path) -> ControlName:
@@ -110,7 +114,7 @@ def _diagnose(
     return whole, read
 
 
-def _print(whole: Diagnosis, power: bool) -> None:
+def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path]) -> None:
     from coupled.cli.tables.gaps import print_closed_loop, print_power, print_stages
 
     out.print(whole.summary, markup=False, highlight=False)
@@ -119,18 +123,20 @@ def _print(whole: Diagnosis, power: bool) -> None:
         print_closed_loop(out, whole.closed_loop)
     if power:
         print_power(out, whole.power)
+    if improve is not None:
+        say(f"improved rig: {improve}")
+    for figure in drawn:
+        say(f"figure: {figure}")
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record], aloud: bool
+    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
     from coupled.rig.rigwrite import rig_text
 
-    names = ", ".join(Path(name).name for name in records)
-    remark = f"{rig_file.name} with what was found in {names}:\n"
+    names = ", ".join(shown(Path(name).name) for name in records)
+    remark = f"{shown(rig_file.name)} with what was found in {names}:\n"
     write_text(path, rig_text(whole.improved, remark + whole.summary))
-    if aloud:
-        say(f"improved rig: {path}")
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:
@@ -142,14 +148,12 @@ def _plot_targets(folder: Path | None) -> list[Path]:
     return [folder / name for name in FIGURES]
 
 
-def _draw(folder: Path, whole: Diagnosis, aloud: bool) -> None:
+def _draw(folder: Path, whole: Diagnosis) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
     for file, figure in draw_diagnosis(whole).items():
         save(figure, folder / file)
-        if aloud:
-            say(f"figure: {folder / file}")
 
 
 def _diagnose_folder(
@@ -157,7 +161,8 @@ def _diagnose_folder(
 ) -> None:
     """Diagnose a control in every record of a folder, each alone; print and write a summary."""
     from coupled.cli.tables.gaps import print_summary
-    from coupled.gap.batch import jobs, run_all, summary
+    from coupled.gap.batch import LIST, jobs, run_all, summary
+    from coupled.record.record import manifest_path
 
     if len(folders) > 1:
         raise InputError(folders[1], "", "a folder of records is diagnosed by itself")
@@ -166,7 +171,9 @@ def _diagnose_folder(
     if output is None:
         raise InputError(folders[0], "--output", "is missing: the folder for the diagnoses")
     todo = jobs(folders[0], output, control)
-    check_target(output / "summary.csv")
+    read = [file for job in todo for file in (job.record, manifest_path(job.record), job.rig)]
+    targets = [*(job.out for job in todo), output / "summary.csv"]
+    check_targets(targets, [folders[0] / LIST, *read])
     with progress() as advance:
         found = run_all(todo, advance)
     write_text(output / "summary.csv", summary(found))

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, give_json, out, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.files import check_target
+from coupled.outputs import Outputs
 from coupled.resources import shipped_rigs
 
 
@@ -50,9 +51,12 @@ def import_log(
 
         nominal = read_rig(rig_file)
     record, account = import_file(log, map_file, nominal)
-    write_record(record, path)
+    table = {"record": str(path), **account}
+    with Outputs() as outputs:
+        write_record(record, outputs.at(path))
+        keep_json(table, json_file, outputs)
     if json_file != "-":
         print_account(out, account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
-    give_json({"record": str(path), **account}, json_file)
+    print_json(table, json_file)

@@ -11,7 +11,8 @@ from coupled.cli.app import app
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
 from coupled.cli.terminal import progress, say
 from coupled.errors import InputError
-from coupled.files import check_target
+from coupled.files import check_targets
+from coupled.outputs import Outputs
 from coupled.resources import find, shipped_rigs
 
 
@@ -45,8 +46,7 @@ def draw_map(
     check_format(path)
     other = path.with_name(f"{path.stem}-feel{path.suffix}")
     written = [path, path.with_suffix(".csv"), other, other.with_suffix(".csv")]
-    for target in written:
-        check_target(target, [file, *(record or [])])
+    check_targets(written, [file, *(record or [])])
     for given in record or []:
         check_suffix(given)
     records = [read_record(given) for given in record or []]
@@ -60,13 +60,15 @@ def draw_map(
         felt = feel(data, file, advance)
     maps = {name: loss_maps(data, name) for name in data.controls}
     flown = {name: envelope(records, name) for name in data.controls}
-    save(draw_losses(data.name, maps, flown), written[0])
-    write_losses((told for of_control in maps.values() for told in of_control), written[1])
+    with Outputs() as outputs:
+        save(draw_losses(data.name, maps, flown), outputs.at(written[0]))
+        losses = (told for of_control in maps.values() for told in of_control)
+        write_losses(losses, outputs.at(written[1]))
+        if felt is not None:
+            save(draw_feel(data.name, felt), outputs.at(written[2]))
+            write_feel(felt, outputs.at(written[3]))
     if felt is None:
         say("no level trim of a column: no stick force per g or per knot")
         written = written[:2]
-    else:
-        save(draw_feel(data.name, felt), written[2])
-        write_feel(felt, written[3])
     for target in written:
         say(f"written: {target}")

@@ -9,9 +9,10 @@ import typer
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
-from coupled.cli.terminal import check_json, give_json, out, progress, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target
+from coupled.outputs import Outputs
 from coupled.record.channels import unit_of
 from coupled.resources import find, shipped_rigs
 
@@ -71,9 +72,13 @@ def stability(
             advance(f"{name}, {kind}", done, len(asked))
             every.append(plane(data, name, kind))
     planes = {name: [each for each in every if each.control == name] for name in bent}
-    save(draw_stability(data, planes), path)
-    write_planes(data, every, table)
     most, worst = (100.0 * share for share in disagreement(every))
+    limits = [each.as_dict() for each in told]
+    listed = {"rig": data.name, "controls": limits, "greatest_difference_percent": worst}
+    with Outputs() as outputs:
+        save(draw_stability(data, planes), outputs.at(path))
+        write_planes(data, every, outputs.at(table))
+        keep_json(listed, json_file, outputs)
     if json_file != "-":
         print_limits(out, told, bob)
         found = sum(len(each.crossings) for each in every)
@@ -83,7 +88,4 @@ def stability(
         )
         say(f"written: {path}")
         say(f"written: {table}")
-    limits = [each.as_dict() for each in told]
-    give_json(
-        {"rig": data.name, "controls": limits, "greatest_difference_percent": worst}, json_file
-    )
+    print_json(listed, json_file)

@@ -136,7 +136,7 @@ HOSTILE = [
     (["calibrate", "r.csv", "--write", "new.csv"], "a rig file ends in .toml"),
     (["calibrate", "r.csv", "--write", "r.csv/new.toml"], "cannot be written"),
     (["calibrate", "r.csv", "--figure", "f.bmp"], "a figure ends in"),
-    (["calibrate", "r.csv", "--json", "r.csv"], "is a file that this reads"),
+    (["calibrate", "r.csv", "--json", "r.csv"], "is another file of this command"),
     (["calibrate", "r.csv", "--write", "a.toml", "--json", "a.toml"], "is another file"),
     (["calibrate", "r.csv", "--plan"], "give no readings"),
     (["calibrate", "--plan", "--write", "form.toml"], "ends in .csv"),

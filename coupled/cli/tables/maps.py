@@ -8,8 +8,8 @@ from pathlib import Path
 import polars as pl
 
 from coupled.authority.maps import FELT, Feel, LossMap
-from coupled.files import write_whole
 from coupled.record.channels import unit_of
+from coupled.record.csvfile import write_table
 
 
 def write_losses(maps: Iterable[LossMap], path: Path) -> None:
@@ -27,7 +27,7 @@ def write_losses(maps: Iterable[LossMap], path: Path) -> None:
         for i, q in enumerate(told.pressure_Pa)
         for j, d in enumerate(told.deflection)
     ]
-    write_whole(path, pl.DataFrame(rows).fill_nan(None).write_csv)
+    write_table(pl.DataFrame(rows).fill_nan(None), path)
 
 
 def write_feel(feel: Feel, path: Path) -> None:
@@ -40,4 +40,4 @@ def write_feel(feel: Feel, path: Path) -> None:
         word = "specified" if name == "rigid" else name
         columns[f"{word}_force_per_g_N"] = feel.per_g_N[name]
         columns[f"{word}_pull_per_knot_N"] = feel.per_knot_N[name]
-    write_whole(path, pl.DataFrame(columns).fill_nan(None).write_csv)
+    write_table(pl.DataFrame(columns).fill_nan(None), path)

@@ -12,8 +12,8 @@ from rich.table import Table
 from coupled.authority.stability.aircraft import BobWeight
 from coupled.authority.stability.limits import Limit, Told
 from coupled.authority.stability.planes import Kind, Plane
-from coupled.files import write_whole
 from coupled.record.channels import unit_of
+from coupled.record.csvfile import write_table
 from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
@@ -80,4 +80,4 @@ def write_planes(rig: Rig, planes: Iterable[Plane], path: Path) -> None:
         for i, share in enumerate(told.shares)
         for j, value in enumerate(told.values)
     ]
-    write_whole(path, pl.DataFrame(rows).write_csv)
+    write_table(pl.DataFrame(rows), path)

@@ -1,0 +1,84 @@
+"""What a command owes the system that runs it: its streams, its signals, its exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import signal
+import sys
+from types import FrameType
+
+REFUSED = 2  # input that cannot be used
+INTERRUPTED = 130  # as a shell tells of Ctrl-C: 128 and the number of SIGINT
+PIPE_CLOSED = 141  # likewise of SIGPIPE: whoever read the output has gone
+_STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG, errno.EDQUOT)
+
+
+class Stop:
+    """Let SIGTERM and a hang-up end a command as Ctrl-C does: finished work is kept.
+
+    `exit_code` is that of the signal that came, or 0.
+    """
+
+    def __init__(self) -> None:
+        self.exit_code = 0
+        wanted = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
+        # One that is ignored, as by nohup, stays so.
+        self._signals = [n for n in wanted if n and signal.getsignal(n) == signal.SIG_DFL]
+
+    def __enter__(self) -> Stop:
+        for number in self._signals:
+            signal.signal(number, self._come)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number in self._signals:
+            signal.signal(number, signal.SIG_DFL)
+
+    def _come(self, number: int, frame: FrameType | None) -> None:
+        self.exit_code = 128 + number
+        raise KeyboardInterrupt
+
+
+def prepare_streams() -> None:
+    """Make the standard streams safe to use.
+
+    A closed one is opened on nothing, or the next file would take its number and whatever a
+    library prints would go into it. A letter that the terminal's encoding lacks is shown as a
+    question mark: a table in which one is missing is better than a flight lost.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def silence_streams() -> None:
+    """Drop what waits on a stream that takes no more."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is None:
+            continue
+        try:
+            stream.flush()
+        except OSError:
+            with contextlib.suppress(OSError, ValueError):
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, stream.fileno())
+                os.close(nowhere)
+
+
+def said_of(error: OSError | MemoryError) -> str:
+    """Return the line for a fault of the system that no reader or writer has named."""
+    if isinstance(error, MemoryError):
+        return "out of memory: shorter records, or fewer workers, need less"
+    why = error.strerror or str(error)
+    if error.filename is not None:
+        return f"{error.filename}: {why}"
+    place = "standard output: cannot be written: " if error.errno in _STREAM_FAULTS else ""
+    return place + why
