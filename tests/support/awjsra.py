@@ -34,11 +34,11 @@ def validation() -> ModuleType:
 
 
 def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
-    """Return the aircraft trimmed as its rig file says, but for what is given."""
+    """Return the aircraft trimmed as its rig file says, but for some keys of the file."""
     assert RIG.flight is not None
-    changes = {**flight, "properties": {**RIG.flight.properties, **(properties or {})}}
-    rig = RIG.model_copy(update={"flight": RIG.flight.model_copy(update=changes)})
-    return validation().trimmed(rig)
+    changes: dict[str, Any] = {f"flight.{key}": value for key, value in flight.items()}
+    changes["flight.properties"] = {**RIG.flight.properties, **(properties or {})}
+    return validation().trimmed(RIG.changed(changes))
 
 
 def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:
