@@ -39,12 +39,13 @@ def rig_at(knots: float, path_deg: float, flaps_deg: float, nozzles_deg: float) 
     rig = read_rig(RIG)
     assert rig.flight is not None
     levers = {"fcs/flap-cmd-norm": flaps_deg / 75.0, "fcs/nozzle-cmd-deg": nozzles_deg}
-    changes = {
-        "calibrated_airspeed": knots * KNOT_m_per_s,
-        "flight_path": math.radians(path_deg),
-        "properties": {**rig.flight.properties, **(levers if flaps_deg else CLEAN)},
-    }
-    return rig.model_copy(update={"flight": rig.flight.model_copy(update=changes)})
+    return rig.changed(
+        {
+            "flight.calibrated_airspeed_m_per_s": knots * KNOT_m_per_s,
+            "flight.flight_path_rad": math.radians(path_deg),
+            "flight.properties": {**rig.flight.properties, **(levers if flaps_deg else CLEAN)},
+        }
+    )
 
 
 def modes(model: jsbsim.FGLinearization, states: Sequence[str]) -> list[str]:

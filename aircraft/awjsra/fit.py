@@ -77,11 +77,11 @@ def residuals(values: Floats, left_out: str = "") -> Floats:
 
 @dataclass(frozen=True)
 class Found:
-    """The numbers in the order of `HELD`, their standard deviations, and what the rows tell."""
+    """The numbers in the order of `HELD`, their standard deviations, the rows' share in each."""
 
     values: Floats
     deviations: Floats
-    told: Floats
+    shares: Floats
 
 
 def fit(left_out: str = "") -> Found:
@@ -98,13 +98,13 @@ def fit(left_out: str = "") -> Found:
 def numbers() -> str:
     """Return the numbers as a Markdown table, and the lines for Systems/estimates.xml."""
     found = fit()
-    lines = ["| | value | held near | told by the rows |", "| --- | --- | --- | --- |"]
-    for name, (near, width), value, deviation, told in zip(
-        HELD, HELD.values(), found.values, found.deviations, found.told, strict=True
+    lines = ["| | value | held near | share from the rows |", "| --- | --- | --- | --- |"]
+    for name, (near, width), value, deviation, share in zip(
+        HELD, HELD.values(), found.values, found.deviations, found.shares, strict=True
     ):
         held = f"{near:g} ± {width:g}"
-        lines.append(f"| `{name}` | {value:.3f} ± {deviation:.3f} | {held} | {100 * told:.0f} % |")
-    lines.append(f"\nTold by the rows in all: {np.sum(found.told):.1f} of {len(HELD)} numbers.\n")
+        lines.append(f"| `{name}` | {value:.3f} ± {deviation:.3f} | {held} | {100 * share:.0f} % |")
+    lines.append(f"\nFrom the rows in all: {np.sum(found.shares):.1f} of {len(HELD)} numbers.\n")
     for name, value in zip(HELD, found.values, strict=True):
         lines.append(f'<property value="{value:.3f}"> awjsra/{name} </property>')
     return "\n".join(lines)

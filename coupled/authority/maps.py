@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.flight.airframe import ELEVATOR, JSBSimAirframe
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, configure
 from coupled.flight.runfile import read_run
-from coupled.record.channels import ControlName, channel
+from coupled.record.channels import ELEVATOR, LOAD, PRESSURE, ControlName, channel
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
 from coupled.rig.equations import bend_loss, specified_gradient
@@ -28,7 +29,7 @@ from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_line
-from coupled.schema import load_toml
+from coupled.schema import changed, load_toml
 from coupled.units import KNOT_m_per_s
 
 Floats = NDArray[np.float64]
@@ -184,7 +185,7 @@ def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, flo
     """
     sign = COMMAND_SIGN["elevator"]
     middle = _trimmed(rig, file, speed)
-    pressure = middle.motion()[0]
+    pressure = middle.motion()[PRESSURE]
     up, down = (
         _load_factors(_trimmed(rig, file, speed), sign * s, rig.frame_rate) for s in (_STEP, -_STEP)
     )
@@ -203,9 +204,9 @@ def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, flo
 
 def _trimmed(rig: Rig, file: Path, speed: float) -> JSBSimAirframe:
     assert rig.flight is not None
-    still = {"calibrated_airspeed": speed, "flight_path": 0.0, "gust_rms": 0.0}
-    flight = rig.flight.model_copy(update=still)
-    return JSBSimAirframe(
+    level = {"calibrated_airspeed_m_per_s": speed, "flight_path_rad": 0.0, "gust_rms_m_per_s": 0.0}
+    flight = changed(rig.flight, level, file, "flight")
+    return make_aircraft(
         flight, 1.0 / rig.frame_rate, list(rig.controls), [aircraft_folder()], file
     )
 
@@ -215,6 +216,6 @@ def _load_factors(airframe: JSBSimAirframe, command: float, rate: float) -> Floa
     frames = round(_PULL_s * rate)
     out = np.empty(frames)
     for k in range(frames):
-        out[k] = airframe.motion()[1]
+        out[k] = airframe.motion()[LOAD]
         airframe.step((command, 0.0, 0.0))
     return out

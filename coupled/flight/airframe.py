@@ -1,9 +1,12 @@
-"""The aircraft: the only module that knows JSBSim.
+"""One aircraft, plain: loaded, trimmed and stepped. The only module that knows JSBSim.
 
 The airframe is trimmed on its flight path, takes the commands of elevator, aileron and rudder
 (about trim, ±1 for the whole travel) and gives the motion. It opens no socket,
 writes no file and prints nothing: a model's own inputs and outputs are disabled
 before they start, and JSBSim's log is kept to be quoted where something fails.
+
+How it is loaded, what of it differs from its model, and what befalls it are wrappers
+(`wrapper`), which it calls in their order at three moments. `aircraft` makes their list.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
-from coupled.flight.altered import altered
 from coupled.flight.everyframe import (
     LATERAL_PROPERTIES,
     LONGITUDINAL_PROPERTIES,
@@ -30,22 +32,17 @@ from coupled.flight.everyframe import (
     motion_reader,
     stepper,
 )
-from coupled.flight.gusts import dryden, gusty
-from coupled.flight.loading import load
+from coupled.flight.gusts import GUST_DOWN
+from coupled.flight.modelfile import NothingToScaleError, loadable
 from coupled.flight.newton import newton_trim
-from coupled.record.channels import LONGITUDINAL, SURFACES, motion_channels
+from coupled.flight.wrapper import Step, Wrapper, led_by
+from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
-
-ALTITUDE = LONGITUDINAL.index("altitude_m")
-ELEVATOR = LONGITUDINAL.index("elevator_rad")
-SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
 _STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # what is no wheel
-_GUST_DOWN = "atmosphere/gust-down-fps"
-_WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 
 
 class _Log(jsbsim.FGLogger):
@@ -94,9 +91,12 @@ class JSBSimAirframe:
     Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of
     the rig in its order; `models`, folders of models of our own, searched first; `file`,
     where the rig was described, for faults; `record`, further properties to read each
-    frame, asked for in `record_file`; `seed`, of the gusts; `air_m_per_s`, instead of
-    them, how fast the air rises over each frame.
+    frame, asked for in `record_file`; `wrappers`, in the order in which they act. Without the
+    wrappers that `aircraft.make_aircraft` adds, the section's load, factors and gusts are left out.
     """
+
+    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
+    step: Step  # one frame with commands about trim
 
     def __init__(
         self,
@@ -107,13 +107,12 @@ class JSBSimAirframe:
         file: object = "rig",
         record: Sequence[str] = (),
         record_file: object = "run",
-        seed: int = 0,
-        air_m_per_s: Iterable[float] | None = None,
+        wrappers: Sequence[Wrapper] = (),
     ) -> None:
         self._file = file
         self._flight, self._controls = flight, tuple(controls)
-        self._fdm = self._load(models, frame_s)
-        self._trim()
+        self._fdm = self._load(models, frame_s, wrappers)
+        self._trim(wrappers)
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
         self.motion = motion_reader(
             [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES],
@@ -129,25 +128,21 @@ class JSBSimAirframe:
         for control in controls:
             node = self._node(_COMMANDS[SURFACES[control]])
             writes.append((node.set_double_value, node.get_double_value()))
-        self.step = stepper(self._fdm.run, writes, flight.steps_per_frame)
-        if flight.elevator_effectiveness != 1.0 or flight.pitch_damping != 1.0:
-            self.motion, self.step = altered(self, flight, models, frame_s)
-        if air_m_per_s is None and flight.gust_rms > 0.0:
-            speed = self.motion()[SPEED]
-            air_m_per_s = dryden(flight.gust_rms, flight.gust_length, speed, frame_s, seed)
-        if air_m_per_s is not None:
-            self.step = gusty(self.step, self.set_gust, iter(air_m_per_s))
+        plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
+        hooks = [hook for wrapper in wrappers if (hook := wrapper.meet(self)) is not None]
+        self.step = led_by(hooks, plain)
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
         trouble = self.trouble()
         if trouble:
-            raise self._fault("altitude_m", f"{trouble} at the start; choose a higher one")
+            raise self.fault("altitude_m", f"{trouble} at the start; choose a higher one")
 
-    def _fault(self, key: str, problem: str) -> InputError:
+    def fault(self, key: str, problem: str) -> InputError:
+        """Return the fault of a key of the rig's `flight` section."""
         return InputError(self._file, f"flight.{key}" if key else "flight", problem)
 
-    def _load(self, models: Sequence[Path], frame_s: float) -> Any:
+    def _load(self, models: Sequence[Path], frame_s: float, wrappers: Sequence[Wrapper]) -> Any:
         _base().debug_lvl = 0
         jsbsim.set_logger(_log)
         known = dict(packaged_models())
@@ -155,18 +150,26 @@ class JSBSimAirframe:
             known |= {m.name: folder for m in folder.iterdir() if _is_model(m)}
         name = self._flight.model
         if name not in known:
-            raise self._fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
+            raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
-        fdm.set_aircraft_path(str(known[name]))
         frame_s /= self._flight.steps_per_frame
         fdm.set_dt(frame_s)  # a model's rate limits take it as they load
         _log.text = ""
+        scaled = [part for wrapper in wrappers for part in wrapper.scaled]
         try:
-            loaded = fdm.load_model(name)
+            with loadable(known[name], name, scaled) as folder:
+                fdm.set_aircraft_path(str(folder))
+                loaded = fdm.load_model(name)
+        except NothingToScaleError as error:
+            problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
+            raise self.fault(error.scaled.name, problem) from None
+        except OSError as error:
+            problem = f"{name} with factors on it cannot be written to a temporary folder: {error}"
+            raise self.fault("", problem) from None
         except (RuntimeError, jsbsim.BaseError) as error:
-            raise self._fault("model", f"{name} does not load: {error}") from None
+            raise self.fault("model", f"{name} does not load: {error}") from None
         if not loaded:
-            raise self._fault("model", f"{name} does not load: {_log.text.strip()[-200:]}")
+            raise self.fault("model", f"{name} does not load: {_log.text.strip()[-200:]}")
         fdm.disable_input()
         fdm.disable_output()  # which does not keep run_ic from opening the files
         output = 0
@@ -184,24 +187,24 @@ class JSBSimAirframe:
         """Set a property that the rig file names, if it is there and is the model's to set."""
         key = f"properties.{name}"
         if name.startswith(("simulation/", "ic/")) or name == "propulsion/set-running":
-            raise self._fault(key, "is set from the rig's other keys; leave it out")
+            raise self.fault(key, "is set from the rig's other keys; leave it out")
         node = self._node(name, f"flight.{key}", self._file)
         node.set_double_value(value)
         if not math.isclose(node.get_double_value(), value, rel_tol=1e-6, abs_tol=1e-12):
-            raise self._fault(key, f"{self._flight.model} does not let it be set to {value:g}")
+            raise self.fault(key, f"{self._flight.model} does not let it be set to {value:g}")
 
     def _node(self, name: str, key: str = "model", file: object = None) -> Any:
         node = self._properties.get_node(name) if name in self._catalog else None
         if node is None:
             problem = f"{self._flight.model} has no property {name!r}"
             if key == "model":
-                raise self._fault(key, problem + ", so it cannot be flown by its controls")
+                raise self.fault(key, problem + ", so it cannot be flown by its controls")
             near = difflib.get_close_matches(name[:100], self._catalog, n=1)
             like = f", but {near[0]}" if near else ""
             raise InputError(file, key, f"{problem}{like}; none is created")
         return node
 
-    def _trim(self) -> None:
+    def _trim(self, wrappers: Sequence[Wrapper]) -> None:
         fdm, flight = self._fdm, self._flight
         fdm["ic/h-sl-ft"] = flight.altitude / FOOT_m
         fdm["ic/vc-kts"] = flight.calibrated_airspeed / KNOT_m_per_s
@@ -212,8 +215,8 @@ class JSBSimAirframe:
                 node = self._properties.get_node(f"fcs/{lever}-cmd-norm[{engine}]")
                 if node is not None:
                     node.set_double_value(1.0)
-        if (fault := load(fdm, flight, self._catalog)) is not None:
-            raise self._fault(*fault)
+        for wrapper in wrappers:
+            wrapper.load(self)
         for name, value in flight.properties.items():
             self._set(name, value)
         _log.text = ""
@@ -230,26 +233,11 @@ class JSBSimAirframe:
             elif started:
                 fdm["simulation/do_simple_trim"] = 1
         except (RuntimeError, jsbsim.BaseError):
-            raise self._fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
+            raise self.fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
         if problem:
-            raise self._fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
+            raise self.fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
-            raise self._fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
-
-    def pitch_moments(self) -> tuple[float, float]:
-        """Return what moves the nose, by finite differences.
-
-        The pitching acceleration per pitch rate, 1/s, and per unit of elevator command,
-        rad/s². Spends this aircraft: it is put back to its initial conditions.
-        """
-        fdm, command = self._fdm, _COMMANDS["elevator"]
-        trim, found = fdm[command], []
-        for rate, step in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02)):
-            fdm["ic/q-rad_sec"], fdm[command] = rate, trim + step
-            fdm.run_ic()
-            found.append(fdm["accelerations/qdot-rad_sec2"])
-        up, down, forth, back = found
-        return (up - down) / 0.04, (forth - back) / 0.04
+            raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
     def surface_map(self, surface: str = "elevator_rad") -> tuple[Floats, Floats]:
         """Return commands about trim, and where a surface stands for each, rad.
@@ -266,12 +254,17 @@ class JSBSimAirframe:
             positions[i] = self.motion()[at]
         return commands, positions
 
+    def names(self) -> list[str]:
+        """Return the names of all of the model's properties."""
+        return list(self._catalog)
+
     def has(self, name: str) -> bool:
         """Tell whether the model has a property."""
         return name in self._catalog
 
-    def lever(self, name: str, file: object, key: str) -> Lever:
+    def lever(self, name: str, file: object = None, key: str = "model") -> Lever:
         """Return a property that may be set in flight; a fault is that of a key in a file."""
+        file = self._file if file is None else file
         if name.startswith(("simulation/", "ic/")):
             raise InputError(file, key, f"{name} is not the aircraft's; it is not set in flight")
         if "W" not in self._catalog.get(name, "W"):
@@ -281,12 +274,7 @@ class JSBSimAirframe:
 
     def set_gust(self, up_m_per_s: float) -> None:
         """Let a gust rise at this speed from the next step on, beside any wind."""
-        self._fdm[_GUST_DOWN] = -up_m_per_s / FOOT_m
-
-    def blow(self, along_m_per_s: float, up_m_per_s: float) -> None:
-        """Let the air move: along the heading of the start (north), and upwards."""
-        for name, speed in zip(_WINDS, (along_m_per_s, -up_m_per_s), strict=True):
-            self._fdm[name] = speed / FOOT_m
+        self._fdm[GUST_DOWN] = -up_m_per_s / FOOT_m
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

@@ -1,61 +1,131 @@
-"""An airframe whose elevator or pitch damping differs from its model's.
+"""What of an aircraft's aerodynamics differs from its model's, by factors of the rig's `flight`.
 
-Both act through the elevator, the one effector that every model has: about its trim it is
-driven to e times the command, and the missing or surplus damping moment is made by it,
+An alteration is data: the factor's name, the quantity whose part is scaled, in which axes, and
+about what. `modelfile` scales that part of the model itself, so a moment is made as a moment, by
+whatever function the model has for it, and nothing else comes along.
 
-    Δc = (d − 1)·(M_q/M_c)·q·V₀/V,
-
-with the model's own M_q (per pitch rate) and M_c (per command), found by finite differences in
-trim; their ratio falls with speed. The surface itself stands where the command puts it, so
-the motion tells that position, not the one that makes the moment.
+    pitch_damping            C_mq: the pitching moment due to the pitch rate alone
+    elevator_effectiveness   all forces and moments due to the elevator, about its place in trim
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coupled.record.channels import LONGITUDINAL
+from coupled.flight.modelfile import Scaled
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.rig.parameters import Flight
 
-if TYPE_CHECKING:
-    from coupled.flight.airframe import JSBSimAirframe
-
-Motion = Callable[[], tuple[float, ...]]
-Step = Callable[[tuple[float, float, float]], None]
-# The model as it comes, in still air.
-UNALTERED = {"elevator_effectiveness": 1.0, "pitch_damping": 1.0, "gust_rms": 0.0}
-_ELEVATOR = LONGITUDINAL.index("elevator_rad")
-_RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
-_SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
+_TRIM = "fcs/pitch-trim-cmd-norm"
+_TRIMS = np.linspace(-2.0, 2.0, 401)  # how far it is moved
 
 
-def altered(
-    airframe: JSBSimAirframe, flight: Flight, models: Sequence[Path], frame_s: float
-) -> tuple[Motion, Step]:
-    """Return the reading and stepping of an airframe with the factors of `flight`."""
-    plain = flight.model_copy(update=UNALTERED)
-    spare = type(airframe)(plain, frame_s, ["column"], models)
-    per_rate, per_command = spare.pitch_moments()
-    commands_at, positions = spare.surface_map()
-    read, step = airframe.motion, airframe.step
-    start_speed = read()[_SPEED]
-    effect, surplus = flight.elevator_effectiveness, flight.pitch_damping - 1.0
-    ratio = surplus * per_rate / per_command * start_speed
-    stands = read()[_ELEVATOR]
+@dataclass(frozen=True)
+class Alteration:
+    """A factor of the `flight` section, by its field's name, and what it scales.
 
-    def motion() -> tuple[float, ...]:
-        now = read()
-        return (*now[:_ELEVATOR], stands, *now[_ELEVATOR + 1 :])
+    `about_trim` says that the part counts from the quantity's value in trim, not from zero.
+    """
 
-    def run(commands: tuple[float, float, float], /) -> None:
-        nonlocal stands
-        now = read()
-        makes = effect * commands[0] + ratio * now[_RATE] / now[_SPEED]
-        stands = float(np.interp(commands[0], commands_at, positions))
-        step((makes, commands[1], commands[2]))
+    part: Scaled
+    about_trim: bool = False
 
-    return motion, run
+    def factor(self, flight: Flight) -> float:
+        """Return the factor that a rig has."""
+        return float(getattr(flight, self.part.name))
+
+
+ALTERATIONS = (
+    Alteration(
+        Scaled(
+            "pitch_damping",
+            "pitching moment due to the pitch rate",
+            ("velocities/q-aero-rad_sec", "velocities/q-rad_sec"),
+            axes=("PITCH",),
+        )
+    ),
+    Alteration(
+        Scaled(
+            "elevator_effectiveness",
+            "force or moment due to the elevator",
+            ("fcs/elevator-pos-rad", "fcs/elevator-pos-deg", "fcs/elevator-pos-norm"),
+        ),
+        about_trim=True,
+    ),
+)
+# The changes that make an aircraft its model as filed, in still air.
+UNALTERED = {a.part.name: 1.0 for a in ALTERATIONS} | {"gust_rms_m_per_s": 0.0}
+
+
+class Alterations(Wrapper):
+    """The factors of a rig that are not 1.
+
+    `spare` makes an aircraft like this one, plain, with the properties that it is asked to read:
+    where the trim is moved in flight, its surface tells where the trim alone puts it.
+    """
+
+    def __init__(self, flight: Flight, spare: Callable[[Sequence[str]], Aircraft]) -> None:
+        self._flight, self._spare = flight, spare
+        self._made = [a for a in ALTERATIONS if a.factor(flight) != 1.0]
+
+    @property
+    def scaled(self) -> tuple[Scaled, ...]:
+        """What the factors scale."""
+        return tuple(alteration.part for alteration in self._made)
+
+    def load(self, aircraft: Aircraft) -> None:
+        """Let the factors count in the trim that count from zero."""
+        self._set(aircraft, about_trim=False)
+
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Let the others count from the trim, wherever it is moved to."""
+        held = [
+            (name, aircraft.lever(alteration.part.held(name)).set)
+            for alteration in self._made
+            for name in (alteration.part.properties if alteration.about_trim else ())
+            if aircraft.has(name)
+        ]
+        for name, hold in held:
+            hold(aircraft.lever(name).read())
+        self._set(aircraft, about_trim=True)
+        return self._follow(aircraft, held) if held and aircraft.has(_TRIM) else None
+
+    def _set(self, aircraft: Aircraft, *, about_trim: bool) -> None:
+        for alteration in self._made:
+            if alteration.about_trim == about_trim:
+                factor = alteration.factor(self._flight)
+                aircraft.lever(alteration.part.factor).set(factor)
+                aircraft.lever(alteration.part.rest).set(1.0 - factor)
+
+    def _follow(
+        self, aircraft: Aircraft, held: Sequence[tuple[str, Callable[[float], object]]]
+    ) -> Hook:
+        """Return what holds the quantities at where the trim alone puts the surface."""
+        trim = aircraft.lever(_TRIM).read
+        start = last = trim()
+        moved = np.empty((0, len(held)))
+
+        def follow() -> None:
+            nonlocal last, moved
+            if (now := trim()) == last:
+                return
+            last = now
+            if not moved.size:
+                moved = self._moved([name for name, _ in held])
+            for values, (_, hold) in zip(moved.T, held, strict=True):
+                hold(float(np.interp(now - start, _TRIMS, values)))
+
+        return follow
+
+    def _moved(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Return the quantities where the elevator is moved by each of _TRIMS, (trims, names)."""
+        spare = self._spare(names)
+        values = []
+        for command in _TRIMS.tolist():
+            spare.step((command, 0.0, 0.0))
+            values.append(spare.extra())
+        return np.array(values)

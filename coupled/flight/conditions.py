@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from coupled.errors import InputError
-from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.event import Event, check_events, happening
-from coupled.flight.weather import Gust, Turbulence, check_gust, gusting, stir
-from coupled.flight.wind import Wind, blown, check_wind
+from coupled.flight.event import Event, Events, check_events
+from coupled.flight.weather import DiscreteGust, Gust, Turbulence, TurbulentAir, check_gust
+from coupled.flight.wind import MovingAir, Wind, check_wind
+from coupled.flight.wrapper import Wrapper
 from coupled.schema import Section, build
 
 _TABLES: dict[str, type[Section]] = {"wind": Wind, "gust": Gust, "turbulence": Turbulence}
@@ -47,15 +47,17 @@ def build_conditions(table: dict[str, Any], file: object) -> None:
         check_gust(table["gust"], file)
 
 
-def meet(
-    airframe: JSBSimAirframe, conditions: Conditions, file: object, frame_s: float, seed: int
-) -> None:
-    """Let an aircraft in trim meet the conditions from now on."""
-    if conditions.turbulence is not None:
-        stir(airframe, conditions.turbulence, file, seed)
-    if conditions.gust is not None:
-        airframe.step = gusting(airframe, conditions.gust, file, frame_s)
-    if conditions.event:
-        airframe.step = happening(airframe, conditions.event, file, frame_s)
+def condition_wrappers(
+    conditions: Conditions, file: object, frame_s: float, seed: int
+) -> list[Wrapper]:
+    """Return the conditions as what is put around an aircraft, in the order in which they act."""
+    found: list[Wrapper] = []
     if conditions.wind is not None:
-        airframe.step = blown(airframe.step, airframe.blow, conditions.wind, frame_s)
+        found.append(MovingAir(conditions.wind, frame_s))
+    if conditions.event:
+        found.append(Events(conditions.event, file, frame_s))
+    if conditions.gust is not None:
+        found.append(DiscreteGust(conditions.gust, file, frame_s))
+    if conditions.turbulence is not None:
+        found.append(TurbulentAir(conditions.turbulence, file, seed))
+    return found

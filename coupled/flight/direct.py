@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from coupled.errors import InputError
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.aircraft import make_aircraft
 from coupled.record.channels import SURFACES, motion_channels
 from coupled.rig.parameters import Flight
 
@@ -89,7 +89,7 @@ def _fly(
     commands: tuple[float, float, float],
 ) -> list[tuple[float, ...]]:
     """Return the motion of an aircraft of its own under commands, frame by frame."""
-    airframe = JSBSimAirframe(flight, frame_s, controls, models, file)
+    airframe = make_aircraft(flight, frame_s, controls, models, file)
     motions = []
     for _ in range(frames):
         airframe.step(commands)

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from coupled.errors import InputError
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.schema import Section, named, quantity
 
-Step = Callable[[tuple[float, float, float]], None]
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
 _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 # Fuel cut and magnetos off, for the engine that JSBSim has picked; −1 picks all.
@@ -50,38 +49,41 @@ def check_events(events: Mapping[str, Event], file: object) -> None:
             raise InputError(file, f"{place}.over_s", "an engine stops at once; leave it out")
 
 
-def happening(
-    airframe: JSBSimAirframe, events: Mapping[str, Event], file: object, frame_s: float
-) -> Step:
-    """Return the aircraft's step, with what happens by the start of each set before it."""
-    makers = (_trim, _engine, _property)
-    moves = [
-        (event, move)
-        for name, event in events.items()
-        for make in makers
-        if (move := make(airframe, event, file, f"event.{name}")) is not None
-    ]
-    step, frame = airframe.step, 0
+class Events(Wrapper):
+    """A run's events; `file` is where they are described."""
 
-    def run(commands: tuple[float, float, float], /) -> None:
-        nonlocal frame, moves
-        time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
-        frame += 1
-        for event, move in moves:
-            if time >= event.at:
-                move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
-        moves = [(event, move) for event, move in moves if time < event.at + event.over]
-        step(commands)
+    def __init__(self, events: Mapping[str, Event], file: object, frame_s: float) -> None:
+        self._events, self._file, self._frame_s = events, file, frame_s
 
-    return run
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Return what lets happen, before each frame, what happens by its start."""
+        makers = (_trim, _engine, _property)
+        moves = [
+            (event, move)
+            for name, event in self._events.items()
+            for make in makers
+            if (move := make(aircraft, event, self._file, f"event.{name}")) is not None
+        ]
+        frame, frame_s = 0, self._frame_s
+
+        def happen() -> None:
+            nonlocal frame, moves
+            time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
+            frame += 1
+            for event, move in moves:
+                if time >= event.at:
+                    move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
+            moves = [(event, move) for event, move in moves if time < event.at + event.over]
+
+        return happen
 
 
-def _trim(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
     """Return what moves the trim, by a share of the surface's travel; two may move one."""
     if event.trim is None or event.by is None:
         return None
     name = f"fcs/{_TRIMS[event.trim]}-trim-cmd-norm"
-    lever = airframe.lever(name, file, f"{place}.trim")
+    lever = aircraft.lever(name, file, f"{place}.trim")
     whole, before = COMMAND_SIGN[SURFACES[event.trim]] * event.by, 0.0
 
     def move(share: float) -> None:
@@ -92,19 +94,19 @@ def _trim(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> M
     return move
 
 
-def _engine(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+def _engine(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
     """Return what stops an engine."""
     if event.engine_out is None:
         return None
     number = f"[{event.engine_out}]" if event.engine_out else ""  # as JSBSim lists them
     running = f"propulsion/engine{number}/set-running"
-    if not airframe.has(running):
+    if not aircraft.has(running):
         raise InputError(file, f"{place}.engine_out", "there is no such engine; the first is 0")
-    pick = airframe.lever(_PICK, file, place)
+    pick = aircraft.lever(_PICK, file, place)
     levers = [
-        (airframe.lever(name, file, place), to) for name, to in _OFF.items() if airframe.has(name)
+        (aircraft.lever(name, file, place), to) for name, to in _OFF.items() if aircraft.has(name)
     ]
-    levers.append((airframe.lever(running, file, place), 0.0))
+    levers.append((aircraft.lever(running, file, place), 0.0))
 
     def move(share: float) -> None:
         pick.set(float(event.engine_out or 0))
@@ -115,11 +117,11 @@ def _engine(airframe: JSBSimAirframe, event: Event, file: object, place: str) ->
     return move
 
 
-def _property(airframe: JSBSimAirframe, event: Event, file: object, place: str) -> Move | None:
+def _property(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
     """Return what leads a property of the model to a value."""
     if event.of_model is None or event.to is None:
         return None
-    lever, to = airframe.lever(event.of_model, file, f"{place}.property"), event.to
+    lever, to = aircraft.lever(event.of_model, file, f"{place}.property"), event.to
     begun: float | None = None
 
     def move(share: float) -> None:

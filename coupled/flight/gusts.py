@@ -10,14 +10,19 @@ at the start, where the aircraft is trimmed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper
+from coupled.record.channels import SPEED
+from coupled.rig.parameters import Flight
+from coupled.units import FOOT_m
+
 Floats = NDArray[np.float64]
-Step = Callable[[tuple[float, float, float]], None]
+GUST_DOWN = "atmosphere/gust-down-fps"  # beside any wind
 _BLOCK = 1024  # frames made at a time
 
 
@@ -38,11 +43,30 @@ def dryden(
         yield from block.tolist()
 
 
-def gusty(step: Step, set_air: Callable[[float], None], air_m_per_s: Iterator[float]) -> Step:
-    """Return a stepping in which the air over each frame moves up as told."""
+class Gusts(Wrapper):
+    """Gusts drawn from a seed, in a rig that has them, or how fast the air rises each frame."""
 
-    def run(commands: tuple[float, float, float], /) -> None:
-        set_air(next(air_m_per_s, 0.0))
-        step(commands)
+    def __init__(
+        self,
+        flight: Flight,
+        frame_s: float,
+        seed: int = 0,
+        air_m_per_s: Iterable[float] | None = None,
+    ) -> None:
+        self._flight, self._frame_s, self._seed = flight, frame_s, seed
+        self._air = air_m_per_s
 
-    return run
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Let the air over each frame rise: as given, or as the Dryden spectrum has it."""
+        flight, air = self._flight, self._air
+        if air is None and flight.gust_rms > 0.0:
+            speed = aircraft.motion()[SPEED]
+            air = dryden(flight.gust_rms, flight.gust_length, speed, self._frame_s, self._seed)
+        if air is None:
+            return None
+        down, speeds = aircraft.lever(GUST_DOWN).set, iter(air)
+
+        def blow() -> None:
+            down(-next(speeds, 0.0) / FOOT_m)
+
+        return blow

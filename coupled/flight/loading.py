@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
-from typing import Any
 
+from coupled.flight.wrapper import Aircraft, Wrapper
 from coupled.rig.parameters import Flight
 from coupled.units import INCH_m
 
@@ -20,18 +19,28 @@ _POINT = "metrics/aero-rp-x-in"  # aft positive
 _FUEL = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
 
 
-def load(fdm: Any, flight: Flight, properties: Iterable[str]) -> tuple[str, str] | None:
-    """Load a model before it is trimmed; return the key that it cannot be, and why, or None."""
-    if flight.cg_aft != 0.0:
-        fdm[_POINT] -= flight.cg_aft / INCH_m
-    if flight.fuel == 1.0:
-        return None
-    tanks = sorted(filter(_FUEL, properties))
-    if not any(fdm[tank] > 0.0 for tank in tanks):
-        return "fuel", f"{flight.model} has no fuel in its tanks"
-    for tank in tanks:
-        wanted = flight.fuel * fdm[tank]
-        fdm[tank] = wanted
-        if not math.isclose(fdm[tank], wanted, rel_tol=1e-6, abs_tol=1e-9):
-            return "fuel", f"{flight.fuel:g} is more than the tanks of {flight.model} hold"
-    return None
+class Loading(Wrapper):
+    """The load that a rig's `flight` section asks for."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+
+    def load(self, aircraft: Aircraft) -> None:
+        """Load a model before it is trimmed."""
+        if self._flight.cg_aft != 0.0:
+            point = aircraft.lever(_POINT)
+            point.set(point.read() - self._flight.cg_aft / INCH_m)
+        if self._flight.fuel != 1.0:
+            self._fill(aircraft)
+
+    def _fill(self, aircraft: Aircraft) -> None:
+        flight = self._flight
+        tanks = [aircraft.lever(name) for name in sorted(filter(_FUEL, aircraft.names()))]
+        if not any(tank.read() > 0.0 for tank in tanks):
+            raise aircraft.fault("fuel", f"{flight.model} has no fuel in its tanks")
+        for tank in tanks:
+            wanted = flight.fuel * tank.read()
+            tank.set(wanted)
+            if not math.isclose(tank.read(), wanted, rel_tol=1e-6, abs_tol=1e-9):
+                problem = f"{flight.fuel:g} is more than the tanks of {flight.model} hold"
+                raise aircraft.fault("fuel", problem)

@@ -20,14 +20,23 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.files import sha256
-from coupled.flight.airframe import ALTITUDE, JSBSimAirframe
+from coupled.flight.aircraft import make_aircraft
 from coupled.flight.bench import Airframe, Bench
-from coupled.flight.conditions import meet
+from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
+from coupled.flight.gusts import Gusts
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action, ForceTable
 from coupled.flight.pilot.base import Start
-from coupled.record.channels import TIME, ControlName, channel, record_channels
+from coupled.record.channels import (
+    ALTITUDE,
+    LOAD,
+    PRESSURE,
+    TIME,
+    ControlName,
+    channel,
+    record_channels,
+)
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
@@ -54,7 +63,7 @@ def fly(
     airframe = make_airframe(manoeuvre, air_m_per_s)
     frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
-    actions = _actions(manoeuvre, airframe.motion()[0])
+    actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
     names = list(rig.controls)
     channels = record_channels(names, rig.flight is not None)
     controls = pack(rig, {str(name): action.hand for name, action in actions.items()})
@@ -81,7 +90,7 @@ def fly(
             if looks:
                 for state, look in looks:
                     state["command"] = look(k / rig.frame_rate, motion)
-            load = motion[1] if flown else 1.0
+            load = motion[LOAD] if flown else 1.0
             commands = rig_frame(place, k, motion, load)
             if asked:
                 extra.append(airframe.extra())
@@ -115,20 +124,23 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
     try:
         check_direct_controls(rig.flight, frame_s, controls, **where)
-        asked: dict[str, Any] = {
-            "record": manoeuvre.record_properties,
-            "record_file": manoeuvre.file,
-            "seed": manoeuvre.seed,
-            "air_m_per_s": air_m_per_s,
-        }
-        airframe = JSBSimAirframe(rig.flight, frame_s, controls, **asked, **where)
+        return make_aircraft(
+            rig.flight,
+            frame_s,
+            controls,
+            record=manoeuvre.record_properties,
+            run_file=manoeuvre.file,
+            conditions=condition_wrappers(
+                manoeuvre.conditions, manoeuvre.file, frame_s, manoeuvre.seed
+            ),
+            gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air_m_per_s),
+            **where,
+        )
     except InputError as error:
         if source is None or error.key not in source.changes:
             raise
         place = f"case {manoeuvre.label!r}: rig.{error.key}"
         raise InputError(source.run_file, place, error.problem) from None
-    meet(airframe, manoeuvre.conditions, manoeuvre.file, frame_s, manoeuvre.seed)
-    return airframe
 
 
 def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Action]:

@@ -15,10 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.flight.airframe import ALTITUDE, SPEED, JSBSimAirframe
-from coupled.record.channels import LONGITUDINAL, ControlName
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.record.channels import ALTITUDE, LOAD, PITCH, PRESSURE, SPEED, ControlName
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
+from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 
@@ -26,8 +28,6 @@ _SIZE = 0.004  # of the elevator command: linear, and far above rounding
 _FADE, _WAIT, _MEASURED = 2.0, 2.0, 4.0  # periods
 _LEAST_WAIT_s = 10.0  # the short period of the slowest aircraft here has died down by then
 _DRIFT = 3  # order of the polynomial that takes what drifts
-PITCH = LONGITUDINAL.index("pitch_rad")
-LOAD = LONGITUDINAL.index("load_factor")
 
 
 class Response(NamedTuple):
@@ -51,7 +51,7 @@ def elevator_response(
 
     The command is set once a frame; the motion of row k is read before that of row k acts.
     """
-    still = flight.model_copy(update={"gust_rms": 0.0})
+    still = changed(flight, {"gust_rms_m_per_s": 0.0}, file)
     return _response(still.model_dump_json(), frame_s, controls, file, rate_rad_per_s)
 
 
@@ -66,7 +66,7 @@ def _response(
     fade = np.sin(0.5 * np.pi * np.clip(times / (_FADE * period), 0.0, 1.0)) ** 2
     command = _SIZE * fade * np.sin(rate * times)
     planes = [_aircraft(flight, frame_s, controls, file) for _ in "+-"]
-    pressure_Pa = planes[0].motion()[0]
+    pressure_Pa = planes[0].motion()[PRESSURE]
     up = _fly(planes[0], command, frame_s)
     down = _fly(planes[1], -command, frame_s)
     late = times >= wait
@@ -81,7 +81,7 @@ def _response(
 def _aircraft(
     flight: Flight, frame_s: float, controls: tuple[ControlName, ...], file: object
 ) -> JSBSimAirframe:
-    return JSBSimAirframe(flight, frame_s, controls, [aircraft_folder()], file)
+    return make_aircraft(flight, frame_s, controls, [aircraft_folder()], file)
 
 
 def _fly(airframe: JSBSimAirframe, command: Floats, frame_s: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Gusts and turbulence of a run: JSBSim's own, told in SI and drawn from the run's seed.
+"""Gusts and turbulence of a run: JSBSim's own, given in SI and drawn from the run's seed.
 
 A gust is air that moves as (1 − cos(π·t/rise))/2 of its velocity, holds it, and comes to rest in
 the same way. Turbulence is JSBSim's: `milspec`, MIL-F-8785C by its discrete approximation, or
@@ -9,15 +9,13 @@ of the wind at 20 ft, above 2000 ft that of a severity. It shakes all axes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Literal
 
 from coupled.errors import InputError
-from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.schema import Section, quantity
 from coupled.units import FOOT_m
 
-Step = Callable[[tuple[float, float, float]], None]
 _GUST = "atmosphere/cosine-gust/"
 _LOCAL = 3.0  # JSBSim's number of the frame north, east, down; the aircraft starts northwards
 _STRONGEST = 100.0  # m/s
@@ -52,39 +50,52 @@ def check_gust(gust: Gust, file: object) -> None:
         raise InputError(file, "gust", problem)
 
 
-def gusting(airframe: JSBSimAirframe, gust: Gust, file: object, frame_s: float) -> Step:
-    """Return the aircraft's step, with the gust let go at its time."""
-    velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
-    values = {
-        "startup-duration-sec": gust.rise,
-        "steady-duration-sec": gust.hold,
-        "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
-        "magnitude-ft_sec": math.hypot(*velocity),
-        "frame": _LOCAL,
-        **{f"{axis}-velocity-ft_sec": speed for axis, speed in zip("XYZ", velocity, strict=True)},
-    }
-    for name, value in values.items():
-        airframe.lever(_GUST + name, file, "gust").set(value)
-    start = airframe.lever(_GUST + "start", file, "gust")
-    step, frame, first = airframe.step, 0, math.ceil(gust.at / frame_s - 1e-6)
+class DiscreteGust(Wrapper):
+    """A run's discrete gust, let go at its time; `file` is where it is described."""
 
-    def run(commands: tuple[float, float, float], /) -> None:
-        nonlocal frame
-        if frame == first:
-            start.set(1.0)
-        frame += 1
-        step(commands)
+    def __init__(self, gust: Gust, file: object, frame_s: float) -> None:
+        self._gust, self._file, self._frame_s = gust, file, frame_s
 
-    return run
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Describe the gust to JSBSim, and start it when its frame comes."""
+        gust, file = self._gust, self._file
+        velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
+        values = {
+            "startup-duration-sec": gust.rise,
+            "steady-duration-sec": gust.hold,
+            "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
+            "magnitude-ft_sec": math.hypot(*velocity),
+            "frame": _LOCAL,
+            **{f"{way}-velocity-ft_sec": v for way, v in zip("XYZ", velocity, strict=True)},
+        }
+        for name, value in values.items():
+            aircraft.lever(_GUST + name, file, "gust").set(value)
+        start = aircraft.lever(_GUST + "start", file, "gust").set
+        frame, first = 0, math.ceil(gust.at / self._frame_s - 1e-6)
+
+        def blow() -> None:
+            nonlocal frame
+            if frame == first:
+                start(1.0)
+            frame += 1
+
+        return blow
 
 
-def stir(airframe: JSBSimAirframe, turbulence: Turbulence, file: object, seed: int) -> None:
-    """Let the air be turbulent, by a seed."""
-    values = {
-        "atmosphere/randomseed": float(seed % 2**31),
-        "atmosphere/turb-type": _MODELS[turbulence.model],
-        _TURBULENCE + "windspeed_at_20ft_AGL-fps": turbulence.wind_at_6m / FOOT_m,
-        _TURBULENCE + "severity": float(turbulence.severity),
-    }
-    for name, value in values.items():
-        airframe.lever(name, file, "turbulence").set(value)
+class TurbulentAir(Wrapper):
+    """A run's turbulence, drawn from its seed; `file` is where it is described."""
+
+    def __init__(self, turbulence: Turbulence, file: object, seed: int) -> None:
+        self._turbulence, self._file, self._seed = turbulence, file, seed
+
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Let the air be turbulent from now on; JSBSim does the rest."""
+        values = {
+            "atmosphere/randomseed": float(self._seed % 2**31),
+            "atmosphere/turb-type": _MODELS[self._turbulence.model],
+            _TURBULENCE + "windspeed_at_20ft_AGL-fps": self._turbulence.wind_at_6m / FOOT_m,
+            _TURBULENCE + "severity": float(self._turbulence.severity),
+        }
+        for name, value in values.items():
+            aircraft.lever(name, self._file, "turbulence").set(value)
+        return None

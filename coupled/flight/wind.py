@@ -6,15 +6,16 @@ the change, as through a shear. Hence a run's wind starts at zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
 from coupled.errors import InputError
+from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.schema import Section, quantity
+from coupled.units import FOOT_m
 
-Step = Callable[[tuple[float, float, float]], None]
+_WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 _STRONGEST = 100.0  # m/s
 
 
@@ -42,16 +43,23 @@ def check_wind(wind: Wind, file: object) -> None:
             raise InputError(file, f"wind.{key}", f"is beyond ±{_STRONGEST:g} m/s")
 
 
-def blown(step: Step, blow: Callable[[float, float], None], wind: Wind, frame_s: float) -> Step:
-    """Return a step that sets the air's velocity first, frame by frame from the start."""
-    frame = 0
+class MovingAir(Wrapper):
+    """A run's wind: along the heading of the start, which is north, and upwards."""
 
-    def run(commands: tuple[float, float, float], /) -> None:
-        nonlocal frame
-        time = frame * frame_s
-        along = float(np.interp(time, wind.time, wind.along))
-        blow(along, 0.0 if wind.up is None else float(np.interp(time, wind.time, wind.up)))
-        frame += 1
-        step(commands)
+    def __init__(self, wind: Wind, frame_s: float) -> None:
+        self._wind, self._frame_s = wind, frame_s
 
-    return run
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Let the air move, frame by frame from the start."""
+        wind, frame_s, frame = self._wind, self._frame_s, 0
+        north, down = (aircraft.lever(name).set for name in _WINDS)
+        rising = [0.0] * len(wind.time) if wind.up is None else wind.up
+
+        def blow() -> None:
+            nonlocal frame
+            time = frame * frame_s
+            north(float(np.interp(time, wind.time, wind.along)) / FOOT_m)
+            down(-float(np.interp(time, wind.time, rising)) / FOOT_m)
+            frame += 1
+
+        return blow

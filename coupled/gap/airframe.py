@@ -14,12 +14,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.flight.airframe import SPEED, JSBSimAirframe
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.gusts import Gusts
 from coupled.gap.air import Air, vertical_air
 from coupled.gap.output import Output, spread, white
 from coupled.gap.surfaces import commands, surface_channel
 from coupled.gap.thresholds import FLIGHT_KNOWN, LOST_MOTION
-from coupled.record.channels import motion_channels
+from coupled.record.channels import SPEED, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
@@ -65,14 +66,15 @@ class Model:
 
         `with_error` adds to the air a sample of its error.
         """
-        still = changed(flight, {"gust_rms_m_per_s": 0.0}, flight.model)
+        still = changed(flight, {"gust_rms_m_per_s": 0.0}, self.rig.name, "flight")
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = moves + self.air.error if with_error else moves
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 tells of the air over the frame before
         frame_s, controls = 1.0 / self.rig.frame_rate, list(self.rig.controls)
-        airframe = JSBSimAirframe(still, frame_s, controls, [aircraft_folder()], air_m_per_s=air)
+        gusts = Gusts(still, frame_s, air_m_per_s=air)
+        airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
         every = motion_channels(controls, flown=True)
         at = [every.index(name) for name in self.compared]
         motion = np.full((len(asked), len(at)), np.nan)
@@ -123,5 +125,5 @@ def trim_speed(rig: Rig) -> float:
     """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
     assert rig.flight is not None
     frame_s = 1.0 / rig.frame_rate
-    airframe = JSBSimAirframe(rig.flight, frame_s, ["column"], [aircraft_folder()])
+    airframe = make_aircraft(rig.flight, frame_s, ["column"], [aircraft_folder()])
     return airframe.motion()[SPEED]

@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.output import white
@@ -24,6 +25,7 @@ from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.rig.replay import replay_surface
 from coupled.rig.rig import Rig
+from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
@@ -40,7 +42,7 @@ def surface_points(rig: Rig, control: ControlName) -> Points | None:
     None where the aircraft moves the surface by laws of its own.
     """
     assert rig.flight is not None
-    plain = Flight.model_validate({**dict(rig.flight), **UNALTERED})
+    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
     return _points(plain.model_dump_json(), tuple(rig.controls), rig.frame_rate, control)
 
 
@@ -51,7 +53,7 @@ def _points(
     plain = Flight.model_validate_json(flight)
 
     def model() -> JSBSimAirframe:
-        return JSBSimAirframe(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
+        return make_aircraft(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
 
     if _moves_itself(model(), controls, rate_Hz, control):
         return None

@@ -46,6 +46,15 @@ LONGITUDINAL = (
     "true_airspeed_m_per_s",
     "altitude_m",
 )
+# Their places in the motion, which the airframe gives in this order.
+PRESSURE = LONGITUDINAL.index("dynamic_pressure_Pa")
+LOAD = LONGITUDINAL.index("load_factor")
+ELEVATOR = LONGITUDINAL.index("elevator_rad")
+PITCH_RATE = LONGITUDINAL.index("pitch_rate_rad_per_s")
+ALPHA = LONGITUDINAL.index("alpha_rad")
+PITCH = LONGITUDINAL.index("pitch_rad")
+SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
+ALTITUDE = LONGITUDINAL.index("altitude_m")
 LATERAL = (
     "aileron_rad",
     "rudder_rad",

@@ -23,14 +23,14 @@ CONTROLS = ("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-nor
 def test_it_comes_back_from_an_upset_hands_off(
     alpha_deg: float, beta_deg: float, clean: bool
 ) -> None:
-    level = {"calibrated_airspeed": 66.9, "flight_path": 0.0} if clean else {}
-    fdm = trimmed(CLEAN if clean else {}, altitude=1800.0, **level)
-    calm_deg, knots = fdm["aero/alpha-deg"], fdm["velocities/vc-kts"]
+    level = {"calibrated_airspeed_m_per_s": 66.9, "flight_path_rad": 0.0} if clean else {}
+    fdm = trimmed(CLEAN if clean else {}, altitude_m=1800.0, **level)
+    trim_deg, knots = fdm["aero/alpha-deg"], fdm["velocities/vc-kts"]
     place(fdm, alpha__deg=alpha_deg, beta__deg=beta_deg)
     assert fdm["aero/alpha-deg"] == pytest.approx(alpha_deg, abs=0.1)
     assert fdm["aero/beta-deg"] == pytest.approx(beta_deg, abs=0.1)
     fly(fdm, 60.0)
-    assert fdm["aero/alpha-deg"] == pytest.approx(calm_deg, abs=2.5)
+    assert fdm["aero/alpha-deg"] == pytest.approx(trim_deg, abs=2.5)
     assert fdm["aero/beta-deg"] == pytest.approx(0.0, abs=1.0)
     assert fdm["velocities/vc-kts"] == pytest.approx(knots, rel=0.12)
     assert abs(fdm["attitude/phi-deg"]) < 5.0
@@ -118,7 +118,7 @@ def test_the_nozzles_stop_where_published(asked_deg: float, stands_deg: float) -
 
 
 def test_an_engine_out_in_the_approach_is_held_by_the_wheel() -> None:
-    fdm = trimmed(altitude=1000.0)
+    fdm = trimmed(altitude_m=1000.0)
     fdm.run()
     thrust = fdm["propulsion/engine[1]/thrust-lbs"]
     place(fdm, {LEVERS[1]: 0.0})
@@ -132,7 +132,7 @@ def test_an_engine_out_in_the_approach_is_held_by_the_wheel() -> None:
 
 def test_the_stall_gives_way_to_a_push() -> None:
     """Clean and idle, the column right back: it slows to its greatest lift, and recovers."""
-    fdm = trimmed(CLEAN, altitude=2500.0, calibrated_airspeed=60.0, flight_path=0.0)
+    fdm = trimmed(CLEAN, altitude_m=2500.0, calibrated_airspeed_m_per_s=60.0, flight_path_rad=0.0)
     trim = fdm["fcs/elevator-cmd-norm"]
     greatest = 0.0
     fdm["fcs/elevator-cmd-norm"] = -1.0

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly, make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
+from coupled.record.channels import ALPHA, ELEVATOR, PRESSURE, SPEED
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.units import POUND_N, FOOT_m
@@ -44,10 +46,10 @@ def scenario(
     seed: int = 3,
 ) -> Manoeuvre:
     path = folder / "adverse.toml"
-    told = RUN.format(
+    text = RUN.format(
         conditions=conditions, rig=rig, extra=extra or [], duration=duration, seed=seed
     )
-    path.write_text(told, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return read_run(str(path))[0]
 
 
@@ -74,8 +76,8 @@ def test_a_gust_is_one_minus_cosine_of_its_velocity(tmp_path: Path) -> None:
 @pytest.mark.parametrize("model", ["milspec", "tustin"])
 def test_turbulence_comes_from_the_seed_and_grows_with_the_wind(tmp_path: Path, model: str) -> None:
     def air(wind: float, seed: int) -> np.ndarray:
-        told = f'[turbulence]\nmodel = "{model}"\nwind_at_6m_m_per_s = {wind}\nseverity = 3\n'
-        low = scenario(tmp_path, told, extra=AIR, duration=20.0, seed=seed)
+        table = f'[turbulence]\nmodel = "{model}"\nwind_at_6m_m_per_s = {wind}\nseverity = 3\n'
+        low = scenario(tmp_path, table, extra=AIR, duration=20.0, seed=seed)
         rig = low.rig.changed({"flight.altitude_m": 200.0})
         return fly(replace(low, rig=rig)).data[:, -3:]
 
@@ -158,27 +160,24 @@ def test_ice_on_the_flaps_brakes_by_its_drag(tmp_path: Path) -> None:
 
 
 def loaded(rig: str, **changes: float) -> JSBSimAirframe:
-    flight = read_run({"737": "pull-up-737", "awjsra": "awjsra-shear"}[rig])[0].rig.flight
+    nominal = read_run({"737": "pull-up-737", "awjsra": "awjsra-shear"}[rig])[0].rig
+    flight = nominal.changed({f"flight.{key}": value for key, value in changes.items()}).flight
     assert flight is not None
-    folders = [aircraft_folder()]
-    return JSBSimAirframe(flight.model_copy(update=changes), 1 / 120, ("column",), folders)
-
-
-def told(airframe: JSBSimAirframe, name: str) -> float:
-    return airframe.lever(name, "test", name).read() if airframe.has(name) else np.nan
+    return make_aircraft(flight, 1 / 120, ("column",), [aircraft_folder()])
 
 
 def test_a_centre_of_gravity_further_aft_takes_nose_down_elevator() -> None:
     """ΔC_m = C_N·Δx/c̄ for a normal force that is the weight, over C_mδ = −1.2 (less with Mach)."""
     shift = 0.3
-    before, after = loaded("737"), loaded("737", cg_aft=shift)
-    q, _, elevator, _, alpha, _, speed, _ = before.motion()
+    before, after = loaded("737"), loaded("737", cg_aft_m=shift)
+    start, end = before.motion(), after.motion()
+    q, speed, alpha = start[PRESSURE], start[SPEED], start[ALPHA]
     weight = 107_000 * POUND_N
     normal = weight * np.cos(alpha) / (q * 1171.0 * FOOT_m**2)
     power = 1.2 - 0.45 * speed / 328.6  # the model's table against Mach, at 3000 m
-    moved = after.motion()[2] - elevator
+    moved = end[ELEVATOR] - start[ELEVATOR]
     # The stabilising 0.6 by which the model's C_m falls with α acts where α has changed.
-    moved += 0.6 * (after.motion()[4] - alpha) / power
+    moved += 0.6 * (end[ALPHA] - alpha) / power
     assert moved == pytest.approx(normal * shift / (12.31 * FOOT_m) / power, rel=0.03)
 
 
@@ -243,7 +242,7 @@ def test_what_the_model_lacks_is_refused_before_it_flies(
 
 @pytest.mark.parametrize(
     ("changes", "key", "says"),
-    [({"fuel": 50.0}, "flight.fuel", "is more than the tanks"), ({"cg_aft": 9.0}, "flight", "")],
+    [({"fuel": 50.0}, "flight.fuel", "is more than the tanks"), ({"cg_aft_m": 4.0}, "flight", "")],
 )
 def test_a_load_that_cannot_be_is_refused(changes: dict[str, float], key: str, says: str) -> None:
     with pytest.raises(InputError) as caught:

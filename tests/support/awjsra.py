@@ -9,7 +9,6 @@ from types import ModuleType
 from typing import Any
 
 from coupled.resources import aircraft_folder, shipped_rigs
-from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
 
 HOME = aircraft_folder() / "awjsra"
@@ -35,11 +34,11 @@ def validation() -> ModuleType:
 
 
 def trimmed(properties: dict[str, float] | None = None, **flight: float) -> Any:
-    """Return the aircraft trimmed as its rig file says, but for what is given."""
+    """Return the aircraft trimmed as its rig file says, but for some keys of the file."""
     assert RIG.flight is not None
-    values = {**dict(RIG.flight), **flight}
-    values["properties"] = {**RIG.flight.properties, **(properties or {})}
-    return validation().trimmed(RIG.changed({"flight": Flight(**values)}))
+    changes: dict[str, Any] = {f"flight.{key}": value for key, value in flight.items()}
+    changes["flight.properties"] = {**RIG.flight.properties, **(properties or {})}
+    return validation().trimmed(RIG.changed(changes))
 
 
 def place(fdm: Any, levers: dict[str, float] | None = None, **state: float) -> Any:

@@ -11,8 +11,18 @@ from numpy.typing import NDArray
 
 from coupled.blind.twin.kernel import twin_frame
 from coupled.blind.twin.numbers import KNOTS, TWIN_PARAMETERS, TWIN_STATE
-from coupled.flight.airframe import ALTITUDE, ELEVATOR, JSBSimAirframe
-from coupled.record.channels import BENCH_MOTION, LONGITUDINAL
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.record.channels import (
+    ALPHA,
+    ALTITUDE,
+    BENCH_MOTION,
+    ELEVATOR,
+    LOAD,
+    LONGITUDINAL,
+    PRESSURE,
+    SPEED,
+)
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
@@ -29,10 +39,6 @@ RIG_CHANNELS = (
     "column_modifying_force_N",
     "dynamic_pressure_Pa",
 )
-LOAD, RATE, ALPHA = (
-    LONGITUDINAL.index(name) for name in ("load_factor", "pitch_rate_rad_per_s", "alpha_rad")
-)
-SPEED = LONGITUDINAL.index("true_airspeed_m_per_s")
 
 
 @dataclass
@@ -158,7 +164,7 @@ def fly_twin(
 
 def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
     """Return the aircraft, trimmed, its column alone."""
-    return JSBSimAirframe(flight, frame_s, ["column"], [aircraft_folder()])
+    return make_aircraft(flight, frame_s, ["column"], [aircraft_folder()])
 
 
 def _fly(
@@ -189,7 +195,7 @@ def _fly(
         if abs(motion[ALPHA] - start[ALPHA]) > 0.22 or motion[SPEED] < 0.7 * start[SPEED]:
             raise LostError
         motions.append(motion)
-        command = kernel(twin.numbers, state, nodes, rows[k], k, motion[0], motion[LOAD])
+        command = kernel(twin.numbers, state, nodes, rows[k], k, motion[PRESSURE], motion[LOAD])
         commands[k] = command
         if moment is not None:
             change = [now - then for now, then in zip(motion, start, strict=True)]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from coupled.flight.pilot.base import STRONGEST, Action, Pilot, Start, edges, needs_aircraft
-from coupled.record.channels import LONGITUDINAL, ControlName
+from coupled.record.channels import PITCH, PITCH_RATE, ControlName
 from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.schema import quantity
@@ -28,8 +28,6 @@ class Attitude(Pilot):
     integral_gain_N_per_rad_s: float = quantity("", 0.0, ge=0, le=1e6)
     lag_s: float = quantity("", 0.1, ge=0, le=7200)
     force_limit_N: float = quantity("", 330.0, gt=0, le=STRONGEST)
-    _PITCH: ClassVar[int] = LONGITUDINAL.index("pitch_rad")
-    _RATE: ClassVar[int] = LONGITUDINAL.index("pitch_rate_rad_per_s")
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
         """Refuse any but the column of a rig that flies."""
@@ -44,10 +42,10 @@ class Attitude(Pilot):
             nonlocal found, integral, last
             if time < self.start_s:
                 return 0.0
-            found = motion[self._PITCH] if found is None else found
+            found = motion[PITCH] if found is None else found
             share = edges(np.array([time]), [(self.start_s, 1.0)], self.rise_s)[0]
-            error = found + self.change_rad * float(share) - motion[self._PITCH]
-            damping = self.rate_gain_N_s_per_rad * motion[self._RATE]
+            error = found + self.change_rad * float(share) - motion[PITCH]
+            damping = self.rate_gain_N_s_per_rad * motion[PITCH_RATE]
             force = self.gain_N_per_rad * error + integral - damping
             if abs(force) < self.force_limit_N:
                 integral += self.integral_gain_N_per_rad_s * error * (time - last)

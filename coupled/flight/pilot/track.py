@@ -21,7 +21,6 @@ from typing import Literal
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.airframe import ALTITUDE, SPEED
 from coupled.flight.pilot.base import (
     STRONGEST,
     Action,
@@ -41,8 +40,8 @@ from coupled.flight.pilot.crossover import (
     delay_response,
 )
 from coupled.flight.pilot.remnant import Remnant
-from coupled.flight.response import PITCH, Response, elevator_response, path_angle
-from coupled.record.channels import ControlName
+from coupled.flight.response import Response, elevator_response, path_angle
+from coupled.record.channels import ALTITUDE, PITCH, SPEED, ControlName
 from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import COMMAND_SIGN, Hand
 from coupled.rig.rig import Rig

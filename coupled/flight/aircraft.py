@@ -1,0 +1,48 @@
+"""A rig's aircraft in its conditions: the plain airframe, and all that is put around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import Alterations
+from coupled.flight.gusts import Gusts
+from coupled.flight.loading import Loading
+from coupled.flight.wrapper import Aircraft, Wrapper
+from coupled.rig.parameters import Flight
+
+
+def make_aircraft(
+    flight: Flight,
+    frame_s: float,
+    controls: Sequence[str] = ("column",),
+    models: Sequence[Path] = (),
+    file: object = "rig",
+    *,
+    record: Sequence[str] = (),
+    run_file: object = "run",
+    conditions: Sequence[Wrapper] = (),
+    gusts: Gusts | None = None,
+) -> JSBSimAirframe:
+    """Return a rig's aircraft, trimmed, as its `flight` section and a run's conditions have it.
+
+    `controls` are those of the rig in its order; `models`, folders of models of our own, searched
+    first; `file` and `run_file`, where rig and run are described, for faults; `record`, further
+    properties to read each frame; `gusts`, in place of those that the rig draws from seed 0.
+    Raises InputError.
+
+    Before each frame the conditions act in their order, then the gusts; then the factors follow
+    a trim that was moved.
+    """
+
+    def spare(names: Sequence[str]) -> Aircraft:
+        return JSBSimAirframe(flight, frame_s, ("column",), models, file, names)
+
+    wrappers = (
+        *conditions,
+        gusts or Gusts(flight, frame_s),
+        Alterations(flight, spare),
+        Loading(flight),
+    )
+    return JSBSimAirframe(flight, frame_s, controls, models, file, record, run_file, wrappers)

@@ -1,0 +1,189 @@
+"""A JSBSim model's file, with a part of its aerodynamics scaled.
+
+Of each function F of an axis, the part that is due to one quantity x is F(x) − F(x₀). With a
+factor k that part is k times as large,
+
+    F ← k·F(x) + (1 − k)·F(x₀),
+
+whatever the form of F: a product is its coefficient times k, a table each of its values less that
+at x₀. Functions outside the axis that F refers to are followed, and copied with x₀ for x. At k = 1
+the model is the one that was filed, to the bit. k and x₀ are properties, set once loaded.
+
+JSBSim loads files only, so the new text stands in a temporary folder while it loads, beside links
+to the model's other files. The model's own folder is never written to.
+"""
+
+from __future__ import annotations
+
+import copy
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+Element = ElementTree.Element
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """The part of the aerodynamics that is due to one quantity.
+
+    `quantity` is named by `properties`, JSBSim's, of which a model may use any; `axes` are those
+    in which its part is scaled, all where none is named.
+    """
+
+    name: str
+    quantity: str
+    properties: tuple[str, ...]
+    axes: tuple[str, ...] = ()
+
+    @property
+    def factor(self) -> str:
+        """The property that holds k."""
+        return f"coupled/{self.name}/factor"
+
+    @property
+    def rest(self) -> str:
+        """The property that holds 1 − k."""
+        return f"coupled/{self.name}/rest"
+
+    def held(self, name: str) -> str:
+        """Return the property that holds x₀ for one of `properties`."""
+        return f"coupled/{self.name}/held-{self.properties.index(name)}"
+
+
+class NothingToScaleError(Exception):
+    """A model has no aerodynamics that are due to a quantity."""
+
+    def __init__(self, scaled: Scaled) -> None:
+        super().__init__(scaled.name)
+        self.scaled = scaled
+
+
+@contextmanager
+def loadable(models: Path, name: str, scaled: Sequence[Scaled]) -> Iterator[Path]:
+    """Yield the folder of models from which to load a model, with parts of it scalable.
+
+    Raises NothingToScaleError, or OSError where there is no temporary folder to write to.
+    """
+    if not scaled:
+        yield models
+        return
+    folder = models / name
+    state = (folder / f"{name}.xml").stat()
+    text = _scalable(folder, tuple(scaled), state.st_mtime_ns, state.st_size)
+    with tempfile.TemporaryDirectory(prefix="coupled-") as temporary:
+        made = Path(temporary) / name
+        made.mkdir()
+        for entry in folder.iterdir():
+            if entry.name != f"{name}.xml":
+                _stand_in(made / entry.name, entry.absolute())
+        (made / f"{name}.xml").write_bytes(text)
+        yield Path(temporary)
+
+
+def _stand_in(place: Path, entry: Path) -> None:
+    """Put a link to a file or folder at a place, or a copy where links are not allowed."""
+    try:
+        place.symlink_to(entry, target_is_directory=entry.is_dir())
+    except OSError:
+        if entry.is_dir():
+            shutil.copytree(entry, place)
+        else:
+            shutil.copyfile(entry, place)
+
+
+@lru_cache(maxsize=16)
+def _scalable(folder: Path, scaled: tuple[Scaled, ...], changed_ns: int, size: int) -> bytes:
+    """Return a model's text with parts of it scalable; `changed_ns` and `size` tell versions."""
+    root = ElementTree.parse(folder / f"{folder.name}.xml").getroot()
+    aerodynamics = root.find("aerodynamics")
+    if aerodynamics is None:
+        raise NothingToScaleError(scaled[0])
+    if (file := aerodynamics.attrib.pop("file", None)) is not None:
+        own = folder / (file if file.endswith(".xml") else f"{file}.xml")
+        aerodynamics[:] = list(ElementTree.parse(own).getroot())
+    for one in scaled:
+        _make_scalable(aerodynamics, one)
+    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text
+
+
+def _make_scalable(aerodynamics: Element, scaled: Scaled) -> None:
+    named = {
+        f.attrib["name"].strip(): f for f in aerodynamics.iter("function") if "name" in f.attrib
+    }
+    found = {name: scaled.held(name) for name in scaled.properties}
+    held = dict(found)
+    copies: list[Element] = []
+    without = set[str]()  # functions that have nothing of the quantity
+
+    def depends(function: Element) -> bool:
+        """Tell whether a function has the quantity in it, and copy those that it reaches it by."""
+        hit = False
+        for part in function.iter():
+            name = _property(part)
+            if name in named and name not in held and name not in without:
+                without.add(name)
+                if depends(named[name]):
+                    without.discard(name)
+                    held[name] = f"{name}-{scaled.name}-held"
+                    copies.append(_held_copy(named[name], held, held[name]))
+            hit = hit or name in held
+        return hit
+
+    touched = [
+        function
+        for axis in aerodynamics.findall("axis")
+        if not scaled.axes or axis.get("name", "").strip() in scaled.axes
+        for function in axis.findall("function")
+        if depends(function)
+    ]
+    if not touched:
+        raise NothingToScaleError(scaled)
+    for function in touched:
+        _scale(function, scaled, held)
+    values = {scaled.factor: "1", scaled.rest: "0", **dict.fromkeys(found.values(), "0")}
+    for place, (name, value) in enumerate(values.items()):
+        declared = Element("property", {"value": value})
+        declared.text = name
+        aerodynamics.insert(place, declared)
+    first_axis = list(aerodynamics).index(aerodynamics.findall("axis")[0])
+    aerodynamics[first_axis:first_axis] = copies
+
+
+def _property(element: Element) -> str:
+    """Return the property that an element of a function refers to, or an empty string."""
+    return (element.text or "").strip().removeprefix("-")
+
+
+def _held_copy(function: Element, held: dict[str, str], name: str = "") -> Element:
+    """Return a copy of a function in which what it refers to is held at x₀."""
+    made = copy.deepcopy(function)
+    for part in made.iter():
+        if (old := _property(part)) in held:
+            part.text = (part.text or "").replace(old, held[old])
+        part.attrib.pop("name", None)  # of a table: no two properties bear one name
+    if name:
+        made.set("name", name)
+    return made
+
+
+def _scale(function: Element, scaled: Scaled, held: dict[str, str]) -> None:
+    """Let a function be k times its value, and 1 − k times that at x₀."""
+    bodies = [part for part in function if part.tag != "description"]
+    total = Element("sum")
+    for factor, terms in (
+        (scaled.factor, bodies),
+        (scaled.rest, [_held_copy(body, held) for body in bodies]),
+    ):
+        product = ElementTree.SubElement(total, "product")
+        ElementTree.SubElement(product, "property").text = factor
+        product.extend(terms)
+    for body in bodies:
+        function.remove(body)
+    function.append(total)

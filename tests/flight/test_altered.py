@@ -1,0 +1,186 @@
+"""Factors on a model's aerodynamics: each against a copy of the model edited by hand."""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe, packaged_models
+from coupled.flight.altered import ALTERATIONS
+from coupled.flight.modelfile import Scaled
+from coupled.flight.wrapper import Wrapper
+from coupled.record.channels import ELEVATOR, LONGITUDINAL, PITCH_RATE
+from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.rig.parameters import Flight
+from coupled.rig.rigfile import read_rig
+from coupled.schema import changed
+from tests.support.models import edited_model, multiplied
+
+FRAME = 1 / 120
+FLOWN = [name for name in shipped_rigs() if name != "bench"]
+MODELS = ["c172p", "t37", "737", "b747"]
+Floats = NDArray[np.float64]
+
+
+def shipped(name: str, **changes: Any) -> Flight:
+    flight = read_rig(shipped_rigs()[name]).flight
+    assert flight is not None
+    return changed(flight, changes, name, "flight")
+
+
+def motions(airframe: JSBSimAirframe, size: float = 0.04, frames: int = 240) -> Floats:
+    """Return the motion under a doublet of the elevator, shape (frames, channels)."""
+    found = []
+    for k in range(frames):
+        found.append(airframe.motion())
+        airframe.step((size if k < 60 else -size if k < 120 else 0.0, 0.0, 0.0))
+    return np.array(found)
+
+
+class Neutral(Wrapper):
+    """All parts scalable, and none scaled."""
+
+    @property
+    def scaled(self) -> tuple[Scaled, ...]:
+        return tuple(alteration.part for alteration in ALTERATIONS)
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_a_model_that_is_scalable_and_not_scaled_is_as_filed_to_the_bit(name: str) -> None:
+    flight, folders = shipped(name), [aircraft_folder()]
+    plain = JSBSimAirframe(flight, FRAME, models=folders)
+    scalable = JSBSimAirframe(flight, FRAME, models=folders, wrappers=[Neutral()])
+    assert scalable.has("coupled/pitch_damping/factor")
+    assert np.array_equal(motions(plain), motions(scalable))
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("factor", [0.0, 0.53, 2.0])
+def test_pitch_damping_is_the_coefficient_of_the_pitch_rate(
+    tmp_path: Path, name: str, factor: float
+) -> None:
+    flight = shipped(name)
+    models = edited_model(tmp_path, flight.model, multiplied({"/Cmq": factor}))
+    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    found = motions(make_aircraft(shipped(name, pitch_damping=factor), FRAME))
+    nominal = motions(make_aircraft(flight, FRAME))
+    scale = np.ptp(nominal, axis=0) + 1e-6
+    assert np.max(np.abs(found - wanted) / scale) < 1e-9
+    assert np.max(np.abs(nominal - wanted)[:, PITCH_RATE]) > 0.02 * scale[PITCH_RATE]
+
+
+def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> None:
+    """The Augmentor Wing's tail meets the pitch rate in functions that its lift shares."""
+    factor = 0.4
+
+    def edit(aerodynamics: ET.Element) -> None:
+        """Write the tail's and the wing's damping down by hand, and leave the tail's lift."""
+        named = {f.get("name"): f for f in aerodynamics.iter("function")}
+        wing = named["aero/moment/pitch-wing-rate"].find("product")
+        assert wing is not None
+        ET.SubElement(wing, "value").text = repr(factor)
+        axis = next(a for a in aerodynamics.findall("axis") if a.get("name") == "PITCH")
+        lost = ET.SubElement(axis, "function", name="aero/moment/pitch-tail-rate-lost")
+        product = ET.SubElement(lost, "product")
+        # The tail's table is straight over the angles of this flight, its slope 1.
+        for value in (-46.3 * 233.0 * 4.32, factor - 1.0):
+            ET.SubElement(product, "value").text = repr(value)
+        for name in ("aero/qbar-psf", "awjsra/tail-slope", "aero/tail-delay-s"):
+            ET.SubElement(product, "property").text = name
+        ET.SubElement(product, "property").text = "velocities/q-aero-rad_sec"
+
+    models = edited_model(tmp_path, "awjsra", edit, aircraft_folder())
+    wanted = motions(make_aircraft(shipped("awjsra"), FRAME, models=[models]))
+    flight = shipped("awjsra", pitch_damping=factor)
+    altered = make_aircraft(flight, FRAME, models=[aircraft_folder()])
+    scale = np.ptp(wanted, axis=0) + 1e-6
+    assert np.max(np.abs(motions(altered) - wanted) / scale) < 1e-6
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_elevator_does_more_or_less_about_its_trim(tmp_path: Path, name: str) -> None:
+    """ΔX = e·(X(δ) − X(δ₀)): lift, drag and moment of a copy with e in each and δ₀ made up for."""
+    factor, flight = 0.6, shipped(name)
+    trim = make_aircraft(flight, FRAME).motion()[ELEVATOR]
+
+    def edit(aerodynamics: ET.Element) -> None:
+        """Put δ₀ + e·(δ − δ₀) in the place of δ."""
+        seen = ET.Element("function", name="test/elevator-seen")
+        total = ET.SubElement(seen, "sum")
+        ET.SubElement(total, "value").text = repr((1.0 - factor) * trim)
+        product = ET.SubElement(total, "product")
+        ET.SubElement(product, "value").text = repr(factor)
+        ET.SubElement(product, "property").text = "fcs/elevator-pos-rad"
+        for axis in aerodynamics.findall("axis"):
+            if axis.get("name") == "DRAG":  # of |δ|: scaled as it is, below
+                continue
+            for part in axis.iter("property"):
+                if (part.text or "").strip() == "fcs/elevator-pos-rad":
+                    part.text = "test/elevator-seen"
+        aerodynamics.insert(0, seen)
+
+    models = edited_model(tmp_path, flight.model, edit)
+    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    found = motions(make_aircraft(shipped(name, elevator_effectiveness=factor), FRAME))
+    nominal = motions(make_aircraft(flight, FRAME))
+    scale = np.ptp(nominal, axis=0) + 1e-6
+    quick = [
+        i for i, n in enumerate(LONGITUDINAL) if "rate" in n or n in ("alpha_rad", "load_factor")
+    ]
+    assert np.max((np.abs(found - wanted) / scale)[:, quick]) < 5e-3
+    assert np.array_equal(found[:, ELEVATOR], nominal[:, ELEVATOR])  # it stands where it is put
+    ratio = np.ptp(found[:, PITCH_RATE]) / np.ptp(nominal[:, PITCH_RATE])
+    assert ratio == pytest.approx(factor, rel=0.05)
+
+
+def test_factors_count_together() -> None:
+    both = make_aircraft(shipped("c172p", elevator_effectiveness=0.5, pitch_damping=3.0), FRAME)
+    damped = make_aircraft(shipped("c172p", pitch_damping=3.0), FRAME)
+    # Half the effect of a small command is that of half the command.
+    found, wanted = motions(both, 0.02), motions(damped, 0.01)
+    rates = found[:, PITCH_RATE], wanted[:, PITCH_RATE]
+    assert np.max(np.abs(rates[0] - rates[1])) < 0.03 * np.ptp(rates[1])
+
+
+def test_a_model_without_such_a_moment_is_refused_by_name(tmp_path: Path) -> None:
+    def edit(aerodynamics: ET.Element) -> None:
+        for axis in aerodynamics.findall("axis"):
+            for function in axis.findall("function"):
+                if function.get("name", "").endswith("/Cmq"):
+                    axis.remove(function)
+
+    models = edited_model(tmp_path, "c172p", edit)
+    flight = shipped("c172p", pitch_damping=0.5)
+    with pytest.raises(InputError) as caught:
+        make_aircraft(flight, FRAME, models=[models], file="my.toml")
+    assert str(caught.value).startswith(
+        "my.toml: flight.pitch_damping: c172p has no pitching moment"
+    )
+
+
+def test_the_models_folder_is_left_alone_and_the_temporary_one_cleared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = packaged_models()["737"] / "737"
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    make_aircraft(shipped("737", pitch_damping=0.5), FRAME)
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_temporary_folder_it_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    make_aircraft(shipped("737"), FRAME)  # as filed it needs none
+    with pytest.raises(InputError, match="cannot be written to a temporary folder"):
+        make_aircraft(shipped("737", pitch_damping=0.5), FRAME)

@@ -1,0 +1,38 @@
+"""Copies of packaged JSBSim models with a number of their aerodynamics edited by hand."""
+
+from __future__ import annotations
+
+import shutil
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from coupled.flight.airframe import packaged_models
+
+
+def edited_model(
+    folder: Path, model: str, edit: Callable[[ET.Element], None], models: Path | None = None
+) -> Path:
+    """Copy a model into a folder of models, with its <aerodynamics> edited; return that folder."""
+    copy = folder / model
+    shutil.copytree((models or packaged_models()[model]) / model, copy)
+    tree = ET.parse(copy / f"{model}.xml")
+    aerodynamics = tree.getroot().find("aerodynamics")
+    assert aerodynamics is not None
+    edit(aerodynamics)
+    tree.write(copy / f"{model}.xml")
+    return folder
+
+
+def multiplied(factors: Mapping[str, float]) -> Callable[[ET.Element], None]:
+    """Return an edit that multiplies the products of functions, by the ends of their names."""
+
+    def edit(aerodynamics: ET.Element) -> None:
+        for end, factor in factors.items():
+            found = [f for f in aerodynamics.iter("function") if f.get("name", "").endswith(end)]
+            assert len(found) == 1, (end, [f.get("name") for f in aerodynamics.iter("function")])
+            product = found[0].find("product")
+            assert product is not None
+            ET.SubElement(product, "value").text = repr(factor)
+
+    return edit
