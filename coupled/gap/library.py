@@ -176,6 +176,12 @@ EFFECTS: tuple[Effect, ...] = (
         *("speed", "computed_left", "law", 1.0),
     ),
     _one(
+        "loader",
+        "modifying_lag",
+        _added("lag_s", "loader.modifying_lag_s", 0, 3, 0.01),
+        *("speed", "missing", "law", 1.5),
+    ),
+    _one(
         "sensing",
         "deflection_scale",
         _factor("sensing.deflection_scale", 1.03),

@@ -12,7 +12,8 @@ goes on from there. So the order is kept through stick, slip and impact, and a
 control inside its friction band does not creep.
 
 The hardening spring enters by its slope at the midpoint (one Newton step), which
-keeps the order.
+keeps the order. An F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the
+motion and half a substep after it (Strang's splitting), each exactly: of second order, too.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import TINY, layout, stage
-from coupled.rig.declaration import Declaration
+from coupled.rig.declaration import Declaration, Given, first_order_gain
 from coupled.rig.friction import FrictionParameters, running_friction
-from coupled.rig.modification import ModificationState, slope, smooth_force
+from coupled.rig.modification import ModificationState, modifying_force, slope, smooth_force
 from coupled.rig.parameters import DELAY_SLOTS
 
 MAX_EVENTS = 16  # events in one substep before the control is taken to be at rest
@@ -46,6 +47,8 @@ class LoaderParameters(Protocol):
     delay_substeps: float  # transport delay over the substep
     travel: float  # stops at ±travel, d
     digital: int  # F_mod is held over the frame
+    lag_gain: float  # share that F_mod's lag goes in half a substep; 0 without lag
+    held: int  # F_mod does not follow δc within a substep: it is digital, or lags
 
 
 class LoaderState(Protocol):
@@ -55,9 +58,16 @@ class LoaderState(Protocol):
     rate: float  # δc', d/s
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     delayed: float  # the pilot's force as the loader has it, N
+    felt: float  # F_mod as the loader feels it where it is held, N
     node: int  # substeps since the start
     stop: int  # the stop met during this frame: −1, 0 or +1
     history: NDArray[np.float64]  # the pilot's force at past nodes, N
+
+
+def _half_step_gain(given: Given) -> float:
+    """Return the share that F_mod's lag goes in half a substep, 0 where it has none."""
+    lag_s = given.control.loader.modifying_lag
+    return first_order_gain(lag_s, 0.5 * given.substep_s) if lag_s > 0.0 else 0.0
 
 
 LOADER = Declaration(
@@ -67,6 +77,8 @@ LOADER = Declaration(
         "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
         "travel": lambda g: g.control.travel,
         "digital": lambda g: g.control.loader.multiplier == "digital",
+        "lag_gain": _half_step_gain,
+        "held": lambda g: g.control.loader.multiplier == "digital" or _half_step_gain(g) > 0.0,
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
     fixed=("external",),
@@ -101,17 +113,17 @@ def _delay(p: LoaderParameters, s: LoaderState, force: float) -> float:
 
 
 @stage
-def _elastic(p: LoaderParameters, m: ModificationState, x: float) -> float:
+def _elastic(p: LoaderParameters, m: ModificationState, s: LoaderState, x: float) -> float:
     """Return the smooth part of the force that opposes δc = x, N: F_L of eq. (8), and F_mod."""
     force = (p.basic_gradient + p.cubic * x * x) * x
-    return force + (m.held if p.digital else smooth_force(m, x))
+    return force + (s.felt if p.held else smooth_force(m, x))
 
 
 @stage
 def _stiffness(p: LoaderParameters, m: ModificationState, x: float) -> float:
     """Return the slope of `_elastic`, N/d."""
     stiffness = p.basic_gradient + 3.0 * p.cubic * x * x
-    return stiffness if p.digital else stiffness + slope(m, x)
+    return stiffness if p.held else stiffness + slope(m, x)
 
 
 @stage
@@ -170,7 +182,7 @@ def _midpoint(
     v = s.rate
     middle = s.computed + 0.5 * span * v
     inertia = 2.0 * p.mass / span + p.damping + 0.5 * span * _stiffness(p, m, middle)
-    push -= _elastic(p, m, middle) + p.damping * v
+    push -= _elastic(p, m, s, middle) + p.damping * v
     if friction.breakaway == 0.0:
         return v + push / inertia
     halfway = v + (push - running_friction(friction, v) * direction) / inertia
@@ -199,7 +211,16 @@ def _first_event(
 
 
 @stage
-def move_loader(
+def _feel(p: LoaderParameters, m: ModificationState, s: LoaderState) -> None:
+    """Let a held F_mod reach the loader: at once, or half a substep on through its lag."""
+    wanted = m.held if p.digital else modifying_force(m, s.computed)
+    if p.lag_gain > 0.0:
+        wanted = s.felt + p.lag_gain * (wanted - s.felt)
+    s.felt = wanted
+
+
+@stage
+def _move(
     p: LoaderParameters,
     friction: FrictionParameters,
     m: ModificationState,
@@ -207,11 +228,11 @@ def move_loader(
     force: float,
     h: float,
 ) -> None:
-    """Advance δc over a substep of h seconds to a node where the pilot's force is `force` N."""
+    """Advance δc over a substep of h seconds with a held F_mod as it is felt."""
     before = s.delayed
     after = _delay(p, s, force)
     s.delayed = after
-    breakout = p.breakout + (0.0 if p.digital else m.breakout)
+    breakout = p.breakout + (0.0 if p.held else m.breakout)
     dry = friction.breakaway > 0.0
     done = 0.0
     for _ in range(MAX_EVENTS):
@@ -219,7 +240,7 @@ def move_loader(
         direction = _sign(v)
         if v == 0.0:
             hold = friction.breakaway + (breakout if x == 0.0 else 0.0)
-            balance = s.external - breakout * _sign(x) - _elastic(p, m, x)
+            balance = s.external - breakout * _sign(x) - _elastic(p, m, s, x)
             start = before + (after - before) * done / h + balance
             share, direction = _release(p, s, hold, start, after + balance)
             if direction == 0.0:
@@ -249,7 +270,24 @@ def move_loader(
             s.computed, s.rate = s.stop * p.travel, 0.0
         else:  # the preload stops a control too slow to leave neutral within the substep
             s.computed = 0.0
-            spare = friction.running + breakout - abs(pull - _elastic(p, m, 0.0))
+            spare = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
             if p.mass * abs(s.rate) <= (h - done) * spare:
                 s.rate = 0.0
     s.rate = 0.0
+
+
+@stage
+def move_loader(
+    p: LoaderParameters,
+    friction: FrictionParameters,
+    m: ModificationState,
+    s: LoaderState,
+    force: float,
+    h: float,
+) -> None:
+    """Advance δc over a substep of h seconds to a node where the pilot's force is `force` N."""
+    if p.held:
+        _feel(p, m, s)
+    _move(p, friction, m, s, force, h)
+    if p.lag_gain > 0.0:
+        _feel(p, m, s)

@@ -33,6 +33,7 @@ class Loader(Section):
     cubic: float = quantity("N_per_{d}3", 0.0, ge=0)
     delay: float = quantity("s", 0.0, ge=0, le=0.2)
     multiplier: Literal["hybrid", "digital"] = "hybrid"
+    modifying_lag: float = quantity("s", 0.0, ge=0, le=10)
     servo_frequency: float = quantity("Hz", gt=0)
     servo_damping_ratio: float = quantity("", gt=0)
     servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)

@@ -173,6 +173,7 @@ EFFECTS = (
     Kind("force_offset", "loader", 0.02, 20.0, _added("offset", "offset_N", signed=True)),
     Kind("digital_multiplier", "loader", 1.0, 1.0, _digital),
     Kind("transport_delay", "loader", 0.0005, 0.15, _added("delay", "delay_s")),
+    Kind("modifying_lag", "loader", 0.0002, 0.3, _added("modifying_lag", "lag_s")),
     Kind("deflection_scale", "sensing", 0.0005, 0.15, _scaled("deflection_scale")),
     Kind("bend", "linkage", 0.005, 1.2, _bend),
     Kind("stiffening_bend", "linkage", 0.05, 3.0, _stiffening),

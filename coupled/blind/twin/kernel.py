@@ -126,6 +126,7 @@ def _loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: float)
     x0, v0, z1 = s.x, s.v, s.z
     x1, v1 = x0 + h * v0, v0
     y1, w1 = s.second_x, s.second_v
+    felt, lagged = s.felt, h / p.modifying_lag if p.modifying_lag > 0.0 else 0.0
     gradient = p.basic_gradient * (1.0 + p.gradient_drift * time)
     push = pull
     if p.hum_force != 0.0:
@@ -134,8 +135,16 @@ def _loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: float)
         x, v, last = 0.5 * (x0 + x1), 0.5 * (v0 + v1), v1
         dry, z1 = _friction(p, s, v, pull, h)
         net = push - dry - (gradient + p.cubic * x * x) * x - p.damping * v
-        net -= s.product if p.digital else _product(s, x)
-        net -= (p.breakout + s.preload) * _mean_sign(x0, x1)
+        wanted = s.product if p.digital else _product(s, x)
+        side = _mean_sign(x0, x1)
+        if lagged > 0.0:  # the trapezoidal rule
+            wanted += s.preload * side
+            felt = s.felt + lagged * (wanted - s.felt) / (1.0 + 0.5 * lagged)
+            net -= 0.5 * (s.felt + felt)
+            net -= p.breakout * side
+        else:
+            net -= wanted
+            net -= (p.breakout + s.preload) * side
         net -= p.quadratic_damping * v * abs(v)
         if p.cog_force != 0.0:
             net -= p.cog_force * math.sin(2.0 * math.pi * x / p.cog_pitch)
@@ -149,7 +158,7 @@ def _loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: float)
         x1 = x0 + 0.5 * h * (v0 + v1)
         if abs(v1 - last) < 1e-13:
             break
-    s.z, s.second_x, s.second_v = z1, y1, w1
+    s.z, s.second_x, s.second_v, s.felt = z1, y1, w1, felt
     s.x, s.v = min(max(x1, -p.travel), p.travel), v1
     if s.x != x1:
         s.v = 0.0

@@ -51,6 +51,7 @@ class TwinParameters(Protocol):
     bob_weight: float
     offset: float
     delay: float
+    modifying_lag: float  # s, of F_mod on its way to the loader
     travel: float
     load_friction: float  # outsider: N of friction per N of force
     cog_force: float  # outsider: periodic in δc
@@ -111,6 +112,7 @@ class TwinState(Protocol):
     break_at: float
     preload: float
     product: float
+    felt: float  # F_mod behind its lag, N
     lagged: float
     moved: float
     position: float

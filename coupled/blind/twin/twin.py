@@ -110,6 +110,7 @@ def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
     twin.set(cubic=loader.cubic, breakout=loader.breakout, bob_weight=loader.bob_weight)
     twin.set(offset=loader.offset, delay=loader.delay, travel=column.travel, cog_pitch=1.0)
     set_friction(twin, loader.friction, loader.breakaway, loader.stribeck_rate, bristle_J)
+    twin.set(modifying_lag=loader.modifying_lag)
     twin.set(servo_rate=2.0 * math.pi * loader.servo_frequency, play=loader.play)
     twin.set(servo_ratio=loader.servo_damping_ratio, servo_limit=loader.servo_rate_limit)
     twin.set(bend=loader.bend, bend_limit=loader.bend_limit)
