@@ -173,8 +173,8 @@ def _document(job: Job) -> dict[str, Any]:
         return diagnose(read_rig(job.rig), records, job.control).as_dict()
     except InputError as error:
         return _nothing("refused", f"{error.key}: {error.problem}".lstrip(": "))
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        # A defect of the diagnosis: said in this record's file, and no other record pays for it.
+    except Exception as error:
+        # A defect of the diagnosis is said in this record's file, and the others go on.
         return _nothing("failed", f"{type(error).__name__}: {error}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -118,7 +119,7 @@ def rounding(signal: Floats, noise: float) -> float:
     wide ones, and neither was rounded.
     """
     steps = np.diff(np.unique(signal))
-    error = float(steps.min()) / np.sqrt(12.0) if steps.size else 0.0
+    error = float(steps.min()) / math.sqrt(12.0) if steps.size else 0.0
     return error if error < ROUNDED * noise else 0.0
 
 

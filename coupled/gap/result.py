@@ -5,28 +5,17 @@ Keys are those of the contract. SI units; a gap is a residual's rms over its noi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from coupled.errors import InputError
 from coupled.gap.output import explained_below
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import Remains, Where
 
-# Of the JSON that is written; one without a format was written before formats had numbers.
+# Of the JSON that is written. Where it is read back, one without a format is read, as one written
+# before formats had numbers, and a newer one is refused by name (`files.check_format`).
 FORMAT = 1
 Verdict = Literal["no_gap", "effect", "ambiguous", "unexplained"]
-
-
-def check_format(table: Mapping[str, Any], file: object) -> None:
-    """Refuse a diagnosis of a newer format than this version reads; older ones are read."""
-    made = table.get("format", 0)
-    if not isinstance(made, int) or isinstance(made, bool) or made < 0:
-        raise InputError(file, "format", f"is no number of a format; this version writes {FORMAT}")
-    if made > FORMAT:
-        problem = f"is {made}, of a newer version of coupled; this one reads up to {FORMAT}"
-        raise InputError(file, "format", problem)
 
 
 @dataclass(frozen=True)

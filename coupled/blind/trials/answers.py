@@ -12,7 +12,7 @@ from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
 from coupled.files import check_format, read_json
 
-VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained", "refused")
+VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained", "refused", "failed")
 MISSING = "missing"  # the verdict of a record without a diagnosis
 FORMAT = 2  # the newest of a diagnosis that is read
 

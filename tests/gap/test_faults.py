@@ -1,0 +1,144 @@
+"""Records and folders that once ended in a traceback, a silent answer or a file elsewhere."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from rich.console import Console
+
+from coupled.cli.tables.gaps import print_stages
+from coupled.errors import InputError
+from coupled.gap import batch
+from coupled.gap.batch import Row, jobs, run
+from coupled.gap.diagnose import diagnose
+from coupled.gap.result import FORMAT, StageResult
+from coupled.record.record import Record, write_record
+from coupled.rig.rigwrite import rig_text
+from tests.support.gaps import made, nominal_rig
+from tests.test_cli import ROOT, coupled
+
+Floats = NDArray[np.float64]
+RIG = nominal_rig(False)
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    return made(tmp_path_factory.mktemp("clean"), RIG, {}, 4).between(0.0, 15.0)
+
+
+def spoiled(record: Record, channel: str, change: Callable[[Floats], Floats]) -> Record:
+    data = record.data.copy()
+    at = record.channels.index(channel)
+    data[:, at] = change(data[:, at])
+    return Record(record.channels, data)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda f: 0.22 * f, lambda f: -f, lambda f: np.concatenate((f[:1], f[:-1]))],
+    ids=["x 0.22", "x -1", "a frame late"],
+)
+def test_a_wrong_modifying_force_is_a_gap_of_the_loader(
+    clean: Record, change: Callable[[Floats], Floats]
+) -> None:
+    """Of the library only the digital product shows there, which has no number to fit."""
+    found = diagnose(RIG, {"r": spoiled(clean, "column_modifying_force_N", change)})
+    assert found.verdict == "unexplained"
+    assert "loader" in found.guilty
+
+
+def test_a_deflection_of_64_levels_is_diagnosed_and_written(clean: Record) -> None:
+    def coarse(x: Floats) -> Floats:
+        step = np.ptp(x) / 64.0
+        return np.asarray(np.round(x / step) * step)
+
+    found = diagnose(RIG, {"r": spoiled(clean, "column_computed_m", coarse)})
+    assert isinstance(found.stage("compensation").guilty, bool)
+    json.dumps(found.as_dict(), allow_nan=False)
+
+
+def test_sensing_is_not_given_a_gap_that_nobody_measured(clean: Record) -> None:
+    found = diagnose(RIG, {"r": clean})
+    assert found.stage("sensing").as_dict() == {
+        "judged": False,
+        "missing": [],
+        "why": "shows in loader and linkage",
+    }
+    assert "sensing" not in found.summary  # its neighbours were judged
+
+
+def test_a_stage_within_its_settings_is_told_by_its_own_limit() -> None:
+    def printed(gap: float, settled: float) -> str:
+        console = Console(file=io.StringIO(), width=80)
+        print_stages(console, [StageResult("loader", gap, settled, 1.4, settled)])
+        assert isinstance(console.file, io.StringIO)
+        return console.file.getvalue()
+
+    assert "within its settings" in printed(1.5, 1.3)
+    assert "within its settings" not in printed(1.3, 1.1)  # within its limit as it is
+    assert "within its settings" not in printed(1.5, 1.45)
+
+
+def folder_of(tmp_path: Path, record: Record, *names: str) -> Path:
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "rigs" / "mine.toml").write_text(rig_text(RIG, "a bench"))
+    for name in names:
+        write_record(record, tmp_path / f"{name}.csv")
+    (tmp_path / "records.toml").write_text("".join(f'{name} = "mine"\n' for name in names))
+    return tmp_path
+
+
+def test_a_folder_is_diagnosed_on_the_control_that_was_asked_for(
+    tmp_path: Path, clean: Record
+) -> None:
+    folder_of(tmp_path, clean, "a")
+    done = coupled(tmp_path, "diagnose", ".", "--output", "out", "--control", "wheel")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "a.json").read_text())
+    assert (found["verdict"], found["made"]["control"]) == ("refused", "wheel")
+    assert "the rig has no wheel" in found["why"]
+    wrong = coupled(tmp_path, "diagnose", ".", "--output", "out", "--control", "stick")
+    assert wrong.returncode == 2
+    assert "one of column, wheel, pedals" in wrong.stderr
+
+
+def test_a_record_whose_diagnosis_fails_leaves_the_others_theirs(
+    tmp_path: Path, clean: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    todo = jobs(folder_of(tmp_path, clean, "a", "b"), tmp_path / "out")
+    with monkeypatch.context() as patched:
+        patched.setattr(batch, "diagnose", lambda *given: 1 / 0)
+        failed = run(todo[0], "v")
+    assert failed.verdict == "failed"
+    assert "ZeroDivisionError" in failed.why
+    assert json.loads((tmp_path / "out" / "a.json").read_text())["format"] == FORMAT
+    rows = [failed, run(todo[1], "v")]
+    assert rows[1].verdict == "no_gap"
+    assert [line.split(",")[2] for line in batch.summary(rows).splitlines()[1:]] == [
+        "failed",
+        "no_gap",
+    ]
+    assert isinstance(rows[1], Row)
+
+
+@pytest.mark.parametrize("name", ["../evil", "a/b", "", ".hidden", "/evil"])
+def test_a_record_outside_the_folder_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "records.toml").write_text(f'"{name}" = "737"\n')
+    (tmp_path / "evil.csv").write_text("time_s\n0\n")
+    with pytest.raises(InputError, match=r"letters, digits, dots and dashes"):
+        jobs(tmp_path / "in", tmp_path / "out" / "deep")
+    (tmp_path / "in" / "records.toml").write_text('r = "../mine"\n')
+    with pytest.raises(InputError, match="no folder"):
+        jobs(tmp_path / "in", tmp_path / "out")
+
+
+def test_no_module_of_the_package_is_taken_for_a_test() -> None:
+    names = [path.stem for path in (ROOT / "coupled").rglob("*.py")]
+    assert not [n for n in names if n.startswith("test_") or n.endswith("_test")]

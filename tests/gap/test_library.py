@@ -1,0 +1,103 @@
+"""The library is complete: what an effect needs elsewhere is there, and no list names it again."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from coupled.blind.twin.effects import EFFECTS as TWINS
+from coupled.errors import InputError
+from coupled.gap.chain import STAGES, stage_of
+from coupled.gap.effect import Effect, apply, possible, value_of
+from coupled.gap.library import BY_NAME, EFFECTS, SETTINGS
+from coupled.plots.signals import SIGNALS
+from coupled.record.channels import CONTROL_NAMES
+from coupled.rig.rig import Rig
+from tests.support.gaps import nominal_rig
+from tests.support.rigs import bench
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "coupled"
+TWIN_OF = {kind.name: kind for kind in TWINS}
+
+
+@pytest.fixture(scope="module")
+def flown() -> Rig:
+    return nominal_rig(True)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_what_an_effect_needs_elsewhere_is_there(effect: Effect, flown: Rig) -> None:
+    assert effect.stage in STAGES
+    assert {stage_of(output) for output in effect.shows_in} <= set(STAGES)
+    assert TWIN_OF[effect.name].stage == effect.stage
+    drawn = {effect.signature.x, effect.signature.y} - {""}
+    assert drawn <= set(SIGNALS)
+    files = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    diagnosis = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    assert f"| `{effect.name}` |" in diagnosis
+    for p in effect.parameters:
+        assert f"`{p.key.split('.')[-1]}`" in files, p.key
+        if p.name:
+            assert f"`{p.name}`" in diagnosis, p.name
+        value_of(flown, "column", p.key)  # the rig has it
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_an_effect_is_entered_under_its_keys_and_nothing_else(effect: Effect, flown: Rig) -> None:
+    starts = {effect.value_key(p): p.starts[0] + p.base(flown, "column") for p in effect.free}
+    changed = apply(flown, "column", [effect], starts)
+    for p in effect.parameters:
+        value = starts.get(effect.value_key(p), 0.0)
+        assert value_of(changed, "column", p.key) == p.entered(p.nominal(flown, "column"), value)
+    neutral = {effect.value_key(p): float(p.mode == "factor") for p in effect.free}
+    if all(p.mode in ("factor", "added") for p in effect.parameters):
+        same = apply(flown, "column", [effect], neutral)
+        for p in effect.parameters:
+            assert value_of(same, "column", p.key) == value_of(flown, "column", p.key)
+
+
+def test_every_stage_and_name_is_listed_once() -> None:
+    assert len(BY_NAME) == len(EFFECTS)
+    assert set(SETTINGS) == {effect.name for effect in EFFECTS if effect.tolerance}
+    assert set(TWIN_OF) == set(BY_NAME)
+    for effect in EFFECTS:
+        if effect.alike is not None:
+            assert effect.alike.plainer in BY_NAME
+
+
+def test_no_other_module_spells_an_effect() -> None:
+    """Names that are fields of a rig as well, as `bend`, cannot be told from those."""
+    fields = {p.key.split(".")[-1] for e in EFFECTS for p in e.parameters}
+    own = {name for name in BY_NAME if not any(field.startswith(name) for field in fields)}
+    assert len(own) > 15
+    for room in ("gap", "plots", "cli"):
+        for path in sorted((PACKAGE / room).rglob("*.py")):
+            if path.name == "library.py":
+                continue
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                    assert node.value not in own, (path.name, node.lineno, node.value)
+
+
+def test_numbers_that_the_physics_cannot_give_are_refused_as_a_file_would_be() -> None:
+    rig = bench()
+    stiff = {"bend.bend_{d}_per_N": 5e-4}  # K·G_T = 1.09
+    with pytest.raises(InputError, match=r"K·G_T = 1\.09"):
+        apply(rig, "column", [BY_NAME["bend"]], stiff)
+    assert possible(rig, "column", [BY_NAME["bend"]], stiff) is None
+
+
+def test_more_running_friction_than_breakaway_is_plain_friction() -> None:
+    rig = bench({"friction_N": 1.0, "breakaway_N": 2.0})
+    effect = BY_NAME["coulomb_friction"]
+    more = apply(rig, "column", [effect], {"coulomb_friction.friction_N": 3.0})
+    loader = more.controls["column"].loader
+    assert (loader.friction, loader.breakaway) == (4.0, 4.0)
+
+
+def test_wheel_and_pedals_have_the_same_keys(flown: Rig) -> None:
+    assert CONTROL_NAMES[1] == "wheel"
+    assert BY_NAME["backlash"].free[0].named("wheel") == "play_rad"
