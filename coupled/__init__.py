@@ -1,7 +1,135 @@
-"""Fly a JSBSim aircraft through a compliant control loader.
+"""Fly a JSBSim aircraft through a compliant control loader; calibrate it; diagnose its gaps.
 
-`coupled.rig` is the loader, `coupled.flight` couples it to an aircraft,
-`coupled.authority.compare` compares what each correction gives back.
+    import coupled
+
+    rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
+    flight = coupled.fly(rig, column=coupled.Step(force_N=50), duration_s=8)
+    flight.record.plot("column_force_N", "pitch_rad")
+    table = coupled.compare(rig, column=coupled.Clamp(deflection_m=0.03), duration_s=8)
+    found = coupled.diagnose("t37", flight.record)
+
+Load
+    load_rig        a rig file, or a shipped rig by name: `Rig`
+    load_run        a run file, or a shipped run by name: a `Manoeuvre` each case
+    read_record     a record of CSV or Parquet: `Record`
+    write_record    the reverse, with a manifest
+    import_log      a log of your own, by a map of its columns
+
+Fly
+    fly             one flight: `.record`, `.outcome`, `.ended_early`
+    compare         rigid, uncompensated, each correction, both: `.loss(…)`, `.to_polars()`
+    check           runs held against what they expect
+    sweep           a run over values of its parameters, to one table
+
+Pilots, on `column`, `wheel` or `pedals`
+    Step Ramp Doublet ThreeTwoOneOne FrequencySweep ForceTable     a force over time
+    Clamp                                                          a held deflection
+    Attitude Track                                                 a closed loop
+
+Calibrate and diagnose
+    calibrate       readings to S1, S2, S3 and K, with errors
+    diagnose        records to where they part from the rig, which effect, how large
+
+Data
+    Rig Manoeuvre PressureProfile Record InputError
+
+All is in SI; a name ends in its unit. A pull, right wheel and right pedal are positive. Input that
+cannot be used raises InputError: one line that names file and key, and what would be right.
+
+Where things are: `coupled.rig` the loader and its equations, `coupled.flight` the aircraft and
+pilots, `coupled.record` channels and files, `coupled.authority` what is lost, `coupled.campaign`
+many flights, `coupled.calibration`, `coupled.gap` the diagnosis, `coupled.blind` its trials.
+Names are loaded when they are first used: `import coupled` takes no time.
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from coupled.api.flights import compare, fly, load_run
+    from coupled.api.gaps import diagnose
+    from coupled.api.records import import_log, read_record, write_record
+    from coupled.api.rigs import load_rig
+    from coupled.calibration.calibrate import calibrate
+    from coupled.campaign.check import check
+    from coupled.campaign.sweep import sweep
+    from coupled.errors import InputError
+    from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
+    from coupled.flight.pilot import (
+        Attitude,
+        Clamp,
+        Doublet,
+        ForceTable,
+        FrequencySweep,
+        Ramp,
+        Step,
+        ThreeTwoOneOne,
+        Track,
+    )
+    from coupled.record.record import Record
+    from coupled.rig.rig import Rig
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "Attitude",
+    "Clamp",
+    "Doublet",
+    "ForceTable",
+    "FrequencySweep",
+    "InputError",
+    "Manoeuvre",
+    "PressureProfile",
+    "Ramp",
+    "Record",
+    "Rig",
+    "Step",
+    "ThreeTwoOneOne",
+    "Track",
+    "calibrate",
+    "check",
+    "compare",
+    "diagnose",
+    "fly",
+    "import_log",
+    "load_rig",
+    "load_run",
+    "read_record",
+    "sweep",
+    "write_record",
+]
+
+_HOMES = {
+    "coupled.api.flights": ("compare", "fly", "load_run"),
+    "coupled.api.gaps": ("diagnose",),
+    "coupled.api.records": ("import_log", "read_record", "write_record"),
+    "coupled.api.rigs": ("load_rig",),
+    "coupled.calibration.calibrate": ("calibrate",),
+    "coupled.campaign.check": ("check",),
+    "coupled.campaign.sweep": ("sweep",),
+    "coupled.errors": ("InputError",),
+    "coupled.flight.manoeuvre": ("Manoeuvre", "PressureProfile"),
+    "coupled.flight.pilot": (
+        *("Attitude", "Clamp", "Doublet", "ForceTable", "FrequencySweep"),
+        *("Ramp", "Step", "ThreeTwoOneOne", "Track"),
+    ),
+    "coupled.record.record": ("Record",),
+    "coupled.rig.rig": ("Rig",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'coupled' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -40,6 +40,13 @@ class InputError(ValueError):
 
     Parameters: `file` where the fault stands, `key` within it (dotted; may be
     empty), and `problem`, which also says what would be right.
+
+    >>> import coupled
+    >>> try:
+    ...     coupled.load_rig("t38")
+    ... except coupled.InputError as error:
+    ...     print(error)
+    t38: is no shipped rig; did you mean t37?
     """
 
     def __init__(self, file: object, key: str, problem: str) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from coupled.plots.flights import draw_record
 from coupled.plots.saving import save
 from coupled.record.channels import record_channels
 from coupled.record.record import read_record
@@ -87,7 +86,7 @@ def test_a_figure_is_the_same_bytes_again(tmp_path: Path, folder: Path) -> None:
     record = read_record(folder / "r.csv")
     for suffix in ("png", "pdf", "svg"):
         for name in ("one", "two"):
-            save(draw_record(record, "r"), tmp_path / f"{name}.{suffix}")
+            save(record.plot(title="r"), tmp_path / f"{name}.{suffix}")
         one, two = (tmp_path / f"{name}.{suffix}" for name in ("one", "two"))
         assert one.read_bytes() == two.read_bytes(), suffix
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.authority.compare import Flight, compare
+from coupled.authority.compare import Comparison, compare
 from coupled.flight.runfile import read_run
 from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs
@@ -14,7 +14,7 @@ WORST = {"worst-case", "worst-case-t37"}
 OWN = {"multiplier", "recovery"}  # one of another kind, one that some configurations do not end
 
 
-def flown(name: str) -> list[Flight]:
+def flown(name: str) -> Comparison:
     return compare(read_run(name))
 
 

@@ -26,9 +26,20 @@ PACKAGE = Path(__file__).parents[1] / "coupled"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # A room may import from the rooms left of it.
-ORDER = ["errors", "units", "files", "outputs", "parallel", "schema", "resources", "record", "rig"]
-ORDER += ["record/importing", "flight", "authority", "campaign", "calibration", "gap"]
-ORDER += ["blind/twin", "blind/trials", "plots", "cli/tables", "cli/terminal", "cli"]
+ORDER = ["errors", "units", "files", "outputs", "parallel", "schema", "resources"]
+ORDER += [
+    "record/channels",
+    "plots/histories",
+    "record",
+    "rig",
+    "record/importing",
+    "flight",
+    "authority",
+    "campaign",
+    "calibration",
+    "gap",
+]
+ORDER += ["blind/twin", "blind/trials", "plots", "api", "cli/tables", "cli/terminal", "cli"]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 
 

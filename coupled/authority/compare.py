@@ -9,17 +9,19 @@ out). Breakout and bob weight are taken off the force before it is compared.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
+from coupled.errors import InputError, nearest
 from coupled.flight.loop import fly
-from coupled.flight.manoeuvre import Configuration, Manoeuvre
-from coupled.record.channels import ControlName, channel
-from coupled.record.record import Record
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.record.channels import ATTITUDE, RATE, ControlName, channel
+from coupled.record.record import Record, pandas_frame
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
@@ -28,8 +30,7 @@ from coupled.rig.statics import static_point
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-_RATE = {"column": "pitch_rate", "wheel": "roll_rate", "pedals": "yaw_rate"}
-_ATTITUDE = {"column": "pitch_rad", "wheel": "roll_rad", "pedals": "heading_rad"}
+AS_THE_RIG = "as the rig file says"  # a flight in none of the five configurations
 
 
 @dataclass(frozen=True)
@@ -60,38 +61,120 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight of a comparison."""
+    """One flight: what was flown, its record, and the figures of its outcome.
+
+    `configuration` is one of the five, or says that the rig was flown as it is.
+    """
 
     manoeuvre: Manoeuvre
-    configuration: Configuration
+    configuration: str
     record: Record
     outcome: Outcome
 
+    @property
+    def ended_early(self) -> str:
+        """Why and when the flight ended before its time, or an empty string."""
+        return self.outcome.ended_early
 
-def compare(manoeuvres: list[Manoeuvre], progress: Progress | None = None) -> list[Flight]:
-    """Fly every case in every configuration that its run asks for.
+    def __repr__(self) -> str:
+        ended = f", ended early: {self.ended_early}" if self.ended_early else ""
+        loss, seconds = self.outcome.loss, self.manoeuvre.duration_s
+        lost = f", {100.0 * loss:.1f} % authority lost" if math.isfinite(loss) else ""
+        return f"Flight({self.manoeuvre.label}, {self.configuration}: {seconds:g} s{lost}{ended})"
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Sequence[Flight]):
+    """Flights of one run's cases, each in several configurations; a sequence of `Flight`."""
+
+    flights: tuple[Flight, ...]
+
+    @overload
+    def __getitem__(self, index: int) -> Flight: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Flight, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Flight | tuple[Flight, ...]:
+        return self.flights[index]
+
+    def __len__(self) -> int:
+        return len(self.flights)
+
+    def __repr__(self) -> str:
+        return "\n".join(["Comparison:", *(f"  {flight!r}" for flight in self.flights)])
+
+    def flight(self, configuration: str, case: str | None = None) -> Flight:
+        """Return the flight in a configuration; `case` is needed where there are several.
+
+        Raises InputError for a configuration or case that was not flown.
+        """
+        cases = list(dict.fromkeys(flight.outcome.case for flight in self.flights))
+        if case is None and len(cases) > 1:
+            raise InputError("comparison", "case", f"is needed; one of: {', '.join(cases)}")
+        if case is not None and case not in cases:
+            raise InputError("comparison", "case", f"no {case!r}; {nearest(case, cases)}")
+        ours = {f.configuration: f for f in self.flights if case in (None, f.outcome.case)}
+        if configuration not in ours:
+            problem = f"no {configuration!r} was flown; {nearest(configuration, ours)}"
+            raise InputError("comparison", "configuration", problem)
+        return ours[configuration]
+
+    def loss(self, configuration: str, case: str | None = None) -> float:
+        """Return the share of the surface command that is lost, without unit; NaN if unmoved."""
+        return self.flight(configuration, case).outcome.loss
+
+    def felt_ratio(self, configuration: str, case: str | None = None) -> float:
+        """Return the force felt over the force specified; NaN if the control never moves."""
+        return self.flight(configuration, case).outcome.felt_ratio
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """Return the figures of each flight, as JSON takes them."""
+        return [flight.outcome.as_dict() for flight in self.flights]
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the figures, a row a flight; units are in the columns' names, null for none."""
+        return pl.DataFrame(self.as_dict(), infer_schema_length=None)
+
+    def to_pandas(self) -> Any:
+        """Return the figures as a pandas DataFrame; raises InputError where pandas lacks."""
+        return pandas_frame(self.to_polars())
+
+
+def compare(manoeuvres: Sequence[Manoeuvre], progress: Progress | None = None) -> Comparison:
+    """Fly every case in every configuration that it asks for.
 
     `progress` is called with what is flown, frames done and frames in all.
     """
-    flights = []
-    total = sum(s.frames * len(s.configurations) for s in manoeuvres)
-    before = 0
-    for manoeuvre in manoeuvres:
-        for configuration in manoeuvre.configurations:
-            configured = manoeuvre.configured(configuration)
-            label = f"{manoeuvre.label}, {configuration}"
+    flights: list[Flight] = []
+    jobs = [(m, configuration) for m in manoeuvres for configuration in m.configurations]
+    total, before = sum(manoeuvre.frames for manoeuvre, _ in jobs), 0
+    for manoeuvre, configuration in jobs:
+        label = f"{manoeuvre.label}, {configuration}"
 
-            def report(done: int, _: int, label: str = label, before: int = before) -> None:
-                if progress is not None:
-                    progress(label, before + done, total)
+        def report(done: int, _: int, label: str = label, before: int = before) -> None:
+            if progress is not None:
+                progress(label, before + done, total)
 
-            record = fly(configured, report)
-            before += manoeuvre.frames
-            outcome = judge(configured, configuration, record)
-            flights.append(Flight(configured, configuration, record, outcome))
-            if record.manifest["ended_early"] and outcome.ended_early.startswith("interrupted"):
-                return flights
-    return flights
+        flight = fly_and_judge(manoeuvre.configured(configuration), configuration, report)
+        flights.append(flight)
+        before += manoeuvre.frames
+        if flight.ended_early.startswith("interrupted"):
+            break
+    return Comparison(tuple(flights))
+
+
+def fly_and_judge(
+    manoeuvre: Manoeuvre,
+    configuration: str = AS_THE_RIG,
+    progress: Callable[[int, int], None] | None = None,
+) -> Flight:
+    """Fly a manoeuvre as it is, and return the flight; `configuration` is what to call it.
+
+    `progress` is called with frames done and frames in all.
+    """
+    record = fly(manoeuvre, progress)
+    return Flight(manoeuvre, configuration, record, judge(manoeuvre, configuration, record))
 
 
 def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
@@ -190,10 +273,10 @@ def _motion_figures(
     if manoeuvre.rig.flight is None:
         return None, None, None
     start = manoeuvre.pilots[control].start_s if control in manoeuvre.pilots else 0.0
-    rate = side * record[f"{_RATE[control]}_rad_per_s"]
+    rate = side * record[RATE[control]]
     load = record["load_factor"]
     far = load[np.argmax(np.abs(load - load[0]))] if control == "column" else load.max()
-    attitude = np.unwrap(record[_ATTITUDE[control]])
+    attitude = np.unwrap(record[ATTITUDE[control]])
     there = side * (attitude - attitude[0]) >= manoeuvre.measure.attitude_change
     there &= record.time_s >= start
     reached = float(record.time_s[np.argmax(there)]) - start if there.any() else None

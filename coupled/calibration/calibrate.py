@@ -43,6 +43,17 @@ def calibrate(
     its travel, arc, gains and schedule are used, not its scales. `instruments` are the usual
     ones of a careful person unless given. d is m, or rad for a wheel; a pull is positive.
     Raises InputError where the readings tell too little, naming file and row.
+
+    >>> import coupled
+    >>> from coupled.calibration.bench import CalibrationBench, take_readings
+    >>> from coupled.calibration.estimate import usual_instruments
+    >>> from coupled.calibration.plan import stations
+    >>> rig = coupled.load_rig("report-column")
+    >>> tools = usual_instruments("column")
+    >>> bench = CalibrationBench(rig, "column", stations(rig, "column", 3, 3), tools)
+    >>> found = coupled.calibrate(take_readings(bench, seed=1), rig)
+    >>> found.line.bend.low < rig.controls["column"].loader.bend < found.line.bend.high
+    True
     """
     if not isinstance(rig, Rig):
         rig = read_rig(find(str(rig), shipped_rigs(), "rig"))

@@ -45,6 +45,10 @@ def check(
     `runs` is a run file, the name of a shipped one, or several; a run may be given as its
     cases, too. Only what the expectations look at is flown. `progress` is called with what is
     flown, frames done and frames in all. Raises InputError for a run that expects nothing.
+
+    >>> import coupled
+    >>> coupled.check("appendix-c").passed
+    True
     """
     several = [runs] if isinstance(runs, (str, Path)) else runs
     read = [

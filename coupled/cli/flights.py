@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,7 +60,7 @@ def compare(
     say_stale(cases[0].rig)
     with progress() as advance:
         flights = compare_flights(cases, advance)
-    table = [flight.outcome.as_dict() for flight in flights]
+    table = flights.as_dict()
     with Outputs() as outputs:
         if not no_figure:
             from coupled.plots.flights import draw_comparison
@@ -90,9 +91,8 @@ def fly(
     json_file: JsonOption = "",
 ) -> None:
     """Fly one run and write its record, and a manifest beside it."""
-    from coupled.authority.compare import judge
+    from coupled.authority.compare import AS_THE_RIG, fly_and_judge
     from coupled.errors import nearest
-    from coupled.flight.loop import fly as fly_manoeuvre
     from coupled.flight.loop import input_files
     from coupled.flight.manoeuvre import CONFIGURATIONS
     from coupled.flight.runfile import read_run
@@ -116,19 +116,23 @@ def fly(
     check_json(json_file, [*inputs, path, manifest_path(path)])
     say_stale(manoeuvre.rig)
     with progress() as advance:
-        record = fly_manoeuvre(manoeuvre, lambda done, total: advance(manoeuvre.label, done, total))
-    outcome = judge(manoeuvre, configuration or "as the rig file says", record)
+        flight = fly_and_judge(
+            manoeuvre,
+            configuration or AS_THE_RIG,
+            lambda done, total: advance(manoeuvre.label, done, total),
+        )
+    record, figures = flight.record, flight.outcome.as_dict()
     with Outputs() as outputs:
         write_record(record, outputs.at(path))
-        keep_json(outcome.as_dict(), json_file, outputs)
+        keep_json(figures, json_file, outputs)
     if json_file != "-":
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
         for control, when in record.manifest["stop_first_met_s"].items():
             out.print(f"the {control} met its stop, first at {when:.2f} s")
-    print_json(outcome.as_dict(), json_file)
-    if outcome.ended_early:
-        err.print(f"[yellow]ended early:[/] {outcome.ended_early}; the record so far is kept")
+    print_json(figures, json_file)
+    if flight.ended_early:
+        err.print(f"[yellow]ended early:[/] {flight.ended_early}; the record so far is kept")
         raise typer.Exit(1)
 
 
@@ -140,7 +144,6 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a record."""
-    from coupled.plots.flights import draw_record
     from coupled.plots.saving import check_format, save
     from coupled.record.record import check_suffix, read_record
 
@@ -148,7 +151,7 @@ def plot(
     path = figure or record.with_suffix(".png")
     check_format(path)
     check_target(path, [record])
-    save(draw_record(read_record(record), shown(record.stem)), path)
+    save(read_record(record).plot(title=shown(record.stem)), path)
     say(f"figure: {path}")
 
 
@@ -176,6 +179,6 @@ def _sentence(card: str) -> str:
     return " ".join(card.split()).partition(". ")[0].rstrip(".") + "."
 
 
-def _end(flights: list[Flight]) -> None:
+def _end(flights: Sequence[Flight]) -> None:
     if any(flight.outcome.ended_early for flight in flights):
         raise typer.Exit(1)

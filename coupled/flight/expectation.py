@@ -175,9 +175,15 @@ def _check_times(expect: Expect, file: object, place: str, duration_s: float) ->
         raise InputError(file, f"{place}.at_s", "is one moment: no from_s, to_s or take with it")
     for field in ("at", "start", "end", "by"):
         value = getattr(expect, field)
-        if value is not None and (value > duration_s or (value == duration_s and field != "end")):
-            problem = f"{value:g} is not within the run's {duration_s:g} s"
-            raise InputError(file, f"{place}.{_KEYS[field]}", problem)
+        if value is None:
+            continue
+        key = f"{place}.{_KEYS[field]}"
+        if field == "end" and value > duration_s:
+            problem = f"is {value:g}, after the run's end; give at most duration_s = {duration_s:g}"
+            raise InputError(file, key, problem)
+        if field != "end" and value >= duration_s:
+            problem = f"is {value:g}; give less than duration_s = {duration_s:g}, when the run ends"
+            raise InputError(file, key, problem)
     if expect.start is not None and expect.end is not None and expect.start >= expect.end:
         raise InputError(file, f"{place}.to_s", "must be after from_s")
 

@@ -35,7 +35,16 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
 class PressureProfile(Given):
     """The dynamic pressure of a bench over time, straight between points and held at the ends.
 
-    On a rig without aircraft; `time_s` must rise, `dynamic_pressure_Pa` has as many values.
+    On a rig without aircraft; `time_s` must rise, `dynamic_pressure_Pa` has as many values, none
+    negative. Raises InputError as a run file does.
+
+    >>> import coupled
+    >>> rig = coupled.load_rig("t37").changed({"flight": None})
+    >>> rise = coupled.PressureProfile(time_s=[0.0, 2.0], dynamic_pressure_Pa=[500.0, 2500.0])
+    >>> pull = coupled.Step(force_N=20)
+    >>> flight = coupled.fly(rig, column=pull, duration_s=3, dynamic_pressure_Pa=rise)
+    >>> float(flight.record["dynamic_pressure_Pa"][120])
+    1500.0
     """
 
     time_s: Values = quantity("", min_length=1)
@@ -95,7 +104,16 @@ class Manoeuvre:
     card                what the run shows, for people
     source              the files that it was read from, if any
 
-    Raises InputError as a run file does: `KEY` is that of a run file.
+    Raises InputError as a run file does, with its keys.
+
+    >>> import coupled
+    >>> rig, pull = coupled.load_rig("t37"), coupled.Step(force_N=50)
+    >>> pull_up = coupled.Manoeuvre(rig, {"column": pull}, duration_s=2)
+    >>> pull_up.frames, pull_up.configured("rigid").rig.controls["column"].loader.bend
+    (240, 0.0)
+    >>> coupled.Manoeuvre(rig, {"column": pull}, duration_s=0)
+    Traceback (most recent call last):
+    coupled.errors.InputError: manoeuvre: duration_s: input should be greater than 0, is 0
     """
 
     rig: Rig
@@ -179,6 +197,9 @@ class Manoeuvre:
         for control, pilot in self.pilots.items():
             if control not in self.rig.controls:
                 problem = f"the rig has no {control}; {nearest(control, self.rig.controls)}"
+                raise InputError(self.file, f"pilot.{control}", problem)
+            if not isinstance(pilot, Pilot):
+                problem = f"is {pilot!r:.60}; give a pilot, as Step(force_N=50)"
                 raise InputError(self.file, f"pilot.{control}", problem)
             pilot.check(self.rig, control, self.file)
 

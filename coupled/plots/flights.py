@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.campaign.labels import parameter_label
-from coupled.errors import InputError
-from coupled.record.channels import CONTROL_NAMES, channel, control_channels, unit_of
-from coupled.record.record import Record
+from coupled.plots.histories import plain
+from coupled.record.channels import RATE, channel, unit_of
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.units import DEGREE_rad
@@ -28,7 +27,6 @@ _STYLE = {
     "gradient only": ("#cc79a7", "dashed", 1.6),
     "compensated": ("#009e73", "solid", 1.6),
 }
-_RATE = {"column": "pitch_rate", "wheel": "roll_rate", "pedals": "yaw_rate"}
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.")
 
 
@@ -89,12 +87,7 @@ def _title(flight: Flight) -> str:
 
 
 def _wrapped(text: str, width: int = 42) -> str:
-    return "\n".join(textwrap.wrap(_plain(text), width))
-
-
-def _plain(text: str) -> str:
-    """Return a user's words as words, where a dollar sign would begin a formula."""
-    return text.replace("$", r"\$")
+    return "\n".join(textwrap.wrap(plain(text), width))
 
 
 def _share_limits(row: Sequence[Any]) -> None:
@@ -144,13 +137,13 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
         axes.set_xlabel("time, s")
         axes.set_ylabel(parameter_label(drawn))
         return
-    name = _RATE[case[0].manoeuvre.control]
+    name = RATE[case[0].manoeuvre.control]
     for flight in case:
-        rate = flight.record[f"{name}_rad_per_s"] / DEGREE_rad
+        rate = flight.record[name] / DEGREE_rad
         axes.plot(flight.record.time_s, rate, **_line(flight.configuration))
     axes.set_xlabel("time, s")
     _show_from_the_pull(axes, case)
-    axes.set_ylabel(f"{name.replace('_', ' ')}, °/s")
+    axes.set_ylabel(f"{name.removesuffix('_rad_per_s').replace('_', ' ')}, °/s")
 
 
 def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
@@ -215,64 +208,3 @@ def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:
         fontsize=9,
     )
     axes.set_xlabel("time, s")
-
-
-_PANELS = (
-    ("force", ("force_N", "modifying_force_N")),
-    ("deflection", ("deflection_{d}", "estimate_{d}", "computed_{d}")),
-)
-
-
-def draw_record(record: Record, title: str) -> Figure:
-    """Draw a record: each control's force and deflections, its surface, and the motion."""
-    panels: list[tuple[str, list[tuple[str, str, float]]]] = []
-    for control in (c for c in CONTROL_NAMES if control_channels(c)[0] in record):
-        d = unit_of(control)
-        for what, names in _PANELS:
-            scale = (1.0 if what == "force" else 100.0) if d == "m" else 1.0
-            unit = "N" if what == "force" else "cm"
-            if d == "rad" and what != "force":
-                scale, unit = 1.0 / DEGREE_rad, "°"
-            lines = [(f"{control}_{n.format(d=d)}", n.split("_")[0], scale) for n in names]
-            panels.append((f"{control} {what}, {unit}", lines))
-    degree = 1.0 / DEGREE_rad
-    panels += [
-        ("surfaces, °", [(f"{s}_rad", s, degree) for s in ("elevator", "aileron", "rudder")]),
-        (
-            "rates, °/s",
-            [(f"{r}_rate_rad_per_s", r, degree) for r in ("pitch", "roll", "yaw")],
-        ),
-        (
-            "angles, °",
-            [(f"{a}_rad", a, degree) for a in ("pitch", "alpha", "roll", "sideslip")],
-        ),
-        ("load factor", [("load_factor", "load factor", 1.0)]),
-        ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "q̄", 1e-3)]),
-        ("true airspeed, m/s", [("true_airspeed_m_per_s", "speed", 1.0)]),
-    ]
-    shown = []
-    for label, lines in panels:
-        present = [line for line in lines if line[0] in record]
-        if present:
-            shown.append((label, present))
-    if not shown:
-        raise InputError(title, "", f"has no channel of a record; it has {record.channels[:5]}")
-    half = (len(shown) + 1) // 2
-    figure = Figure(figsize=(11, 1.0 + 1.9 * half), layout="constrained")
-    grid = figure.subplots(half, 2, sharex=True, squeeze=False)
-    for axes, (label, lines) in zip(grid.T.flat, shown, strict=False):
-        for name, short, scale in lines:
-            axes.plot(record.time_s, scale * record[name], linewidth=1.1, label=short)
-        axes.set_ylabel(label, fontsize=9)
-        axes.grid(alpha=0.25)
-        if len(lines) > 1:
-            axes.legend(fontsize=7, loc="best", ncols=len(lines))
-    for axes in list(grid.T.flat)[len(shown) :]:
-        axes.set_visible(False)
-    for column in range(2):
-        visible = [axes for axes in grid[:, column] if axes.get_visible()]
-        if visible:
-            visible[-1].set_xlabel("time, s")
-            visible[-1].tick_params(labelbottom=True)
-    figure.suptitle(_plain(title), fontsize=12)
-    return figure

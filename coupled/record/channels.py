@@ -35,6 +35,17 @@ _CONTROL = (
 )
 _NOISY = (0, 1, 2, 5)
 
+# What a control turns the aircraft about, as a rate and as an angle.
+RATE: dict[ControlName, str] = {
+    "column": "pitch_rate_rad_per_s",
+    "wheel": "roll_rate_rad_per_s",
+    "pedals": "yaw_rate_rad_per_s",
+}
+ATTITUDE: dict[ControlName, str] = {
+    "column": "pitch_rad",
+    "wheel": "roll_rad",
+    "pedals": "heading_rad",
+}
 BENCH_MOTION = ("dynamic_pressure_Pa",)
 LONGITUDINAL = (
     "dynamic_pressure_Pa",

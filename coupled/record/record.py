@@ -6,11 +6,12 @@ it: versions, the hashes of what went in, the seed, and what happened on the way
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -22,6 +23,9 @@ from coupled.outputs import Outputs
 from coupled.record.channels import TIME
 from coupled.record.csvfile import read_columns, write_table
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Floats = NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet")
 FORMAT = 1  # of a record and its manifest; one without is from before this was written
@@ -29,7 +33,22 @@ FORMAT = 1  # of a record and its manifest; one without is from before this was 
 
 @dataclass(frozen=True)
 class Record:
-    """Channels over time: `data` has shape (rows, channels), SI, one row a frame."""
+    """Channels over time: `data` has shape (rows, channels), SI, one row a frame.
+
+    `record["column_force_N"]` is a channel, shape (rows,); a name that is not there raises
+    KeyError with the nearest. Each channel's unit ends its name; a pull, right wheel and right
+    pedal are positive. `manifest` says what made the record.
+
+    >>> import coupled
+    >>> record = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=2).record
+    >>> record
+    Record(240 rows, 2 s at 120 Hz; 43 channels: time_s, column_force_N, column_computed_m, …)
+    >>> len(record.between(0.5, 1.0)), record["pitch_rad"].shape
+    (60, (240,))
+    >>> record.to_polars().columns[:2]
+    ['time_s', 'column_force_N']
+    >>> figure = record.plot("column_force_N", "pitch_rad")
+    """
 
     channels: tuple[str, ...]
     data: Floats
@@ -51,10 +70,48 @@ class Record:
         """Time of each row."""
         return self[TIME]
 
+    def __repr__(self) -> str:
+        rows, names = len(self), ", ".join(self.channels[:3])
+        names += ", …" if len(self.channels) > 3 else ""
+        what = f"{len(self.channels)} channels: {names}"
+        if rows < 2 or TIME not in self:
+            return f"Record({rows} rows; {what})"
+        step_s = float(np.median(np.diff(self.time_s)))
+        return f"Record({rows} rows, {rows * step_s:g} s at {1.0 / step_s:g} Hz; {what})"
+
     def between(self, start_s: float, end_s: float) -> Record:
         """Return the rows with start ≤ t < end."""
         rows = (self.time_s >= start_s) & (self.time_s < end_s)
         return Record(self.channels, self.data[rows], self.manifest)
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the rows as a polars DataFrame, a column a channel, SI."""
+        return pl.DataFrame(self.data, schema=list(self.channels), orient="row")
+
+    def to_pandas(self) -> Any:
+        """Return the rows as a pandas DataFrame; raises InputError where pandas lacks."""
+        return pandas_frame(self.to_polars())
+
+    def plot(self, *channels: str, title: str = "") -> Figure:
+        """Return a matplotlib Figure of the channels over time, one below the other.
+
+        Without channels: each control's force and deflection, its surface, and the motion, in
+        the units of the field. A notebook shows what is returned; `.savefig(path)` writes it.
+        Raises InputError for a channel that is not there.
+        """
+        from coupled.plots.histories import draw_channels, draw_record
+
+        return draw_channels(self, channels, title) if channels else draw_record(self, title)
+
+
+def pandas_frame(frame: pl.DataFrame) -> Any:
+    """Return a frame of polars as one of pandas; raises InputError where pandas lacks."""
+    try:
+        pandas: Any = importlib.import_module("pandas")
+    except ImportError:
+        problem = "is not installed: pip install pandas, or take to_polars()"
+        raise InputError("pandas", "", problem) from None
+    return pandas.DataFrame({name: frame[name].to_list() for name in frame.columns})
 
 
 def manifest_path(path: Path) -> Path:

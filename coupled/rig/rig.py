@@ -28,7 +28,16 @@ class Rig(Section):
     """A control-loading rig, and the aircraft that it is coupled to.
 
     Without `flight` it is a bench: q̄ is given, and there is no aircraft. `noise` gives
-    the standard deviation of a channel's white noise by the channel's name.
+    the standard deviation of a channel's white noise by the channel's name. SI throughout;
+    a field's key in a file, and in `changed`, ends in its unit.
+
+    >>> import coupled
+    >>> rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
+    >>> rig.controls["column"].loader.play, list(rig.only("column").controls)
+    (0.001, ['column'])
+    >>> rig.changed({"controls.column.loader.mass_kg": -1.0})
+    Traceback (most recent call last):
+    coupled.errors.InputError: t37: controls.column.loader.mass_kg: input should be greater than 0…
     """
 
     name: str = quantity("", pattern=PLAIN_NAME)

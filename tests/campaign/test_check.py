@@ -158,7 +158,7 @@ def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
         ('measure = "loss"\nis = 1.0\nwithin = 0.1\nleast = 0.0', "not both"),
         ('measure = "loss"\nleast = 1.0\nmost = 0.0', "nothing is at least 1 and at most 0"),
         ('measure = "loss"\nmost = 1.0\nat_s = 1.0', "at_s: has no meaning with measure"),
-        ('channel = "time_s"\nmost = 1.0\nat_s = 3.0', "at_s: 3 is not within the run's 2 s"),
+        ('channel = "time_s"\nmost = 1.0\nat_s = 3.0', "at_s: is 3; give less than duration_s = 2"),
         ('channel = "time_s"\nmost = 1.0\nfrom_s = 1.0\nto_s = 0.5', "must be after from_s"),
         ('channel = "time_s"\nreaches = 1.0', "reaches needs by_s"),
         ('channel = "time_s"\nby_s = 1.0', "by_s: needs the level"),

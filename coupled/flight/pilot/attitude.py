@@ -17,7 +17,12 @@ class Attitude(Pilot):
     """A hand that captures a pitch attitude `change_rad` from where it finds it, and holds it.
 
     Force on the column through the muscle's lag: gain on the error of pitch, its integral,
-    and pitch rate. Limited to `force_limit_N`.
+    and pitch rate. Limited to `force_limit_N`. On the column of a rig that flies. Raises
+    InputError as a run file does.
+
+    >>> import coupled
+    >>> coupled.Attitude(change_rad=0.05, gain_N_per_rad=900, rate_gain_N_s_per_rad=150).lag_s
+    0.1
     """
 
     kind: Literal["attitude"] = "attitude"

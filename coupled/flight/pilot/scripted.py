@@ -33,7 +33,18 @@ class _Levels(Pilot):
 
 
 class Step(_Levels):
-    """A force held for `duration_s`, or to the end where that is 0."""
+    """A force held for `duration_s`, or to the end where that is 0.
+
+    `force_N` to ±5000, a pull positive; it begins at `start_s` (1), its edges are half cosines
+    of `rise_s` (0.1). Raises InputError as a run file does.
+
+    >>> import coupled
+    >>> coupled.Step(force_N=50, start_s=1, duration_s=3).force_N
+    50.0
+    >>> coupled.Step(force_lb=11)
+    Traceback (most recent call last):
+    coupled.errors.InputError: coupled.Step: force_lb: wrong unit: give force_N instead
+    """
 
     kind: Literal["step"] = "step"
     duration_s: float = quantity("", 0.0, ge=0, le=7200)
@@ -45,7 +56,15 @@ class Step(_Levels):
 
 
 class Ramp(Pilot):
-    """A force that grows evenly over `ramp_s`, and is then held."""
+    """A force that grows evenly over `ramp_s`, and is then held.
+
+    `force_N` to ±5000, a pull positive; it begins at `start_s` (1). Raises InputError as a run
+    file does.
+
+    >>> import coupled
+    >>> coupled.Ramp(force_N=-40, ramp_s=2).start_s
+    1.0
+    """
 
     kind: Literal["ramp"] = "ramp"
     force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
@@ -61,7 +80,15 @@ class Ramp(Pilot):
 
 
 class Doublet(_Levels):
-    """A force one way, then as long the other way."""
+    """A force one way, then as long the other way.
+
+    `force_N` to ±5000, a pull first where positive; each half lasts `half_period_s`, from
+    `start_s` (1), with edges of `rise_s` (0.1). Raises InputError as a run file does.
+
+    >>> import coupled
+    >>> coupled.Doublet(force_N=30, half_period_s=0.7).levels()
+    [(1.0, 1.0), (1.7, -1.0), (2.4, 0.0)]
+    """
 
     kind: Literal["doublet"] = "doublet"
     half_period_s: float = quantity("", ge=1e-3, le=7200)
@@ -73,7 +100,15 @@ class Doublet(_Levels):
 
 
 class ThreeTwoOneOne(_Levels):
-    """The 3-2-1-1 of aircraft identification: alternating pulses of 3, 2, 1 and 1 units."""
+    """The 3-2-1-1 of aircraft identification: alternating pulses of 3, 2, 1 and 1 units.
+
+    `force_N` to ±5000, a pull first where positive; a unit lasts `unit_s`, from `start_s` (1),
+    with edges of `rise_s` (0.1). Raises InputError as a run file does.
+
+    >>> import coupled
+    >>> coupled.ThreeTwoOneOne(force_N=30, unit_s=0.5).levels()[-1]
+    (4.5, 0.0)
+    """
 
     kind: Literal["3211"] = "3211"
     unit_s: float = quantity("", ge=1e-3, le=7200)
@@ -85,7 +120,15 @@ class ThreeTwoOneOne(_Levels):
 
 
 class FrequencySweep(Pilot):
-    """A sine whose frequency goes exponentially from `low_Hz` to `high_Hz`."""
+    """A sine whose frequency goes exponentially from `low_Hz` (0.1) to `high_Hz` (2).
+
+    Amplitude `force_N`, over `duration_s` from `start_s` (1), faded in and out over a tenth of
+    it. Raises InputError as a run file does, and for more than half the frame rate.
+
+    >>> import coupled
+    >>> coupled.FrequencySweep(force_N=40, duration_s=30, high_Hz=3).low_Hz
+    0.1
+    """
 
     kind: Literal["sweep"] = "sweep"
     force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
@@ -119,6 +162,15 @@ class Clamp(Pilot):
 
     The clamp inverts the rig's own mass, damping and gradient, so that the error of
     deflection dies as exp(−bandwidth·t) on any rig, without a lasting error.
+
+    `deflection_m` (`deflection_rad` on a wheel) within the travel, reached over `rise_s` (0.5)
+    from `start_s` (1), for `duration_s` (0: to the end); `bandwidth_rad_per_s` (6). Raises
+    InputError as a run file does.
+
+    >>> import coupled
+    >>> flight = coupled.fly("t37", column=coupled.Clamp(deflection_m=0.02), duration_s=4)
+    >>> round(float(flight.record["column_deflection_m"][-1]), 3)
+    0.02
     """
 
     kind: Literal["clamp"] = "clamp"

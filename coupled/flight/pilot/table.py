@@ -20,7 +20,13 @@ class ForceTable(Pilot):
 
     Arrays: `time_s` and `force_N`, of one length. A file: a CSV with `time_s` and the control's
     force channel, as `column_force_N`. `start_s` is added to the times; outside of them the
-    force is zero.
+    force is zero. Raises InputError for times that do not rise, gaps, and more than 5000 N.
+
+    >>> import coupled
+    >>> push = coupled.ForceTable(time_s=[0.0, 1.0, 2.0], force_N=[0.0, -30.0, 0.0])
+    >>> flight = coupled.fly("t37", column=push, duration_s=3)
+    >>> float(flight.record["column_force_N"].min())
+    -30.0
     """
 
     kind: Literal["table"] = "table"

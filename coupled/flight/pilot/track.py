@@ -51,7 +51,17 @@ What = Literal["pitch", "flight_path", "airspeed"]
 
 
 class Track(Pilot):
-    """Tracks a target: a change of what the aircraft flew at `start_s`, and a sum of sines."""
+    """Tracks a target: a change of what the aircraft flew at `start_s`, and a sum of sines.
+
+    `what` is `pitch`, `flight_path` or `airspeed`; the open loop crosses over at
+    `crossover_rad_per_s` with `phase_margin_rad` (0.7). The target is `change_rad` and
+    `sine_rad`, of airspeed `change_m_per_s` and `sine_m_per_s`. On the column of a rig that
+    flies. Raises InputError as a run file does, and for a loop that no pilot can give.
+
+    >>> import coupled
+    >>> coupled.Track(crossover_rad_per_s=1.5, change_rad=0.05).what
+    'pitch'
+    """
 
     kind: Literal["track"] = "track"
     what: What = "pitch"

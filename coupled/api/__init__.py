@@ -1,0 +1,1 @@
+"""The front door: what `coupled` offers in Python. Thin: each function calls one room."""

@@ -1,0 +1,203 @@
+"""Runs and flights: load, fly, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike, fspath
+from typing import Any, TypedDict, Unpack
+
+from coupled.api.rigs import load_rig
+from coupled.authority.compare import AS_THE_RIG, Comparison, Flight, fly_and_judge
+from coupled.authority.compare import compare as compare_manoeuvres
+from coupled.errors import InputError, nearest
+from coupled.flight.conditions import Conditions, build_conditions
+from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, Manoeuvre, PressureProfile
+from coupled.flight.pilot import Pilot
+from coupled.flight.runfile import read_run
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+from coupled.schema import known_keys
+
+Path = str | PathLike[str]
+
+
+class Terms(TypedDict, total=False):
+    """What else a flight from Python may be given; tables as in a run file, by its keys."""
+
+    seed: int
+    dynamic_pressure_Pa: float | PressureProfile
+    wind: Mapping[str, Any]
+    gust: Mapping[str, Any]
+    turbulence: Mapping[str, Any]
+    event: Mapping[str, Mapping[str, Any]]
+    record_properties: Sequence[str]
+    name: str
+
+
+def load_run(run: Path) -> list[Manoeuvre]:
+    """Return the cases of a run file, or of a shipped run by its name: a manoeuvre each.
+
+    Raises InputError for what cannot be flown, naming file and key.
+
+    >>> import coupled
+    >>> cases = coupled.load_run("pull-up-t37")
+    >>> [case.label for case in cases]
+    ['110 kt, 2.0 kPa', '200 kt, 6.5 kPa', '300 kt, 14.5 kPa']
+    >>> cases[0].rig.name, list(cases[0].pilots)
+    ('t37', ['column'])
+    """
+    return read_run(fspath(run))
+
+
+def fly(
+    what: Manoeuvre | Rig | Path,
+    *,
+    column: Pilot | None = None,
+    wheel: Pilot | None = None,
+    pedals: Pilot | None = None,
+    duration_s: float | None = None,
+    configuration: Configuration | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    **terms: Unpack[Terms],
+) -> Flight:
+    """Fly a rig under a pilot on each control given, and return the flight.
+
+    `what` is a rig, its file, the name of a shipped one, or a manoeuvre, which says all the
+    rest itself. A pilot is `Step`, `Ramp`, `Doublet`, `ThreeTwoOneOne`, `FrequencySweep`,
+    `ForceTable`, `Clamp`, `Attitude` or `Track`. A pull, right wheel and right pedal are
+    positive. `configuration` is one of the five (`rigid`, `uncompensated`, `deflection only`,
+    `gradient only`, `compensated`); without it the rig flies as it is. `progress` is called
+    with frames done and frames in all.
+
+    Further keywords: `seed` (0); `dynamic_pressure_Pa`, a number or a `PressureProfile`, for a
+    rig without aircraft; `wind`, `gust`, `turbulence` and `event`, tables as in a run file;
+    `record_properties`, of JSBSim; `name`.
+
+    The `Flight` has `.record` (SI, a row a frame), `.outcome` (loss, felt ratio, greatest
+    force and rate) and `.ended_early`. Raises InputError as a run file would.
+
+    >>> import coupled
+    >>> flight = coupled.fly("t37", column=coupled.Step(force_N=50), duration_s=3)
+    >>> flight.record["column_force_N"].max()
+    np.float64(50.0)
+    >>> len(flight.record), flight.ended_early
+    (360, '')
+    """
+    pilots = _pilots(column, wheel, pedals)
+    manoeuvre = _manoeuvre(what, pilots, duration_s, terms)
+    if configuration is None:
+        return fly_and_judge(manoeuvre, AS_THE_RIG, progress)
+    _known(configuration, manoeuvre)
+    return fly_and_judge(manoeuvre.configured(configuration), configuration, progress)
+
+
+def compare(
+    what: Manoeuvre | Sequence[Manoeuvre] | Rig | Path,
+    *,
+    column: Pilot | None = None,
+    wheel: Pilot | None = None,
+    pedals: Pilot | None = None,
+    duration_s: float | None = None,
+    configurations: Sequence[Configuration] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+    **terms: Unpack[Terms],
+) -> Comparison:
+    """Fly a rig rigid, uncompensated, with each correction and with both; return the flights.
+
+    Takes what `fly` takes, and the cases of a run (`load_run`). `configurations` are some of
+    the five, all unless given. `progress` is called with what is flown, frames done and frames
+    in all.
+
+    The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the
+    surface command lost, `.felt_ratio(…)` force felt over force specified, `.flight(…)` the
+    flight; of several cases each takes a case's label too. `.to_polars()` and `.to_pandas()`
+    give a row a flight. Raises InputError as a run file would.
+
+    >>> import coupled
+    >>> pull = coupled.Clamp(deflection_m=0.03)
+    >>> table = coupled.compare(
+    ...     "t37", column=pull, duration_s=3, configurations=["rigid", "uncompensated"]
+    ... )
+    >>> round(table.loss("uncompensated"), 2)
+    0.09
+    >>> table.to_polars()["configuration"].to_list()
+    ['rigid', 'uncompensated']
+    """
+    pilots = _pilots(column, wheel, pedals)
+    if isinstance(what, Sequence) and not isinstance(what, str):
+        for manoeuvre in what:
+            _alone(manoeuvre, pilots, duration_s, terms)
+        cases = list(what)
+    else:
+        cases = [_manoeuvre(what, pilots, duration_s, terms)]
+    if configurations is not None:
+        for configuration in configurations:
+            _known(configuration, cases[0])
+        cases = [replace(case, configurations=tuple(configurations)) for case in cases]
+    return compare_manoeuvres(cases, progress)
+
+
+def _pilots(
+    column: Pilot | None, wheel: Pilot | None, pedals: Pilot | None
+) -> dict[ControlName, Pilot]:
+    given: dict[ControlName, Pilot | None] = {"column": column, "wheel": wheel, "pedals": pedals}
+    return {control: pilot for control, pilot in given.items() if pilot is not None}
+
+
+def _manoeuvre(
+    what: Manoeuvre | Rig | Path,
+    pilots: Mapping[ControlName, Pilot],
+    duration_s: float | None,
+    terms: Terms,
+) -> Manoeuvre:
+    """Return the manoeuvre that keywords say."""
+    if isinstance(what, Manoeuvre):
+        _alone(what, pilots, duration_s, terms)
+        return what
+    name = terms.get("name", "manoeuvre")
+    known_keys(dict(terms), dict.fromkeys(Terms.__annotations__), name, "")
+    if duration_s is None:
+        raise InputError(name, "duration_s", "is missing")
+    given: Mapping[str, object] = terms
+    tables = {key: _plain(given[key]) for key in Conditions.model_fields if key in given}
+    build_conditions(tables, name)
+    pressure = terms.get("dynamic_pressure_Pa")
+    if isinstance(pressure, (int, float)):
+        pressure = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[float(pressure)])
+    return Manoeuvre(
+        what if isinstance(what, Rig) else load_rig(what),
+        pilots,
+        duration_s,
+        seed=terms.get("seed", 0),
+        conditions=Conditions(**tables),
+        bench=pressure,
+        record_properties=tuple(terms.get("record_properties", ())),
+        name=name,
+    )
+
+
+def _plain(table: Any) -> Any:
+    """Return a table as a run file gives it: of dictionaries and lists."""
+    if isinstance(table, Mapping):
+        return {key: _plain(value) for key, value in table.items()}
+    return table.tolist() if hasattr(table, "tolist") else table
+
+
+def _alone(
+    manoeuvre: Manoeuvre,
+    pilots: Mapping[ControlName, Pilot],
+    duration_s: float | None,
+    terms: Terms,
+) -> None:
+    """Refuse keywords beside a manoeuvre, which says all itself."""
+    given = [*pilots, *(["duration_s"] if duration_s is not None else []), *terms]
+    if given:
+        problem = "is said by the manoeuvre itself; change it by dataclasses.replace"
+        raise InputError(manoeuvre.file, given[0], problem)
+
+
+def _known(configuration: str, manoeuvre: Manoeuvre) -> None:
+    if configuration not in CONFIGURATIONS:
+        hint = nearest(configuration, CONFIGURATIONS)
+        raise InputError(manoeuvre.file, "configuration", f"no {configuration!r}; {hint}")

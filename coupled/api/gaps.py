@@ -1,0 +1,69 @@
+"""Diagnosis: hold records against their rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+
+from coupled.api.records import read_record
+from coupled.api.rigs import load_rig
+from coupled.errors import InputError
+from coupled.gap.diagnose import Diagnosis
+from coupled.gap.diagnose import diagnose as diagnose_records
+from coupled.record.channels import CONTROL_NAMES, ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Given = Record | str | PathLike[str]
+
+
+def diagnose(
+    rig: Rig | str | PathLike[str],
+    records: Given | Sequence[Given] | Mapping[str, Record],
+    control: ControlName = "column",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Diagnosis:
+    """Diagnose a mismatch between simulation and record: where, which effect, how large.
+
+    `rig` is the rig that the records should be of: a rig, its file, or the name of a shipped
+    one. `records` is one record or several of that rig, as `Record`, as files, or by name;
+    each needs `time_s` and what its stages need (force and deflections of the control, q̄).
+
+    `found.verdict` is `no_gap`, `effect`, `ambiguous` or `unexplained`; `found.effects` are the
+    effects, each with its parameters, their values and 95 % intervals; `found.improved` is the
+    rig with them; `found.as_dict()` the JSON of the command line. Raises InputError where
+    records and rig cannot be held against each other.
+
+    >>> import coupled
+    >>> rig = coupled.load_rig("t37")
+    >>> worn = rig.changed({"controls.column.loader.bend_m_per_N": 4e-4})
+    >>> sweep = coupled.FrequencySweep(force_N=40, start_s=0.5, duration_s=8)
+    >>> flight = coupled.fly(worn, column=sweep, duration_s=10)
+    >>> found = coupled.diagnose(rig, flight.record)
+    >>> round(1e4 * found.improved.controls["column"].loader.bend, 1)
+    4.0
+    """
+    if control not in CONTROL_NAMES:
+        problem = f"is {control!r}; one of {', '.join(CONTROL_NAMES)}"
+        raise InputError("diagnose", "control", problem)
+    nominal = rig if isinstance(rig, Rig) else load_rig(rig)
+    return diagnose_records(nominal, named_records(records), control, progress)
+
+
+def named_records(records: Given | Sequence[Given] | Mapping[str, Record]) -> dict[str, Record]:
+    """Return records by the name that a fault is to say: the file's, or a number."""
+    if isinstance(records, Mapping):
+        return dict(records)
+    several = [records] if isinstance(records, (Record, str, PathLike)) else list(records)
+    if not several:
+        raise InputError("diagnose", "records", "needs at least one")
+    named: dict[str, Record] = {}
+    for i, given in enumerate(several, 1):
+        if isinstance(given, Record):
+            named["record" if len(several) == 1 else f"record {i}"] = given
+        elif str(given) in named:
+            raise InputError(given, "", "is given twice")
+        else:
+            named[str(given)] = read_record(Path(given))
+    return named

@@ -1,0 +1,74 @@
+"""Records and their files: read, write, import."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from coupled.record import record as files
+from coupled.record.importing import convert
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+
+def read_record(path: str | PathLike[str]) -> Record:
+    """Return the record of a CSV or Parquet file, and its manifest where there is one.
+
+    Channels are in SI, named with their units; `time_s` must be there and rise. Raises
+    InputError for a file that holds no record, naming file, column and row.
+
+    >>> import coupled, tempfile, pathlib
+    >>> flight = coupled.fly("t37", column=coupled.Step(force_N=20, start_s=0), duration_s=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "flight.parquet"
+    ...     coupled.write_record(flight.record, path)
+    ...     again = coupled.read_record(path)
+    >>> bool((again.data == flight.record.data).all())
+    True
+    """
+    return files.read_record(Path(path))
+
+
+def write_record(record: Record, path: str | PathLike[str]) -> None:
+    """Write a record as CSV or Parquet, by the path's extension, and a manifest beside it.
+
+    Both files appear, or neither. Raises InputError for another extension, and where it cannot
+    be written.
+
+    >>> import coupled, tempfile, pathlib
+    >>> flight = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     coupled.write_record(flight.record, pathlib.Path(folder) / "flight.csv")
+    ...     sorted(path.name for path in pathlib.Path(folder).iterdir())
+    ['flight.csv', 'flight.manifest.json']
+    """
+    files.write_record(record, Path(path))
+
+
+def import_log(
+    log: str | PathLike[str], log_map: str | PathLike[str], rig: Rig | None = None
+) -> tuple[Record, dict[str, Any]]:
+    r'''Return the record of a log of your own, and the account of how it was made.
+
+    `log_map` is a TOML file that names the log's columns and their units; `rig` gives the frame
+    rate that the record is laid on. The account has `clock`, `channels`, `unmapped` and
+    `warnings`. Raises InputError, naming file, column and row.
+
+    >>> import coupled, tempfile, pathlib
+    >>> columns = """
+    ... [clock]
+    ... from = "T"
+    ... [channels.column_force_N]
+    ... from = "F"
+    ... unit = "lbf"
+    ... """
+    >>> rows = ["T,F", *(f"{k / 60:.6f},{0.1 * (k % 7)}" for k in range(120))]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log, log_map = (pathlib.Path(folder) / name for name in ("log.csv", "map.toml"))
+    ...     _ = log.write_text("\n".join(rows)), log_map.write_text(columns)
+    ...     record, account = coupled.import_log(log, log_map)
+    >>> record.channels
+    ('time_s', 'column_force_N')
+    '''
+    return convert.import_log(Path(log), Path(log_map), rig)

@@ -1,0 +1,125 @@
+"""Time histories, drawn. All that is known of a record here is its channels: it may call this."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from coupled.errors import InputError, nearest
+from coupled.record.channels import CONTROL_NAMES, RATE, control_channels, unit_of
+from coupled.units import DEGREE_rad
+
+Line = tuple[str, str, float]  # a channel, its name in the legend, and the factor to its unit
+
+
+class Histories(Protocol):
+    """Channels over time: what is drawn of a record."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels' names."""
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time of each row."""
+
+    def __getitem__(self, channel: str, /) -> NDArray[np.float64]: ...
+
+
+_DEGREES = 1.0 / DEGREE_rad
+_SHOWN = {
+    "rad_per_s": ("°/s", _DEGREES),
+    "rad": ("°", _DEGREES),
+    "N": ("N", 1.0),
+    "Pa": ("Pa", 1.0),
+}
+_SHOWN |= {"m_per_s": ("m/s", 1.0), "m": ("m", 1.0), "N_per_m": ("N/m", 1.0)}
+_SHOWN |= {"N_per_rad": ("N/rad", 1.0), "norm": ("of ±1", 1.0)}
+
+
+def draw_channels(record: Histories, channels: Sequence[str], title: str = "") -> Figure:
+    """Draw some channels, one below the other; angles in degrees."""
+    for name in channels:
+        if name not in record.channels:
+            raise InputError("record", name, f"no such channel; {nearest(name, record.channels)}")
+    panels = []
+    for name in channels:
+        ends = [unit for unit in _SHOWN if name.endswith(f"_{unit}")]
+        unit = max(ends, key=len, default="")
+        shown, factor = _SHOWN.get(unit, ("", 1.0))
+        label = name.removesuffix(f"_{unit}").replace("_", " ") + (f", {shown}" if shown else "")
+        panels.append((label, [(name, label, factor)]))
+    return _drawn(record, panels, title, 1)
+
+
+def draw_record(record: Histories, title: str = "") -> Figure:
+    """Draw a record: each control's force and deflections, its surface, and the motion."""
+    panels: list[tuple[str, list[Line]]] = []
+    for control in CONTROL_NAMES:
+        if control_channels(control)[0] in record.channels:
+            panels += _control_panels(control)
+    rates = [(name, name.split("_")[0], _DEGREES) for name in RATE.values()]
+    panels += [
+        ("surfaces, °", [(f"{s}_rad", s, _DEGREES) for s in ("elevator", "aileron", "rudder")]),
+        ("rates, °/s", rates),
+        (
+            "angles, °",
+            [(f"{a}_rad", a, _DEGREES) for a in ("pitch", "alpha", "roll", "sideslip")],
+        ),
+        ("load factor", [("load_factor", "load factor", 1.0)]),
+        ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "q̄", 1e-3)]),
+        ("true airspeed, m/s", [("true_airspeed_m_per_s", "speed", 1.0)]),
+    ]
+    shown = []
+    for label, lines in panels:
+        present = [line for line in lines if line[0] in record.channels]
+        if present:
+            shown.append((label, present))
+    if not shown:
+        problem = f"has no channel of a record; it has {record.channels[:5]}"
+        raise InputError(title or "record", "", problem)
+    return _drawn(record, shown, title, 2)
+
+
+def _control_panels(control: str) -> list[tuple[str, list[Line]]]:
+    """Return the panels of a control: force in N, deflection in cm or degrees."""
+    d = unit_of(control)
+    scale, unit = (100.0, "cm") if d == "m" else (_DEGREES, "°")
+    forces = [(f"{control}_{n}_N", n.split("_")[0], 1.0) for n in ("force", "modifying_force")]
+    names = ("deflection", "estimate", "computed")
+    deflections = [(f"{control}_{n}_{d}", n, scale) for n in names]
+    return [(f"{control} force, N", forces), (f"{control} deflection, {unit}", deflections)]
+
+
+def _drawn(
+    record: Histories, panels: Sequence[tuple[str, Sequence[Line]]], title: str, columns: int
+) -> Figure:
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(11, 1.0 + 1.9 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axes, (label, lines) in zip(grid.T.flat, panels, strict=False):
+        for name, short, scale in lines:
+            axes.plot(record.time_s, scale * record[name], linewidth=1.1, label=short)
+        axes.set_ylabel(label, fontsize=9)
+        axes.grid(alpha=0.25)
+        if len(lines) > 1:
+            axes.legend(fontsize=7, loc="best", ncols=len(lines))
+    for axes in list(grid.T.flat)[len(panels) :]:
+        axes.set_visible(False)
+    for column in range(columns):
+        visible = [axes for axes in grid[:, column] if axes.get_visible()]
+        if visible:
+            visible[-1].set_xlabel("time, s")
+            visible[-1].tick_params(labelbottom=True)
+    if title:
+        figure.suptitle(plain(title), fontsize=12)
+    return figure
+
+
+def plain(text: str) -> str:
+    """Return a user's text as text, where a dollar sign would begin a formula."""
+    return text.replace("$", r"\$")
