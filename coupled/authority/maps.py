@@ -40,7 +40,7 @@ _SEA_LEVEL_kg_per_m3 = 1.225
 _LEAST_PRESSURE_Pa = 200.0
 _PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
 _STEP, _PULL_s = 0.01, 3.0  # of the elevator command, and for how long: linear
-_APART_kt = 8.0  # between the two trims whose force is compared
+_TRIMS_kt = 8.0  # between the two trims whose force is compared
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ def _computed(control: Control) -> Floats:
 def _loss(rig: Rig, control: ControlName, pressure_Pa: float, deflections: Floats) -> Floats:
     line = static_line(rig, control, pressure_Pa, _computed(rig.controls[control]))
     # Beneath the first point the loader rests in its breakout and the surface does not move.
-    believed = np.interp(deflections, line.deflection, line.estimate, left=np.nan)
-    return np.asarray(1.0 - believed / deflections)
+    estimate = np.interp(deflections, line.deflection, line.estimate, left=np.nan)
+    return np.asarray(1.0 - estimate / deflections)
 
 
 def envelope(records: Sequence[Record], control: ControlName) -> Floats:
@@ -141,7 +141,7 @@ def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
         for name, changed in rigs.items()
     }
     slower = {
-        name: _forces(changed, pressure, _APART_kt * per_knot) / _APART_kt
+        name: _forces(changed, pressure, _TRIMS_kt * per_knot) / _TRIMS_kt
         for name, changed in rigs.items()
     }
     return Feel(speed, pressure, pull, slower)
@@ -194,12 +194,12 @@ def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, flo
     commands, positions = middle.surface_map()
     if positions[-1] < positions[0]:
         commands, positions = commands[::-1], positions[::-1]
-    apart = 0.5 * _APART_kt * KNOT_m_per_s
+    half = 0.5 * _TRIMS_kt * KNOT_m_per_s
     slow, fast = (
         np.interp(_trimmed(rig, file, v).motion()[ELEVATOR], positions, commands)
-        for v in (speed - apart, speed + apart)
+        for v in (speed - half, speed + half)
     )
-    return pressure, _STEP / peak, sign * float(slow - fast) / _APART_kt
+    return pressure, _STEP / peak, sign * float(slow - fast) / _TRIMS_kt
 
 
 def _trimmed(rig: Rig, file: Path, speed: float) -> JSBSimAirframe:

@@ -39,7 +39,7 @@ def stability(
     Against the host's K̂, the frame of a digital product, the hand's stiffness and the servo.
     """
     from coupled.authority.stability.aircraft import bob_weight
-    from coupled.authority.stability.limits import disagreement, tell
+    from coupled.authority.stability.limits import disagreement, stability_limits
     from coupled.authority.stability.planes import KINDS, plane
     from coupled.cli.tables.stability import print_limits, write_planes
     from coupled.plots.saving import check_format, save
@@ -66,24 +66,27 @@ def stability(
     asked = [(name, kind) for name in bent for kind in KINDS]
     every = []
     with progress() as advance:
-        told = [tell(data, name) for name in bent]
+        limits = [stability_limits(data, name) for name in bent]
         bob = bob_weight(data, file) if "column" in bent else None
         for done, (name, kind) in enumerate(asked):
             advance(f"{name}, {kind}", done, len(asked))
             every.append(plane(data, name, kind))
     planes = {name: [each for each in every if each.control == name] for name in bent}
     most, worst = (100.0 * share for share in disagreement(every))
-    limits = [each.as_dict() for each in told]
-    listed = {"rig": data.name, "controls": limits, "greatest_difference_percent": worst}
+    listed = {
+        "rig": data.name,
+        "controls": [each.as_dict() for each in limits],
+        "greatest_difference_percent": worst,
+    }
     with Outputs() as outputs:
         save(draw_stability(data, planes), outputs.at(path))
         write_planes(data, every, outputs.at(table))
         keep_json(listed, json_file, outputs)
     if json_file != "-":
-        print_limits(out, told, bob)
-        found = sum(len(each.crossings) for each in every)
+        print_limits(out, limits, bob)
+        count = sum(len(each.crossings) for each in every)
         say(
-            f"{found} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"
+            f"{count} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"
             f" theory, all within {worst:.2f} %"
         )
         say(f"written: {path}")

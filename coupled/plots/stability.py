@@ -39,61 +39,61 @@ def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> F
     figure, grid = panels(len(planes), 4, 3.1)
     norm = SymLogNorm(_LINEAR, vmin=-_FASTEST, vmax=_FASTEST)
     for row, (name, of_control) in zip(grid, planes.items(), strict=True):
-        for axes, told in zip(row, of_control, strict=True):
-            mesh = _panel(axes, told, norm)
-            _mark_own(axes, rig, told)
-            axes.set_title(f"{name}, {_TITLES[told.kind]}", fontsize=10)
+        for axes, plane in zip(row, of_control, strict=True):
+            mesh = _panel(axes, plane, norm)
+            _mark_own(axes, rig, plane)
+            axes.set_title(f"{name}, {_TITLES[plane.kind]}", fontsize=10)
             axes.set_xlabel("structure's bend under the gradient, K·G_T", fontsize=9)
-        bar = figure.colorbar(mesh, ax=list(row), extend="both")
-        bar.set_label("growth, 1/s (red grows)")
+        scale = figure.colorbar(mesh, ax=list(row), extend="both")
+        scale.set_label("growth, 1/s (red grows)")
         ticks = [-100, -30, -10, -3, 0, 3, 10, 30, 100]
-        bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+        scale.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
     figure.suptitle(f"{rig.name}: where its loops are stable, without friction", fontsize=12)
     return figure
 
 
-def _panel(axes: Axes, told: Plane, norm: SymLogNorm) -> Any:
-    factor = 1.0 / MILLISECOND_s if told.kind == "frame" else 1.0
-    y, fine_y = factor * told.values, factor * told.fine_values
+def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
+    factor = 1.0 / MILLISECOND_s if plane.kind == "frame" else 1.0
+    y, fine_y = factor * plane.values, factor * plane.fine_values
     mesh = axes.pcolormesh(
-        told.shares,
+        plane.shares,
         y,
-        np.clip(told.simulated.T, -_FASTEST, _FASTEST),
+        np.clip(plane.simulated.T, -_FASTEST, _FASTEST),
         cmap="RdBu_r",
         norm=norm,
         shading="nearest",
     )
-    if np.min(told.fine) < 0.0 < np.max(told.fine):
-        level = np.arcsinh(told.fine.T)  # a pole of the spring is no place to interpolate over
-        axes.contour(told.fine_shares, fine_y, level, [0.0], colors="black", linewidths=1.4)
+    if np.min(plane.fine) < 0.0 < np.max(plane.fine):
+        level = np.arcsinh(plane.fine.T)  # a pole of the spring is no place to interpolate over
+        axes.contour(plane.fine_shares, fine_y, level, [0.0], colors="black", linewidths=1.4)
     axes.plot([], [], color="black", linewidth=1.4, label="limit by linear theory")
     axes.plot(
-        [c.share for c in told.crossings],
-        [factor * c.simulated for c in told.crossings],
+        [c.share for c in plane.crossings],
+        [factor * c.simulated for c in plane.crossings],
         "o",
         color="white",
         markeredgecolor="black",
         markersize=3.6,
         label="limit found in simulation",
     )
-    if told.kind != "belief":
+    if plane.kind != "belief":
         axes.set_yscale("log")
-    axes.set_ylabel(_LABELS[told.kind])
+    axes.set_ylabel(_LABELS[plane.kind])
     return mesh
 
 
-def _mark_own(axes: Axes, rig: Rig, told: Plane) -> None:
+def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
     """Draw what the rig itself spans."""
-    control = rig.controls[told.control]
+    control = rig.controls[plane.control]
     bend = control.loader.bend
     own = {
         "belief": control.compensation.bend / bend,
         "frame": 1.0 / rig.frame_rate / MILLISECOND_s,
         "hand": _ARM_N_per_d * bend,
         "servo": control.loader.servo_frequency,
-    }[told.kind]
+    }[plane.kind]
     ends = np.array(gradient_range(control)) * bend
     label = "the rig's gradients, as filed (hand: a pilot's arm)"
     axes.plot(ends, [own, own], color="#00a000", linewidth=3.5, label=label)

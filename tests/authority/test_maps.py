@@ -18,7 +18,7 @@ from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def test_the_map_is_the_closed_form_of_each_configuration() -> None:
-    maps = {told.configuration: told for told in loss_maps(bench(), "column")}
+    maps = {one.configuration: one for one in loss_maps(bench(), "column")}
     gradient = np.interp(maps["compensated"].pressure_Pa, [0.0, 3000.0], [560.0, G_STIFF])
     lost = K_REPORT * gradient[:, None]
     expected = {
@@ -27,26 +27,26 @@ def test_the_map_is_the_closed_form_of_each_configuration() -> None:
         "deflection only": 0.0 * lost,
         "compensated": 0.0 * lost,
     }
-    for name, told in maps.items():
+    for name, found in maps.items():
         # Far out the stop at δc = travel holds the loader, before the grip is at its travel.
-        inside = told.deflection < 0.75 * 0.1778
-        shares = np.broadcast_to(expected[name], told.loss.shape)
-        assert told.loss[:, inside] == pytest.approx(shares[:, inside], abs=2e-5)
+        inside = found.deflection < 0.75 * 0.1778
+        shares = np.broadcast_to(expected[name], found.loss.shape)
+        assert found.loss[:, inside] == pytest.approx(shares[:, inside], abs=2e-5)
 
 
 @pytest.mark.parametrize("rig", ["report-column", "737"])
 def test_stick_force_is_as_specified_with_and_without_compensation(rig: str) -> None:
     """δ̂ = δc = F/G_T without it, δ̂ = δ = F/G_T with it, past the breakout."""
     file = find(rig, shipped_rigs(), "rig")
-    told = feel(read_rig(file), file, lambda *_: None)
-    assert told is not None
-    assert len(told.pressure_Pa) >= 4
+    found = feel(read_rig(file), file, lambda *_: None)
+    assert found is not None
+    assert len(found.pressure_Pa) >= 4
     for name in FELT:
-        assert told.per_g_N[name] == pytest.approx(told.per_g_N["rigid"], rel=1e-3)
-        assert np.all(told.per_g_N[name] > 10.0)
+        assert found.per_g_N[name] == pytest.approx(found.per_g_N["rigid"], rel=1e-3)
+        assert np.all(found.per_g_N[name] > 10.0)
         # Stable in speed. The 737's knot is less than the bend moves within the breakout.
         rests = rig == "737" and name == "compensated"
-        assert np.all(np.isnan(told.per_knot_N[name]) if rests else told.per_knot_N[name] > 0.0)
+        assert np.all(np.isnan(found.per_knot_N[name]) if rests else found.per_knot_N[name] > 0.0)
 
 
 def test_a_bench_has_no_stick_force_per_g(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ class BobWeight:
     `simulated` is None where flying finds none within a fifth of theory's.
     """
 
-    filed_N_per_g: float
+    own_N_per_g: float
     simulated_N_per_g: float | None
     theory_N_per_g: float
     rate_rad_per_s: float
@@ -61,18 +61,19 @@ def bob_weight(rig: Rig, file: Path) -> BobWeight | None:
     found = bob_weight_limit(rig, file)
     if found is None:
         return None
-    filed = rig.controls["column"].loader.bob_weight
-    return BobWeight(filed, flown_limit(rig, file, *found), *found)
+    own = rig.controls["column"].loader.bob_weight
+    return BobWeight(own, flown_limit(rig, file, *found), *found)
 
 
 def hands_off_rig(rig: Rig, bob_weight_N_per_g: float, gradient: float) -> Rig:
     """Return the rig's column alone, linear but for its travel, at one gradient in N/m."""
-    plain = linear_rig(rig, "column", gradient)
-    column = plain.controls["column"]
-    loader = column.loader.model_copy(update={"bob_weight": bob_weight_N_per_g})
-    changed = {"loader": loader, "travel": rig.controls["column"].travel}
-    controls = {"column": column.model_copy(update=changed)}
-    return plain.model_copy(update={"controls": controls, "flight": rig.flight})
+    return linear_rig(rig, "column", gradient).changed(
+        {
+            "controls.column.loader.bob_weight_N_per_g": bob_weight_N_per_g,
+            "controls.column.travel_m": rig.controls["column"].travel,
+            "flight": rig.flight,
+        }
+    )
 
 
 def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:

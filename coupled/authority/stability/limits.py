@@ -1,4 +1,4 @@
-"""The limits of a rig at its stiffest gradient, and how its motion dies as it is filed."""
+"""The limits of a rig at its stiffest gradient, and how the motion of the rig itself dies."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Filed:
-    """Growth in 1/s of the motion of a control as filed, at its stiffest gradient."""
+class HandGrowth:
+    """Growth in 1/s of the motion of a control in a hand, at its stiffest gradient."""
 
     hand: str
     simulated: float
@@ -59,26 +59,27 @@ class Filed:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What is told of a control: its greatest K·G_T, its limits, and how its motion dies."""
+class StabilityLimits:
+    """A control's greatest K·G_T as `share`, its limits, and how its motion dies as filed."""
 
     control: ControlName
     gradient: float
     share: float
     limits: tuple[Limit, ...]
-    filed: tuple[Filed, ...]
+    filed: tuple[HandGrowth, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
         return asdict(self)
 
 
-def tell(rig: Rig, name: ControlName) -> Told:
+def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
     """Return a control's limits; its structure must bend."""
     control = rig.controls[name]
     stiffest = gradient_range(control)[1]
     limits = tuple(_limit(rig, name, kind, stiffest) for kind in KINDS)
-    return Told(name, stiffest, stiffest * control.loader.bend, limits, _filed(rig, name, stiffest))
+    share, growths = stiffest * control.loader.bend, _growths(rig, name, stiffest)
+    return StabilityLimits(name, stiffest, share, limits, growths)
 
 
 def gradient_range(control: Control) -> tuple[float, float]:
@@ -94,8 +95,8 @@ def gradient_range(control: Control) -> tuple[float, float]:
 
 def disagreement(planes: Iterable[Plane]) -> tuple[float, float]:
     """Return how far simulated limits lie from linear ones, as shares: 95 % of them, and all."""
-    apart = [c.apart for told in planes for c in told.crossings] or [0.0]
-    return float(np.quantile(apart, 0.95)), max(apart)
+    found = [c.difference for plane in planes for c in plane.crossings] or [0.0]
+    return float(np.quantile(found, 0.95)), max(found)
 
 
 def _limit(rig: Rig, name: ControlName, kind: Kind, gradient: float) -> Limit:
@@ -112,7 +113,7 @@ def _limit(rig: Rig, name: ControlName, kind: Kind, gradient: float) -> Limit:
     return Limit(kind, "above" if above else "below", first.simulated, first.theory, *ends)
 
 
-def _filed(rig: Rig, name: ControlName, gradient: float) -> tuple[Filed, ...]:
+def _growths(rig: Rig, name: ControlName, gradient: float) -> tuple[HandGrowth, ...]:
     loader, w = rig.controls[name].loader, _CLAMP_rad_per_s
     hands = {
         "free": Hand(),
@@ -120,7 +121,7 @@ def _filed(rig: Rig, name: ControlName, gradient: float) -> tuple[Filed, ...]:
     }
     linear = linear_rig(rig, name, gradient)
     found = []
-    for word, hand in hands.items():
+    for hand_name, hand in hands.items():
         simulated = simulated_growth(linear, hand, _SIMULATED_s)
-        found.append(Filed(word, simulated, linear_growth(linear, hand)))
+        found.append(HandGrowth(hand_name, simulated, linear_growth(linear, hand)))
     return tuple(f for f in found if math.isfinite(f.simulated) and np.isfinite(f.theory))

@@ -1,6 +1,6 @@
 """Maps of stability: the growth found in simulation over K·G_T and a second quantity.
 
-Each plane asks one question of a control as it is filed, with friction, breakout, play and
+Each plane asks one question of a control as its rig file has it, with friction, breakout, play and
 limits taken out, which only ever hold or bound a motion:
 
     belief   K̂/K, a free hand: the commanded spring G_T/(1 − K̂·G_T), eq. (12)
@@ -24,10 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.stability.linear import growth as linear_growth
-from coupled.record.channels import ControlName
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
+from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 Kind = Literal["belief", "frame", "hand", "servo"]
@@ -44,7 +45,7 @@ _VALUES: dict[Kind, tuple[float, float]] = {
     "hand": (0.01, 100.0),
     "servo": (2.0, 200.0),
 }
-_FAR = 1e100  # a stop that a linear rig never meets
+_FAR = 1e12  # a stop that a linear rig never meets
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Crossing:
     theory: float | None
 
     @property
-    def apart(self) -> float:
+    def difference(self) -> float:
         """By how much simulation and theory differ, as a share; infinite without theory."""
         return math.inf if self.theory is None else abs(self.simulated / self.theory - 1.0)
 
@@ -84,54 +85,71 @@ class Plane:
     crossings: tuple[Crossing, ...]
 
 
+@dataclass(frozen=True)
+class Question:
+    """What a linear rig has in place of its own values, where it is given."""
+
+    multiplier: Literal["hybrid", "digital"] | None = None
+    servo_frequency_Hz: float | None = None
+    frame_s: float | None = None
+    host_bend: float | None = None  # K̂, d/N
+    host_gradient: bool | None = None  # whether the host corrects the gradient
+
+
 def linear_rig(
-    rig: Rig, name: ControlName, gradient: float, changes: dict[str, Any] | None = None
+    rig: Rig, name: ControlName, gradient: float, question: Question = Question()
 ) -> Rig:
     """Return the rig with this control alone, linear, at one gradient in N/d.
 
-    `changes` are values by the field's name, as `servo_frequency`; `bend` is the host's K̂.
+    The rig may be one that cannot be built: a gradient stiffer than the structure is what some
+    questions are about. Each value is checked against its own bounds only.
     """
-    control, asked = rig.controls[name], changes or {}
-    neutral = dict.fromkeys(("breakout", "friction", "breakaway", "cubic", "play", "offset"), 0.0)
-    neutral |= dict.fromkeys(("servo_rate_limit", "bend_limit", "bob_weight"), 0.0)
-    own: dict[str, Any] = {
-        key: asked[key] for key in ("multiplier", "servo_frequency") if key in asked
+    d, control = unit_of(name), rig.controls[name]
+    linear: dict[str, Any] = {
+        f"travel_{d}": _FAR,
+        "loader.breakout_N": 0.0,
+        "loader.friction_N": 0.0,
+        "loader.breakaway_N": 0.0,
+        f"loader.cubic_N_per_{d}3": 0.0,
+        f"loader.play_{d}": 0.0,
+        "loader.offset_N": 0.0,
+        f"loader.servo_rate_limit_{d}_per_s": 0.0,
+        f"loader.bend_limit_{d}": 0.0,
+        "loader.bob_weight_N_per_g": 0.0,
+        "loader.multiplier": question.multiplier,
+        "loader.servo_frequency_Hz": question.servo_frequency_Hz,
+        "schedule.dynamic_pressure_Pa": [0.0, 1.0],
+        f"schedule.total_gradient_N_per_{d}": [gradient, gradient],
+        f"schedule.break_deflection_{d}": 0.0,
+        "schedule.slope": 1.0,
+        "compensation.breakout_N": 0.0,
+        f"compensation.bend_{d}_per_N": question.host_bend,
+        "compensation.gradient": question.host_gradient,
+        "sensing.word_length_bits": 0,
     }
-    loader = control.loader.model_copy(update={**neutral, **own})
-    table = {"dynamic_pressure": [0.0, 1.0], "total_gradient": [gradient, gradient]}
-    flat = {"second_gradient": None, "break_deflection": 0.0, "slope": 1.0}
-    host = _those(asked, "bend", "gradient")
-    changed = {
-        "travel": _FAR,
-        "loader": loader,
-        "schedule": control.schedule.model_copy(update={**table, **flat}),
-        "compensation": control.compensation.model_copy(update={"breakout": 0.0, **host}),
-        "sensing": control.sensing.model_copy(update={"word_length": 0}),
-    }
-    rate = {"frame_rate": 1.0 / asked["frame"]} if "frame" in asked else {}
-    controls = {name: control.model_copy(update=changed)}
-    return rig.model_copy(update={"controls": controls, "flight": None, "noise": {}, **rate})
-
-
-def _those(values: dict[str, Any], *keys: str) -> dict[str, Any]:
-    return {key: values[key] for key in keys if key in values}
+    given = {key: value for key, value in linear.items() if value is not None}
+    given[f"schedule.second_gradient_N_per_{d}"] = None
+    alone = {name: changed(control, given, rig.name, f"controls.{name}", d)}
+    whole: dict[str, Any] = {"controls": alone, "flight": None, "noise": {}}
+    if question.frame_s is not None:
+        whole["frame_rate_Hz"] = 1.0 / question.frame_s
+    return changed(rig, whole, rig.name)
 
 
 def posed(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, value: float
 ) -> tuple[Rig, Hand]:
     """Return the linear rig and hand of a plane's question at one gradient and value."""
-    bend = rig.controls[name].loader.bend
+    bend, hand = rig.controls[name].loader.bend, Hand()
     if kind == "belief":
-        return linear_rig(rig, name, gradient, {"bend": value * bend, "gradient": True}), Hand()
-    if kind == "frame":
-        changes = {"frame": value, "multiplier": "digital"}
-        return linear_rig(rig, name, gradient, changes), Hand()
-    changes = {"multiplier": "hybrid"}
-    if kind == "servo":
-        changes["servo_frequency"] = value
-        return linear_rig(rig, name, gradient, changes), Hand(HELD_FAST / bend)
-    return linear_rig(rig, name, gradient, changes), Hand(value / bend)
+        question = Question(host_bend=value * bend, host_gradient=True)
+    elif kind == "frame":
+        question = Question("digital", frame_s=value)
+    elif kind == "servo":
+        question, hand = Question("hybrid", servo_frequency_Hz=value), Hand(HELD_FAST / bend)
+    else:
+        question, hand = Question("hybrid"), Hand(value / bend)
+    return linear_rig(rig, name, gradient, question), hand
 
 
 def axis(kind: Kind, points: int) -> Floats:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.authority.stability.aircraft import BobWeight
-from coupled.authority.stability.limits import Limit, Told
+from coupled.authority.stability.limits import Limit, StabilityLimits
 from coupled.authority.stability.planes import Kind, Plane
 from coupled.record.channels import unit_of
 from coupled.record.csvfile import write_table
@@ -31,25 +31,27 @@ _WORDS: dict[Kind, tuple[str, float]] = {
 }
 
 
-def print_limits(console: Console, told: Sequence[Told], bob: BobWeight | None) -> None:
+def print_limits(
+    console: Console, limits: Sequence[StabilityLimits], bob: BobWeight | None
+) -> None:
     """Print the limits of each control at its stiffest gradient, simulated and by theory."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for head in ("", "stable", "simulated", "theory"):
         table.add_column(head, justify="left" if head in ("", "stable") else "right")
-    for control in told:
+    for control in limits:
         unit = unit_of(control.control)
         head = f"{control.control}, {control.gradient:.4g} N/{unit}, K·G_T = {control.share:.3g}"
         table.add_row(f"[bold]{head}[/]")
         for limit in control.limits:
             table.add_row(*_row(limit))
-        for filed in control.filed:
-            word = f" as filed, {filed.hand}: growth, 1/s"
-            side = "yes" if filed.simulated < 0.0 else "[red]no[/]"
-            table.add_row(word, side, f"{filed.simulated:.2f}", f"{filed.theory:.2f}")
+        for growth in control.filed:
+            word = f" as filed, {growth.hand}: growth, 1/s"
+            side = "yes" if growth.simulated < 0.0 else "[red]no[/]"
+            table.add_row(word, side, f"{growth.simulated:.2f}", f"{growth.theory:.2f}")
     if bob is not None:
         table.add_row(f"[bold]column through the aircraft, {bob.rate_rad_per_s:.3g} rad/s[/]")
         flown = "–" if bob.simulated_N_per_g is None else f"{bob.simulated_N_per_g:.4g}"
-        word = f" bob weight, free hand, N/g (filed: {bob.filed_N_per_g:.3g})"
+        word = f" bob weight, free hand, N/g (filed: {bob.own_N_per_g:.3g})"
         table.add_row(word, "below", flown, f"{bob.theory_N_per_g:.4g}")
     console.print(table, highlight=False)
 
@@ -67,17 +69,17 @@ def write_planes(rig: Rig, planes: Iterable[Plane], path: Path) -> None:
     """Write the planes, a row a simulated cell."""
     rows = [
         {
-            "control": told.control,
-            "quantity": _QUANTITIES[told.kind],
+            "control": plane.control,
+            "quantity": _QUANTITIES[plane.kind],
             "value": float(value),
             "bend_times_gradient": float(share),
-            "gradient": float(share) / rig.controls[told.control].loader.bend,
-            "gradient_unit": f"N/{unit_of(told.control)}",
-            "simulated_growth_per_s": float(told.simulated[i, j]),
-            "theory_growth_per_s": float(told.theory[i, j]),
+            "gradient": float(share) / rig.controls[plane.control].loader.bend,
+            "gradient_unit": f"N/{unit_of(plane.control)}",
+            "simulated_growth_per_s": float(plane.simulated[i, j]),
+            "theory_growth_per_s": float(plane.theory[i, j]),
         }
-        for told in planes
-        for i, share in enumerate(told.shares)
-        for j, value in enumerate(told.values)
+        for plane in planes
+        for i, share in enumerate(plane.shares)
+        for j, value in enumerate(plane.values)
     ]
     write_table(pl.DataFrame(rows), path)

@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import polars as pl
@@ -16,9 +17,16 @@ from typer.testing import CliRunner
 
 from coupled.authority.stability import planes
 from coupled.authority.stability.aircraft import bob_weight
-from coupled.authority.stability.limits import gradient_range, tell
+from coupled.authority.stability.limits import gradient_range, stability_limits
 from coupled.authority.stability.linear import frame_map, growth, held_limit, motion_matrix
-from coupled.authority.stability.planes import crossings, linear_rig, plane, posed, simulated_along
+from coupled.authority.stability.planes import (
+    Question,
+    crossings,
+    linear_rig,
+    plane,
+    posed,
+    simulated_along,
+)
 from coupled.cli import app
 from coupled.errors import InputError
 from coupled.flight.loop import fly
@@ -41,9 +49,9 @@ def column(gradient: float = G_STIFF, **changes: float) -> Rig:
     return linear_rig(bench(dict(changes)), "column", gradient)
 
 
-def alone(gradient: float, believed: float) -> float:
+def alone(gradient: float, assumed: float) -> float:
     """Return the growth of mass, damping and spring by the quadratic formula, 1/s."""
-    spring = gradient / (1.0 - believed * gradient)
+    spring = gradient / (1.0 - assumed * gradient)
     inside = complex(DAMPING**2 - 4.0 * MASS * spring)
     return float((-DAMPING + np.sqrt(inside).real) / (2.0 * MASS))
 
@@ -69,7 +77,7 @@ def digital(added: float, frame_s: float, **changes: float) -> Rig:
     """Return a rig whose whole spring is the digital product, G_B = 0, K̂ = 0."""
     values = {"basic_gradient_N_per_m": 0.0, "controls.column.compensation.bend_m_per_N": 0.0}
     rig = bench({**values, **changes})
-    return linear_rig(rig, "column", added, {"frame": frame_s, "multiplier": "digital"})
+    return linear_rig(rig, "column", added, Question("digital", frame_s=frame_s))
 
 
 @pytest.mark.parametrize("frame_s", [0.004, 0.02, 0.08, 0.2, 0.5])
@@ -121,7 +129,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
         values = np.geomspace(0.8 * low, 1.3 * low, 5)
         found = simulated_along(rig, "column", "servo", G_STIFF, values)
         (limit,) = crossings(rig, "column", "servo", G_STIFF, values, found)
-        assert limit.apart < 0.003
+        assert limit.difference < 0.003
         apart.append(limit.simulated / low - 1.0)
     assert 0.0 < apart[1] < 0.35 * apart[0]  # a substep late, first order in it
     assert abs(apart[2]) < 0.012  # HELD_FAST gives by 1 %
@@ -132,7 +140,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
     mass=st.floats(0.5, 10.0),
     ratio=st.floats(0.05, 1.5),
     share=st.floats(0.05, 0.9),
-    belief=amounts(1.05),
+    assumed=amounts(1.05),
     servo_Hz=st.floats(5.0, 60.0),
     frame_s=st.floats(0.002, 0.1),
     arm=st.floats(0.0, 3.0),
@@ -146,18 +154,18 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
     mass: float,
     ratio: float,
     share: float,
-    belief: float,
+    assumed: float,
     servo_Hz: float,
     frame_s: float,
     arm: float,
     arm_damping: float,
     integral: float,
-    multiplier: str,
+    multiplier: Literal["hybrid", "digital"],
     scale: float,
     delay_s: float,
 ) -> None:
     gradient = share / K_REPORT
-    spring = gradient / (1.0 - belief * share)
+    spring = gradient / (1.0 - assumed * share)
     changes = {
         "mass_kg": mass,
         "damping_N_s_per_m": 2.0 * ratio * math.sqrt(spring * mass),
@@ -166,7 +174,7 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
         "controls.column.sensing.deflection_scale": scale,
         "controls.column.sensing.modifying_scale": scale**2,
     }
-    asked = {"frame": frame_s, "multiplier": multiplier, "bend": belief * K_REPORT}
+    asked = Question(multiplier, frame_s=frame_s, host_bend=assumed * K_REPORT)
     rig = linear_rig(bench(changes), "column", gradient, asked)
     hand = Hand(arm / K_REPORT, arm_damping, integral if arm > 0.0 else 0.0)
     expected, found = growth(rig, hand), simulated(rig, hand, 12.0)
@@ -181,7 +189,7 @@ def test_the_frame_loop_flies_the_growth_that_the_map_shows() -> None:
         changes = {"multiplier": "digital", "damping_N_s_per_m": 60.0}
         table = {**BENCH, "frame_rate_Hz": rate_Hz}
         rig = bench(changes, table)
-        linear = linear_rig(rig, "column", 3500.0, {"multiplier": "digital"})
+        linear = linear_rig(rig, "column", 3500.0, Question("digital"))
         sides.append(growth(linear, Hand()))
         record = fly(let_go(linear))
         times = record.time_s
@@ -211,18 +219,18 @@ def let_go(rig: Rig) -> Manoeuvre:
 def test_every_shipped_control_has_its_limits_where_theory_has_them(name: str) -> None:
     rig = read_rig(shipped_rigs()[name])
     for control in rig.controls:
-        told = tell(rig, control)
-        assert told.gradient == gradient_range(rig.controls[control])[1]
-        for filed in told.filed:
+        found = stability_limits(rig, control)
+        assert found.gradient == gradient_range(rig.controls[control])[1]
+        for filed in found.filed:
             assert filed.simulated == pytest.approx(filed.theory, rel=0.02)
             assert filed.simulated < 0.0  # left alone, and clamped as the runs clamp it
-        limits = {limit.kind: limit for limit in told.limits}
+        limits = {limit.kind: limit for limit in found.limits}
         for limit in limits.values():
             if limit.simulated is not None:
                 assert limit.simulated == pytest.approx(limit.theory, rel=0.01)
         belief = limits["belief"]
-        if told.share > 0.5:
-            assert belief.simulated == pytest.approx(1.0 / told.share, rel=1e-3)
+        if found.share > 0.5:
+            assert belief.simulated == pytest.approx(1.0 / found.share, rel=1e-3)
             assert belief.stable == "below"
         else:
             assert belief.stable == "everywhere"
@@ -236,8 +244,8 @@ def test_a_bob_weights_loop_through_the_aircraft_oscillates_where_nyquist_says()
         found = bob_weight(rig, file)
         assert found is not None
         assert found.simulated_N_per_g == pytest.approx(found.theory_N_per_g, rel=within)
-        assert found.filed_N_per_g == rig.controls["column"].loader.bob_weight
-        assert found.filed_N_per_g < 0.1 * found.theory_N_per_g
+        assert found.own_N_per_g == rig.controls["column"].loader.bob_weight
+        assert found.own_N_per_g < 0.1 * found.theory_N_per_g
     assert bob_weight(bench(), Path("bench.toml")) is None
 
 
@@ -257,14 +265,14 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
-    told = plane(bench(), "column", "frame")
-    assert told.simulated.shape == told.theory.shape == (7, 9)
-    assert told.fine.shape == (15, 13)
-    assert np.array_equal(told.simulated > 0.0, told.theory > 0.0)
-    assert told.crossings
-    for found in told.crossings:
-        assert found.apart < 0.01
-        rig, hand = posed(bench(), "column", "frame", found.share / K_REPORT, found.simulated)
+    found = plane(bench(), "column", "frame")
+    assert found.simulated.shape == found.theory.shape == (7, 9)
+    assert found.fine.shape == (15, 13)
+    assert np.array_equal(found.simulated > 0.0, found.theory > 0.0)
+    assert found.crossings
+    for crossing in found.crossings:
+        assert crossing.difference < 0.01
+        rig, hand = posed(bench(), "column", "frame", crossing.share / K_REPORT, crossing.simulated)
         assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
 
 
@@ -279,9 +287,9 @@ def test_the_command_writes_figure_table_and_json(
     cells = pl.read_csv(tmp_path / "w.csv")
     assert len(cells) == 4 * 7 * 9
     assert set(cells["gradient_unit"]) == {"N/rad"}
-    told = json.loads((tmp_path / "w.json").read_text())
-    assert [each["control"] for each in told["controls"]] == ["wheel"]
-    assert told["greatest_difference_percent"] < 1.0
+    found = json.loads((tmp_path / "w.json").read_text())
+    assert [each["control"] for each in found["controls"]] == ["wheel"]
+    assert found["greatest_difference_percent"] < 1.0
     assert "limits on the map" in ran.output
 
 
