@@ -1,53 +1,42 @@
 """Static and dynamic control checks against 14 CFR Part 60, appendix A, table A2A.
 
-The rig as it is against itself with a rigid structure, which stands for the aircraft:
-what the schedule specifies, felt through the loader's own mass, damping and friction.
-Where the rule gives two tolerances for a force, the wider one holds. Of a release the
-rule's P₀ is the time from 90 % of the displacement to the first zero crossing, or overdamped
-to 10 %, and may err by 10 %; P_n, the n-th full period after that crossing, by 10·(n + 1) %.
-Displacements are counted from where the control comes to rest.
+The rig as it is against what is specified (`specification`), which stands for the aircraft.
+The force is the hand's own, not what the strain gauge says. Where the rule gives two
+tolerances for a force, the wider one holds. Of a release the rule's P₀ is the time from 90 %
+of the displacement to the first zero crossing, or overdamped to 10 %, and may err by 10 %;
+P_n, the n-th full period after that crossing, by 10·(n + 1) %. Displacements are counted from
+where the control comes to rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.calibration.specification import LEGS, SweepLeg
 from coupled.calibration.sweeps import Release
+from coupled.campaign.tolerances import (
+    COUNTED,
+    HEIGHT_SHARE,
+    STATIC,
+    TIME_SHARE,
+    SURFACE_rad,
+    force_band,
+)
 from coupled.record.channels import ControlName
-from coupled.rig.rig import Rig
+from coupled.rig.parameters import Control
 from coupled.rig.standalone import History
-from coupled.units import POUND_N, DEGREE_rad
+from coupled.units import DEGREE_rad
 
 Floats = NDArray[np.float64]
 INNER, OUTER = 0.03, 0.93  # of the travel: where a sweep's force is judged
 LINE = (0.06, 0.2)  # of the travel: the straight part whose start is the breakout
-FORCE_SHARE = 0.10
-SURFACE_rad = 2.0 * DEGREE_rad
-TIME_SHARE = 0.10
-COUNTED = 0.05  # overshoots above this share of the displacement count
 STILL, STUCK = 1e-3, 0.8  # of the displacement: what has come to rest, and what never left
-APART = 10.0  # times what still moves, a resting place is no slow return to neutral
-LEGS = ("out, positive", "back, positive", "out, negative", "back, negative")
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """What the rule allows a control: breakout and force in N."""
-
-    breakout_N: float
-    force_N: float
-
-
-TOLERANCES: dict[ControlName, Tolerance] = {
-    "column": Tolerance(2.0 * POUND_N, 5.0 * POUND_N),
-    "wheel": Tolerance(2.0 * POUND_N, 3.0 * POUND_N),
-    "pedals": Tolerance(5.0 * POUND_N, 5.0 * POUND_N),
-}
+RESTING = 10.0  # times what still moves, a resting place is no slow return to neutral
 
 
 @dataclass(frozen=True)
@@ -79,94 +68,103 @@ class ControlCheck:
         return {**self.__dict__, "margin": self.margin, "passed": self.passed}
 
 
-def legs(response: History) -> list[tuple[Floats, Floats, Floats]]:
-    """Return (δ, F, surface) of a sweep's four legs, each with δ rising in size."""
-    turn = [
-        0,
-        int(np.argmax(response.deflection)),
-        int(np.argmin(response.deflection)),
-        len(response.force),
-    ]
-    neutral = turn[1] + int(np.argmax(response.deflection[turn[1] :] <= 0.0))
-    parts = [slice(0, turn[1]), slice(turn[1], neutral)]
-    parts += [slice(neutral, turn[2]), slice(turn[2], turn[3])]
+def legs(response: History) -> tuple[SweepLeg, ...]:
+    """Return a sweep's four legs, each with δ rising in size."""
+    deflection = response.deflection
+    stops = int(np.argmax(deflection)), int(np.argmin(deflection))
+    neutral = stops[0] + int(np.argmax(deflection[stops[0] :] <= 0.0))
+    parts = [slice(0, stops[0]), slice(stops[0], neutral)]
+    parts += [slice(neutral, stops[1]), slice(stops[1], len(deflection))]
     found = []
     for i, part in enumerate(parts):
-        order = slice(None) if i % 2 == 0 else slice(None, None, -1)
-        columns = (response.deflection[part], response.force[part], response.surface[part])
-        found.append(tuple(column[order] for column in columns))
-    return [(d, f, s) for d, f, s in found]
+        order = slice(None, None, 1 if i % 2 == 0 else -1)
+        columns = (deflection[part], response.force[part], response.surface[part])
+        found.append(SweepLeg(*(column[order] for column in columns)))
+    return tuple(found)
 
 
-def band(control: ControlName, force: Floats) -> Floats:
-    """Return how far a force in N may be off the reference: ±10 % or the rule's pounds."""
-    return np.maximum(FORCE_SHARE * np.abs(force), TOLERANCES[control].force_N)
+@dataclass(frozen=True)
+class JudgedLeg:
+    """Where a leg's force is judged: δ in d, F felt and specified there, N."""
+
+    deflection: Floats
+    felt: Floats
+    specified: Floats
 
 
 def judged(
-    control: ControlName, travel: float, felt: History, specified: History
-) -> list[tuple[Floats, Floats, Floats]]:
-    """Return (δ, F felt, F specified) along each leg, at the same δ in d, where it is judged."""
+    travel: float, felt: Sequence[SweepLeg], specified: Sequence[SweepLeg]
+) -> tuple[JudgedLeg, ...]:
+    """Return what is felt and specified along each leg at the same δ."""
     found = []
-    for (d, f, _), (d0, f0, _) in zip(legs(felt), legs(specified), strict=True):
-        side = 1.0 if d.sum() > 0.0 else -1.0
-        at = np.linspace(INNER, OUTER, 181) * travel
-        found.append((side * at, np.interp(at, side * d, f), np.interp(at, side * d0, f0)))
-    return found
+    at = np.linspace(INNER, OUTER, 181) * travel
+    for now, wanted, (side, _) in zip(felt, specified, LEGS.values(), strict=True):
+        forces = (np.interp(at, side * leg.deflection, leg.force) for leg in (now, wanted))
+        found.append(JudgedLeg(side * at, *forces))
+    return tuple(found)
 
 
-def breakout(deflection: Floats, force: Floats, travel: float, straight: float) -> float:
+def breakout(leg: SweepLeg, travel: float, straight: float) -> float:
     """Return the force in N at which a control leaves neutral: where its line starts.
 
     `straight` is where its first segment ends, d.
     """
-    share = np.abs(deflection) / travel
+    share = np.abs(leg.deflection) / travel
     near = (share > LINE[0]) & (share < min(LINE[1], 0.9 * straight / travel))
     if np.count_nonzero(near) < 2:
         near = share < LINE[1]
-    return float(np.abs(np.polyfit(deflection[near], force[near], 1)[1]))
+    return float(np.abs(np.polyfit(leg.deflection[near], leg.force[near], 1)[1]))
 
 
 def static_checks(
-    rig: Rig, control: ControlName, pressure_Pa: float, felt: History, specified: History
+    data: Control,
+    control: ControlName,
+    pressure_Pa: float,
+    felt: Sequence[SweepLeg],
+    specified: Sequence[SweepLeg],
 ) -> list[ControlCheck]:
-    """Return breakout both ways, and the force where it is nearest to its limit on each leg."""
+    """Return breakout both ways, and the force where it is nearest to its limit on each leg.
+
+    `data` is the control as specified.
+    """
     found = []
-    travel = rig.controls[control].travel
-    straight = rig.controls[control].schedule.break_deflection or travel
-    pairs = zip(legs(felt), legs(specified), LEGS, strict=True)
-    for i, ((d, f, _), (d0, f0, _), leg) in enumerate(pairs):
-        if i % 2 == 0:
-            forces = (breakout(d, f, travel, straight), breakout(d0, f0, travel, straight))
-            allowed = TOLERANCES[control].breakout_N
-            name = f"breakout, {leg.removeprefix('out, ')}"
-            found.append(ControlCheck(name, pressure_Pa, *forces, allowed, "N"))
-    for (_, f, f0), leg in zip(judged(control, travel, felt, specified), LEGS, strict=True):
-        worst = int(np.argmax(np.abs(f - f0) / band(control, f0)))
-        allowed = float(band(control, f0)[worst])
-        check = ControlCheck(
-            f"force, {leg}", pressure_Pa, float(f[worst]), float(f0[worst]), allowed, "N"
-        )
-        found.append(check)
+    straight = data.schedule.break_deflection or data.travel
+    for now, wanted, leg in list(zip(felt, specified, LEGS, strict=True))[::2]:
+        forces = [breakout(each, data.travel, straight) for each in (now, wanted)]
+        name = f"breakout, {leg.removeprefix('out, ')}"
+        allowed = STATIC[control].breakout_N
+        found.append(ControlCheck(name, pressure_Pa, forces[0], forces[1], allowed, "N"))
+    for at, leg in zip(judged(data.travel, felt, specified), LEGS, strict=True):
+        band = force_band(control, at.specified)
+        worst = int(np.argmax(np.abs(at.felt - at.specified) / band))
+        felt_there, asked = float(at.felt[worst]), float(at.specified[worst])
+        allowed = float(band[worst])
+        found.append(ControlCheck(f"force, {leg}", pressure_Pa, felt_there, asked, allowed, "N"))
     return found
 
 
 def surface_checks(
-    control: ControlName, travel: float, surface_rad: float, pressure_Pa: float, felt: History
+    data: Control,
+    surface_rad: float,
+    pressure_Pa: float,
+    felt: Sequence[SweepLeg],
+    surface: str = "",
 ) -> list[ControlCheck]:
     """Return the surface's position where it is farthest off the deflection's, both ways.
 
-    `surface_rad` is the surface's travel for the whole of the control's.
+    `surface_rad` is the surface's travel for the whole of the control's; `surface` its name
+    where it is not the control's own, as a spoiler that the wheel moves.
     """
     found = []
-    for (d, _, s), leg in list(zip(legs(felt), LEGS, strict=True))[::2]:
-        inside = np.abs(d) <= OUTER * travel
-        moved = np.abs(s[inside]) * surface_rad / DEGREE_rad
-        asked = np.abs(d[inside]) / travel * surface_rad / DEGREE_rad
+    allowed = SURFACE_rad[surface or data.surface] / DEGREE_rad
+    for leg, name in list(zip(felt, LEGS, strict=True))[::2]:
+        inside = np.abs(leg.deflection) <= OUTER * data.travel
+        moved = np.abs(leg.surface[inside]) * surface_rad / DEGREE_rad
+        asked = np.abs(leg.deflection[inside]) / data.travel * surface_rad / DEGREE_rad
         worst = int(np.argmax(np.abs(moved - asked)))
-        name = f"surface, {leg.removeprefix('out, ')}"
+        label = f"{surface or 'surface'}, {name.removeprefix('out, ')}"
         pair = (float(moved[worst]), float(asked[worst]))
-        found.append(ControlCheck(name, pressure_Pa, *pair, SURFACE_rad / DEGREE_rad, "°"))
+        found.append(ControlCheck(label, pressure_Pa, *pair, allowed, "°"))
     return found
 
 
@@ -202,7 +200,7 @@ def _resting(let_go: Release) -> float:
     """Return where friction holds a release at its end, d; neutral where it still moves."""
     tail = let_go.deflection[-max(len(let_go.deflection) // 10, 1) :]
     rest, moves, start = float(tail[-1]), float(np.ptp(tail)), abs(let_go.start)
-    held = moves <= STILL * start and APART * moves <= abs(rest) < STUCK * start
+    held = moves <= STILL * start and RESTING * moves <= abs(rest) < STUCK * start
     return rest if held else 0.0
 
 
@@ -241,7 +239,8 @@ def dynamic_checks(
         yield ControlCheck(f"period {n}, {side}", pressure_Pa, *periods, allowed, "s")
     for n, peak in enumerate(wanted.peaks):
         height = float(now.peaks[n]) if n < len(now.peaks) else 0.0
-        pair, allowed = (100.0 * height, 100.0 * float(peak)), 10.0 * float(wanted.peaks[0])
+        pair = (100.0 * height, 100.0 * float(peak))
+        allowed = 100.0 * HEIGHT_SHARE * float(wanted.peaks[0])
         yield ControlCheck(f"overshoot {n + 1}, {side}", pressure_Pa, *pair, allowed, "%")
     yield ControlCheck(f"overshoots above 5 %, {side}", pressure_Pa, *count, 1.0, "")
 

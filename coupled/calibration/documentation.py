@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from coupled.calibration.checks import ControlCheck, dynamic_checks, static_checks, surface_checks
+from coupled.calibration.checks import (
+    ControlCheck,
+    dynamic_checks,
+    legs,
+    static_checks,
+    surface_checks,
+)
+from coupled.calibration.specification import SweepLeg, specified_legs, specified_rig
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.manoeuvre import configure
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from coupled.rig.standalone import History
 
@@ -20,18 +28,26 @@ SIDES = {"positive": 1.0, "negative": -1.0}
 
 
 @dataclass(frozen=True)
-class Condition:
-    """One q̄: sweeps of the rig as specified (rigid), without and with compensation, and as it is.
+class LetGo:
+    """A release of the rig as it is, and of the specified one."""
 
-    `let_go` are the releases as it is and as specified, by side.
+    felt: Release
+    specified: Release
+
+
+@dataclass(frozen=True)
+class FeelCondition:
+    """One q̄: what is specified, sweeps without and with compensation, and of the rig as it is.
+
+    `let_go` are the releases by side.
     """
 
     pressure_Pa: float
-    specified: History
+    specified: tuple[SweepLeg, ...]
     uncompensated: History
     compensated: History
     felt: History
-    let_go: dict[str, tuple[Release, Release]]
+    let_go: Mapping[str, LetGo]
 
 
 @dataclass(frozen=True)
@@ -40,7 +56,7 @@ class Documentation:
 
     rig: Rig
     control: ControlName
-    conditions: tuple[Condition, ...]
+    conditions: tuple[FeelCondition, ...]
     checks: tuple[ControlCheck, ...]
     surface_rad: float | None
 
@@ -55,39 +71,74 @@ def surface_travels(rig: Rig, file: Path) -> dict[str, float]:
 
 
 def document(
-    rig: Rig, control: ControlName, surface_rad: float | None, progress: Progress | None = None
+    rig: Rig,
+    control: ControlName,
+    surface_rad: float | None,
+    progress: Progress | None = None,
+    specification: Rig | None = None,
 ) -> Documentation:
-    """Return a control's documentation at the least, middle and greatest gradient."""
-    travel = rig.controls[control].travel
-    pressures = feel_pressures(rig, control)
+    """Return a control's documentation at the least, middle and greatest gradient specified.
+
+    `specification` is a rig that says what is specified where this one's own file does not:
+    its schedule, breakout, friction, mass and damping count. Raises InputError where it lacks
+    the control.
+    """
+    specified = specified_rig((specification or rig).only(control))
+    pressures = feel_pressures(specified, control)
     conditions, checks = [], []
     for i, pressure in enumerate(pressures):
         if progress is not None:
             progress(f"{control}, q̄ = {pressure:.0f} Pa", i, len(pressures))
-        condition = _condition(rig, control, pressure)
+        condition = FeelCondition(
+            pressure,
+            specified_legs(specified, control, pressure),
+            sweep(configure(rig, "uncompensated"), control, pressure),
+            sweep(configure(rig, "compensated"), control, pressure),
+            sweep(rig, control, pressure),
+            _let_go(rig, control, pressure, specified),
+        )
         conditions.append(condition)
-        felt, specified = condition.felt, condition.specified
-        checks += static_checks(rig, control, pressure, felt, specified)
-        if surface_rad is not None:
-            checks += surface_checks(control, travel, surface_rad, pressure, felt)
-        for side, (now, wanted) in condition.let_go.items():
-            checks += dynamic_checks(pressure, side, now, wanted)
+        checks += _checks(condition, control, specified.controls[control], surface_rad)
     return Documentation(rig, control, tuple(conditions), tuple(checks), surface_rad)
 
 
-def _condition(rig: Rig, control: ControlName, pressure: float) -> Condition:
-    rigid = configure(rig, "rigid")
-    return Condition(
-        pressure,
-        sweep(rigid, control, pressure),
-        sweep(configure(rig, "uncompensated"), control, pressure),
-        sweep(configure(rig, "compensated"), control, pressure),
-        sweep(rig, control, pressure),
-        {
-            name: (release(rig, control, pressure, side), release(rigid, control, pressure, side))
-            for name, side in SIDES.items()
-        },
-    )
+def check_feel(
+    rig: Rig,
+    control: ControlName,
+    surface_rad: float | None = None,
+    specification: Rig | None = None,
+) -> tuple[ControlCheck, ...]:
+    """Return the checks of a control's documentation, without what is only drawn."""
+    specified = specified_rig((specification or rig).only(control))
+    checks = []
+    for pressure in feel_pressures(specified, control):
+        felt = sweep(rig, control, pressure)
+        legs_there = specified_legs(specified, control, pressure)
+        let_go = _let_go(rig, control, pressure, specified)
+        condition = FeelCondition(pressure, legs_there, felt, felt, felt, let_go)
+        checks += _checks(condition, control, specified.controls[control], surface_rad)
+    return tuple(checks)
+
+
+def _let_go(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Mapping[str, LetGo]:
+    return {
+        name: LetGo(
+            release(rig, control, pressure, side), release(specified, control, pressure, side)
+        )
+        for name, side in SIDES.items()
+    }
+
+
+def _checks(
+    condition: FeelCondition, control: ControlName, data: Control, surface_rad: float | None
+) -> list[ControlCheck]:
+    pressure, felt = condition.pressure_Pa, legs(condition.felt)
+    checks = static_checks(data, control, pressure, felt, condition.specified)
+    if surface_rad is not None:
+        checks += surface_checks(data, surface_rad, pressure, felt)
+    for side, let_go in condition.let_go.items():
+        checks += dynamic_checks(pressure, side, let_go.felt, let_go.specified)
+    return checks
 
 
 def controls_of(rig: Rig) -> list[ControlName]:

@@ -9,7 +9,8 @@ from pathlib import Path
 import polars as pl
 
 from coupled.authority.compare import Flight, compare
-from coupled.campaign.verdict import UnjudgedError, Verdict, judge_expectation
+from coupled.campaign.standards import UnjudgedError
+from coupled.campaign.verdict import Verdict, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect
 from coupled.flight.manoeuvre import Configuration, Manoeuvre

@@ -1,50 +1,103 @@
-"""Limits of the standards that a flight is held against.
+"""A flight held against 14 CFR 25.143(d) and Part 60, appendix A, table A2A (`tolerances`).
 
-14 CFR 25.143(d): pilot forces. 14 CFR Part 60, appendix A, table A2A: the force of a
-held control against the specified one (2.a, and 2.d.8 and 2.e.1 in flight), and the peak
-rate after a small input (2.b.4), for which the rigid structure stands for the aircraft.
+Pilot forces are judged by how long they last: the greatest against the short-term limit, and
+what is held for longer than a short term against the long-term one; whichever comes nearer to
+its limit is the figure. Part 60: the force of a held control against the specified one (2.a,
+and 2.d.8 and 2.e.1 in flight), and the peak rate after a small pitch input (2.b.4), for which
+the rigid structure stands for the aircraft. 2.b.4 is for approach and landing, whose choice
+is the run's, and for rates of 0.5 to 2 °/s: a larger one is not judged by it, and "rate
+against rigid" has the same tolerances for any rate.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from coupled.authority.compare import Flight, held_forces
-from coupled.flight.expectation import RATE, Standard
+from coupled.campaign.tolerances import (
+    LONG_TERM_N,
+    ONE_HAND_N,
+    RATE_SHARE,
+    TWO_HANDS_N,
+    RATE_rad_per_s,
+    SHORT_TERM_s,
+    SMALL_rad_per_s,
+    force_band,
+    sustained_force,
+)
+from coupled.flight.expectation import RATE, SMALL_RATE, Standard
 from coupled.record.channels import ControlName, channel
-from coupled.units import POUND_N, DEGREE_rad
+from coupled.units import DEGREE_rad
 
-Bounds = tuple[float | None, float | None]
-
-# 25.143(d): pitch, roll and yaw, in lbf. A foot is not a hand: yaw has one short-term limit.
-_PILOT_FORCE_lbf: dict[Standard, dict[ControlName, float]] = {
-    "25.143(d) two hands": {"column": 75.0, "wheel": 50.0, "pedals": 150.0},
-    "25.143(d) one hand": {"column": 50.0, "wheel": 25.0, "pedals": 150.0},
-    "25.143(d) long-term": {"column": 10.0, "wheel": 5.0, "pedals": 20.0},
+_SHORT_TERM: Mapping[Standard, Mapping[ControlName, float]] = {
+    "25.143(d) two hands": TWO_HANDS_N,
+    "25.143(d) one hand": ONE_HAND_N,
 }
-_FORCE_lbf: dict[ControlName, float] = {"column": 5.0, "wheel": 3.0, "pedals": 5.0}
-_FORCE_SHARE = 0.10
-_RATE_rad_per_s = 0.15 * DEGREE_rad
-_RATE_SHARE = 0.20
+_LONG_TERM: Standard = "25.143(d) long-term"
+
+
+class UnjudgedError(Exception):
+    """Why a figure could not be had."""
+
+
+@dataclass(frozen=True)
+class StandardFigure:
+    """A flight's figure and its bounds, in N or rad/s; `note` says which of several it is."""
+
+    value: float
+    least: float | None
+    most: float | None
+    note: str = ""
 
 
 def judge_standard(
     standard: Standard, control: ControlName | None, flight: Flight, rigid: Flight | None
-) -> tuple[float, Bounds]:
-    """Return a flight's figure and its bounds, in N or rad/s.
+) -> StandardFigure:
+    """Return a flight's figure and its bounds.
 
-    `control` is the one that the comparison looks at where none is named. Of two
-    tolerances the wider holds.
+    `control` is the one that the comparison looks at where none is named. Raises
+    UnjudgedError where the standard is for other flights.
     """
     looked_at = control or flight.manoeuvre.control
-    if standard in _PILOT_FORCE_lbf:
-        force = float(np.max(np.abs(flight.record[channel(looked_at, "force")])))
-        return force, (None, _PILOT_FORCE_lbf[standard][looked_at] * POUND_N)
-    if standard == RATE:
+    if standard == _LONG_TERM or standard in _SHORT_TERM:
+        return _pilot_force(standard, looked_at, flight)
+    if standard in (RATE, SMALL_RATE):
         assert rigid is not None
-        peak, wanted = (f.outcome.peak_rate_rad_per_s or 0.0 for f in (flight, rigid))
-        allowed = max(_RATE_rad_per_s, _RATE_SHARE * abs(wanted))
-        return peak, (wanted - allowed, wanted + allowed)
+        return _rate(standard, flight, rigid)
     felt, specified = held_forces(flight.manoeuvre, looked_at, flight.record)
-    allowed = max(_FORCE_lbf[looked_at] * POUND_N, _FORCE_SHARE * abs(specified))
-    return felt, (specified - allowed, specified + allowed)
+    allowed = float(force_band(looked_at, specified))
+    return StandardFigure(felt, specified - allowed, specified + allowed)
+
+
+def _pilot_force(standard: Standard, control: ControlName, flight: Flight) -> StandardFigure:
+    force = flight.record[channel(control, "force")]
+    time_s = flight.record.time_s
+    frame_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else SHORT_TERM_s
+    sustained = sustained_force(force, frame_s)
+    held = StandardFigure(
+        sustained, None, LONG_TERM_N[control], f", mean over {SHORT_TERM_s:g} s (long-term)"
+    )
+    if standard == _LONG_TERM:
+        return held
+    most = _SHORT_TERM[standard][control]
+    greatest = float(np.max(np.abs(force)))
+    if sustained / LONG_TERM_N[control] > greatest / most:
+        return held
+    return StandardFigure(greatest, None, most)
+
+
+def _rate(standard: Standard, flight: Flight, rigid: Flight) -> StandardFigure:
+    peak, wanted = (f.outcome.peak_rate_rad_per_s or 0.0 for f in (flight, rigid))
+    low, high = SMALL_rad_per_s
+    if standard == SMALL_RATE:
+        if flight.manoeuvre.control != "column":
+            problem = f"2.b.4 is for a small pitch input, not for the {flight.manoeuvre.control}"
+            raise UnjudgedError(problem)
+        if not low <= abs(wanted) <= high:
+            problem = f"2.b.4 is for 0.5 to 2 °/s; the rigid flight's is {wanted / DEGREE_rad:.3g}"
+            raise UnjudgedError(f"{problem} °/s (see {RATE!r})")
+    allowed = max(RATE_rad_per_s, RATE_SHARE * abs(wanted))
+    return StandardFigure(peak, wanted - allowed, wanted + allowed)

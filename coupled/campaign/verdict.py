@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.compare import Flight
-from coupled.campaign.standards import judge_standard
+from coupled.campaign.standards import StandardFigure, UnjudgedError, judge_standard
 from coupled.flight.expectation import Expect
 from coupled.record.channels import TIME
 
@@ -70,39 +70,35 @@ def finding(verdict: Verdict) -> str:
     return f"{verdict.value:.6g}{bounds}, margin {verdict.margin:.3g}"
 
 
-class UnjudgedError(Exception):
-    """Why a figure could not be had."""
-
-
 def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | None) -> Verdict:
     """Return the verdict on a flight, held against `other` where the expectation says so."""
     if flight is None or (expect.reference is not None and other is None):
         raise UnjudgedError("was not flown")
-    value, bounds = _figure(expect, flight, other)
-    scenario = flight.manoeuvre
-    return Verdict(
-        scenario.name, scenario.label, flight.configuration, expect.words, value, *bounds
-    )
+    figure = _figure(expect, flight, other)
+    if not math.isfinite(figure.value):
+        raise UnjudgedError("the flight has no such figure")
+    run = flight.manoeuvre
+    what = expect.words + figure.note
+    bounds = (figure.least, figure.most)
+    return Verdict(run.name, run.label, flight.configuration, what, figure.value, *bounds)
 
 
-def _figure(expect: Expect, flight: Flight, other: Flight | None) -> tuple[float, Bounds]:
+def _figure(expect: Expect, flight: Flight, other: Flight | None) -> StandardFigure:
     if expect.channel is None:
         for flown in filter(None, (flight, other)):
             if flown.outcome.ended_early:
                 raise UnjudgedError(f"the flight ended early: {flown.outcome.ended_early}")
     if expect.standard is not None:
-        value, bounds = judge_standard(expect.standard, expect.control, flight, other)
-    elif expect.measure is not None:
-        value, bounds = _measured(expect.measure, flight), expect.bounds
+        return judge_standard(expect.standard, expect.control, flight, other)
+    if expect.measure is not None:
+        value = _measured(expect.measure, flight)
         if other is not None:
             value -= _measured(expect.measure, other)
     elif expect.reaches is not None:
-        value, bounds = _time_reached(expect, flight), expect.bounds
+        value = _time_reached(expect, flight)
     else:
-        value, bounds = _taken(expect, flight, other), expect.bounds
-    if not math.isfinite(value):
-        raise UnjudgedError("the flight has no such figure")
-    return value, bounds
+        value = _taken(expect, flight, other)
+    return StandardFigure(value, *expect.bounds)
 
 
 def _measured(name: str, flight: Flight) -> float:

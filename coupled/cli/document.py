@@ -31,6 +31,9 @@ def document(
     readings: Annotated[
         Path | None, typer.Option(help="Readings to draw (default: a virtual bench's).")
     ] = None,
+    specified: Annotated[
+        str, typer.Option(help="A rig that says what is specified (default: this one's own file).")
+    ] = "",
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
@@ -46,10 +49,12 @@ def document(
 
     file = find(rig, shipped_rigs(), "rig")
     data = read_rig(file)
+    reference = find(specified, shipped_rigs(), "rig") if specified else None
+    wanted = read_rig(reference) if reference else None
     chosen = [rig_and_control(rig, control)[2]] if control else controls_of(data)
     folder = output or Path("out") / f"{data.name}-document"
     pdf = folder / f"{data.name}.pdf"
-    inputs = [file, *([readings] if readings else [])]
+    inputs = [file, *([readings] if readings else []), *([reference] if reference else [])]
     if folder.is_file():
         raise InputError(folder, "--output", "is a file; give a folder")
     check_target(pdf, inputs)
@@ -60,7 +65,7 @@ def document(
     documents = []
     with progress() as advance:
         for name in chosen:
-            documents.append(gather(data, name, travels.get(name), advance))
+            documents.append(gather(data, name, travels.get(name), advance, wanted))
     from coupled.plots.documentation import draw_pages
 
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}

@@ -33,8 +33,11 @@ Standard = Literal[
     "25.143(d) long-term",
     "Part 60 2.a force",
     "Part 60 2.b.4 rate",
+    "rate against rigid",
 ]
-RATE: Standard = "Part 60 2.b.4 rate"  # it holds a flight against the rigid one
+SMALL_RATE: Standard = "Part 60 2.b.4 rate"  # a small pitch input's
+RATE: Standard = "rate against rigid"
+RATES = (SMALL_RATE, RATE)  # they hold a flight against the rigid one
 REFERENCE = "rigid"
 
 
@@ -72,7 +75,7 @@ class Expect(Section):
     @property
     def reference(self) -> str | None:
         """The configuration that the flight is held against, if any."""
-        return REFERENCE if self.standard == RATE else self.minus
+        return REFERENCE if self.standard in RATES else self.minus
 
     def concerns(self, case: str, configuration: str) -> bool:
         """Tell whether a flight is one that this is expected of."""
@@ -196,7 +199,7 @@ def _check_flights(
             file, f"{place}.case", f"no {expect.case!r}; {nearest(expect.case, cases)}"
         )
     wanted = {"configuration": expect.configuration, "minus": expect.minus}
-    if expect.standard == RATE:
+    if expect.standard in RATES:
         wanted["standard"] = REFERENCE
     for key, name in wanted.items():
         if name is not None and name not in configurations:
@@ -214,5 +217,5 @@ def _check_channels(expect: Expect, file: object, place: str, channels: Sequence
     if expect.control is not None and expect.control not in controls:
         hint = nearest(expect.control, controls)
         raise InputError(file, f"{place}.control", f"the rig has no {expect.control}; {hint}")
-    if expect.standard == RATE and "pitch_rate_rad_per_s" not in channels:
+    if expect.standard in RATES and "pitch_rate_rad_per_s" not in channels:
         raise InputError(file, f"{place}.standard", "the rig has no aircraft whose rate this is")

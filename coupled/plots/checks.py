@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.calibration.checks import TIME_SHARE, SURFACE_rad, Swing, band, legs, swing_of
+from coupled.calibration.checks import Swing, swing_of
+from coupled.campaign.tolerances import TIME_SHARE, SURFACE_rad, force_band
 from coupled.plots.pages import BLUE, ORANGE, panels, pressure, scale, title, with_legend
 from coupled.units import DEGREE_rad
 
@@ -25,25 +26,25 @@ def draw_static_checks(found: Documentation) -> Figure:
     figure, grid = panels(rows, len(found.conditions), 3.0)
     for i, condition in enumerate(found.conditions):
         axes = grid[0, i]
-        for (d, f, _), name in zip(
-            legs(condition.specified), ("tolerance", "", "", ""), strict=True
-        ):
-            allowed = band(found.control, f)
+        for leg, name in zip(condition.specified, ("tolerance", "", "", ""), strict=True):
+            x, f = factor * leg.deflection, leg.force
+            allowed = force_band(found.control, f)
             axes.fill_between(
-                factor * d, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
+                x, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
             )
         response = condition.felt
         axes.plot(
             factor * response.deflection, response.force, color=BLUE, linewidth=1.2, label="rig"
         )
-        x = factor * condition.specified.deflection
-        axes.plot(x, condition.specified.force, "k:", linewidth=1.0, label="specified")
+        for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
+            x = factor * leg.deflection
+            axes.plot(x, leg.force, "k:", linewidth=1.0, label=name or None)
         axes.set_title(_verdict(found, condition.pressure_Pa, ("breakout", "force")), fontsize=9)
         if found.surface_rad is not None:
             ends = np.array([-1.0, 1.0])
             degrees = found.surface_rad / DEGREE_rad * ends
             below = grid[1, i]
-            wide = SURFACE_rad / DEGREE_rad
+            wide = SURFACE_rad[data.surface] / DEGREE_rad
             x = factor * data.travel * ends
             below.fill_between(x, degrees - wide, degrees + wide, color="0.85", linewidth=0)
             side = np.sign(np.dot(response.surface, response.deflection))
@@ -80,7 +81,8 @@ def draw_releases(found: Documentation) -> Figure:
     """Draw the dynamic control check: releases, with the tolerance of crossings and overshoots."""
     figure, grid = panels(2, len(found.conditions), 2.7)
     for i, condition in enumerate(found.conditions):
-        for axes, (side, (now, wanted)) in zip(grid[:, i], condition.let_go.items(), strict=True):
+        for axes, (side, both) in zip(grid[:, i], condition.let_go.items(), strict=True):
+            now, wanted = both.felt, both.specified
             swing = swing_of(wanted)
             for let_go, style in (
                 (wanted, {"color": "black", "linestyle": "dotted", "label": "specified"}),

@@ -54,13 +54,15 @@ def draw_forces(found: Documentation) -> Figure:
     figure, grid = panels(1, len(found.conditions), 3.5)
     for axes, condition in zip(grid[0], found.conditions, strict=True):
         sweeps = (
-            ("specified (rigid structure)", condition.specified, GRAY, 4.5),
             ("uncompensated", condition.uncompensated, ORANGE, 1.3),
             ("compensated", condition.compensated, GREEN, 1.3),
         )
         for name, response, color, width in sweeps:
             x = factor * response.deflection
             axes.plot(x, response.force, color=color, linewidth=width, label=name)
+        for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
+            x, style = factor * leg.deflection, {"color": GRAY, "linewidth": 4.5, "zorder": 1}
+            axes.plot(x, leg.force, label=name or None, **style)
         axes.set_title(pressure(condition.pressure_Pa), fontsize=10)
         axes.set_xlabel(f"true deflection δ, {unit}")
         axes.grid(alpha=0.25)

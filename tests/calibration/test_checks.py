@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from coupled.calibration.checks import (
-    TOLERANCES,
     ControlCheck,
-    band,
     dynamic_checks,
+    legs,
     static_checks,
     surface_checks,
     swing_of,
 )
-from coupled.calibration.documentation import document
+from coupled.calibration.documentation import check_feel
+from coupled.calibration.specification import SweepLeg, specified_legs, specified_rig
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
+from coupled.campaign.tolerances import STATIC, SURFACE_rad, force_band
 from coupled.flight.manoeuvre import configure
+from coupled.gap.effects import BY_NAME, apply
 from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.rig import Rig
 from tests.support.rigs import G_STIFF, K_REPORT, bench
@@ -159,12 +162,62 @@ def test_a_margin_is_what_is_left_of_the_tolerance() -> None:
     assert not ControlCheck("x", 0.0, float("nan"), 10.0, 4.0, "N").passed
 
 
-def test_the_wider_of_two_force_tolerances_holds() -> None:
-    np.testing.assert_allclose(
-        band("column", np.array([100.0, -400.0])), [22.2411, 40.0], rtol=1e-5
-    )
-    assert TOLERANCES["wheel"].force_N == pytest.approx(13.34, abs=0.01)
-    assert TOLERANCES["pedals"].breakout_N == pytest.approx(22.24, abs=0.01)
+LBF = 4.4482216
+
+# 14 CFR Part 60, table A2A, 2.a.1 to 2.a.3 as printed: breakout and force in lbf, surface in °.
+PRINTED = {
+    "column": (2.0, 5.0, "elevator", 2.0),
+    "wheel": (2.0, 3.0, "aileron", 2.0),
+    "pedals": (5.0, 5.0, "rudder", 2.0),
+}
+
+
+TRAVEL = 0.1778
+
+
+def four(force: Any, surface_share: float = 1.0) -> tuple[SweepLeg, ...]:
+    """Return the legs of a sweep whose force is a function of the size of δ, odd in it."""
+    at = np.linspace(1e-9, TRAVEL, 401)
+    size, share = np.broadcast_to(force(at), at.shape), surface_share * at / TRAVEL
+    out, back = SweepLeg(at, size, share), SweepLeg(-at, -size, -share)
+    return (out, out, back, back)
+
+
+@pytest.mark.parametrize("control", ["column", "wheel", "pedals"])
+def test_static_tolerances_are_those_printed(control: Any) -> None:
+    """Breakout by ± lbf; a force by ± 10 % where that is more than its ± lbf."""
+    breakout_lbf, force_lbf, surface, degrees = PRINTED[control]
+    data = bench().controls["column"]
+
+    def checks(specified: float, more: float) -> dict[str, ControlCheck]:
+        felt, wanted = (four(lambda _, f=f: f * LBF) for f in (specified + more, specified))
+        return {c.name: c for c in static_checks(data, control, 0.0, felt, wanted)}
+
+    for which, specified, lbf in (
+        ("breakout, positive", 10.0, breakout_lbf),
+        ("force, out, positive", 10.0, force_lbf),
+        ("force, back, negative", 100.0, 10.0),
+    ):
+        for sign in (1.0, -1.0):
+            assert checks(specified, sign * 0.99 * lbf)[which].passed
+            assert not checks(specified, sign * 1.01 * lbf)[which].passed
+    assert force_band(control, 0.0) == pytest.approx(force_lbf * LBF)
+    assert STATIC[control].breakout_N == pytest.approx(breakout_lbf * LBF)
+    assert math.degrees(SURFACE_rad[surface]) == pytest.approx(degrees)
+
+
+@pytest.mark.parametrize(("surface", "degrees"), [("", 2.0), ("aileron", 2.0), ("spoiler", 3.0)])
+def test_a_surface_may_be_off_by_two_degrees_and_a_spoiler_by_three(
+    surface: str, degrees: float
+) -> None:
+    """Of 25° for the whole travel, so much is lacking where it is judged last, at 93 %."""
+    data, full = bench().controls["column"], math.radians(25.0)
+    for off, passed in ((0.98 * degrees, True), (1.02 * degrees, False)):
+        felt = four(lambda at: 500.0 * at, 1.0 - off / (0.93 * 25.0))
+        for check in surface_checks(data, full, 0.0, felt, surface):
+            assert check.passed is passed
+            assert check.tolerance == pytest.approx(degrees)
+            assert check.name.startswith(surface or "surface")
 
 
 FRICTION: dict[str, Any] = {"friction_N": 6.0, "breakout_N": 9.0}
@@ -187,18 +240,19 @@ def test_a_sweep_shows_friction_and_breakout() -> None:
     assert response.deflection.min() == pytest.approx(-0.1778, rel=1e-3)
 
 
-def test_a_rig_that_is_as_specified_passes_with_all_of_its_margin() -> None:
-    found = document(configure(bench(FRICTION), "rigid"), "column", 0.3)
-    assert found.checks
-    assert all(check.margin > 0.99 for check in found.checks)
-    assert {c.name.split(",")[0] for c in found.checks} >= {"breakout", "force", "surface"}
+def test_a_rig_that_is_as_specified_passes_with_nearly_all_of_its_margin() -> None:
+    """What it lacks is the damping at the sweep's 8 mm/s: 0.8 N of a tolerance of 9."""
+    checks = check_feel(configure(bench(FRICTION), "rigid"), "column", 0.3)
+    assert all(check.margin > 0.9 for check in checks)
+    assert {c.name.split(",")[0] for c in checks} >= {"breakout", "force", "surface"}
 
 
 def test_static_checks_tell_the_compensated_rig_from_the_uncompensated() -> None:
     rig = bench()
-    specified = both(rig, "rigid")
+    specified = specified_legs(specified_rig(rig), "column", 3000.0)
+    data = rig.controls["column"]
     checks = {
-        name: static_checks(rig, "column", 3000.0, both(rig, name), specified)
+        name: static_checks(data, "column", 3000.0, legs(both(rig, name)), specified)
         for name in ("compensated", "uncompensated")
     }
     assert all(c.passed for c in checks["compensated"])
@@ -206,6 +260,7 @@ def test_static_checks_tell_the_compensated_rig_from_the_uncompensated() -> None
     assert not any(c.passed for c in forces)
     lost = bend_loss(K_REPORT, G_STIFF) / (1.0 + bend_loss(K_REPORT, G_STIFF))
     assert forces[0].measured == pytest.approx(forces[0].reference * (1.0 - lost), rel=0.01)
+    assert forces[0].reference == pytest.approx(G_STIFF * 0.93 * 0.1778, rel=1e-6)
 
 
 def test_the_surface_lacks_what_the_bend_takes() -> None:
@@ -214,8 +269,121 @@ def test_the_surface_lacks_what_the_bend_takes() -> None:
         ("compensated", 0.0),
         ("uncompensated", uncompensated_loss(K_REPORT, G_STIFF)),
     ):
-        [check, _] = surface_checks("column", 0.1778, 0.4, 3000.0, both(rig, name))
+        felt = legs(both(rig, name))
+        [check, _] = surface_checks(rig.controls["column"], 0.4, 3000.0, felt)
         assert check.measured == pytest.approx(check.reference * (1.0 - loss), abs=0.05)
+
+
+def test_a_reference_is_what_the_host_assumes_and_not_what_is_amiss() -> None:
+    """G_B twice what the host has, S₂ 30 % off, the schedule's slope halved: each is felt."""
+    place = "controls.column"
+    amiss: dict[str, dict[str, Any]] = {
+        "G_B": {
+            f"{place}.loader.basic_gradient_N_per_m": 1120.0,
+            f"{place}.compensation.basic_gradient_N_per_m": 560.0,
+        },
+        "S2": {f"{place}.sensing.modifying_scale": 1.3},
+        "slope": {f"{place}.schedule.slope": 0.5},
+        "breakout": {
+            f"{place}.loader.breakout_N": 12.0,
+            f"{place}.compensation.breakout_N": 0.0,
+        },
+    }
+    assert all(check.passed for check in check_feel(bench(), "column") if check.unit == "N")
+    for name, changes in amiss.items():
+        checks = check_feel(bench().changed(changes), "column")
+        failed = {c.name.split(",")[0] for c in checks if not c.passed and c.unit == "N"}
+        assert ("breakout" if name == "breakout" else "force") in failed, name
+    # at the softest gradient 560 N/m is specified, and the loader holds 1120
+    doubled = check_feel(bench().changed(amiss["G_B"]), "column")
+    worst = next(c for c in doubled if c.name == "force, out, positive")
+    assert worst.reference == pytest.approx(560.0 * 0.93 * 0.1778, rel=1e-6)
+    assert worst.measured > 1.7 * worst.reference
+
+
+def test_another_rig_may_say_what_is_specified() -> None:
+    """A friction, a mass and a damping that a rig's own file takes for specified."""
+    for key, value in (("friction_N", 30.0), ("mass_kg", 9.0), ("damping_N_s_per_m", 250.0)):
+        rig = bench({key: value})
+        known = {c.name for c in check_feel(rig, "column", specification=bench()) if not c.passed}
+        own = {c.name for c in check_feel(rig, "column") if not c.passed}
+        assert known - own, key
+
+
+# Each fault of the library on the column of a test bench, at a size beyond its tolerance.
+FAULTS: dict[str, dict[str, float]] = {
+    "coulomb_friction": {"friction_N": 30.0},
+    "stribeck_friction": {"friction_N": 25.0, "breakaway_N": 35.0, "stribeck_{d}_per_s": 2e-3},
+    "viscous_damping": {"factor": 1.5},
+    "inertia": {"factor": 1.5},
+    "gradient_error": {"factor": 2.0},
+    "cubic_stiffness": {"cubic_N_per_{d}3": 3e4},
+    "breakout": {"breakout_N": 15.0},
+    "force_offset": {"offset_N": 30.0},
+    "deflection_scale": {"factor": 1.15},
+    "bend": {"bend_{d}_per_N": 2.0 * K_REPORT},
+    "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},
+    "backlash": {"play_{d}": 0.03},
+    "servo_lag": {"factor": 0.15},
+    "servo_rate_limit": {"rate_{d}_per_s": 0.1},
+    "pressure_scale": {"factor": 1.4},
+    "schedule_slope": {"factor": 0.5},
+    "cable_stretch": {"loss_per_Pa": 1e-4},
+    "surface_freeplay": {"play_norm": 0.3},
+    "rigging_offset": {"offset_norm": 0.2},
+}
+# What no check of this kind looks at: what needs a q̄ that moves, an aircraft, or a sampled product.
+UNSEEN = {
+    "pressure_lag": "q̄ is held",
+    "transport_delay": "a release is timed from its own 90 %; `coupled diagnose`",
+    "digital_multiplier": "steps of force; `coupled compare` shows them",
+    "bob_weight": "nz is 1",
+    "arc_geometry": "0.7 % at this column's 11°, within its tolerance",
+    "surface_lag": "a slow sweep; 2.b.4 and `coupled diagnose`",
+    "surface_rate_limit": "a slow sweep; `coupled diagnose`",
+    "elevator_effectiveness": "the aircraft's",
+    "pitch_damping": "the aircraft's",
+    "vertical_gust": "the air's",
+}
+FULL_rad = math.radians(25.0)
+TABLE = Path(__file__).parents[2] / "docs" / "calibration.md"
+
+
+def failing(effect: str, values: dict[str, float]) -> list[str]:
+    """Return the kinds of check that fail with an effect, and pass on the rig without it."""
+    nominal = bench()
+    named = {f"{effect}.{name}": value for name, value in values.items()}
+    faulty = apply(nominal, "column", [BY_NAME[effect]], named)
+    before, after = (
+        {
+            (c.name, c.pressure_Pa)
+            for c in check_feel(rig, "column", FULL_rad, nominal)
+            if not c.passed
+        }
+        for rig in (nominal, faulty)
+    )
+    kinds = {name.split(",")[0].rstrip(" 123456789") for name, _ in after - before}
+    return sorted(kinds)
+
+
+@pytest.mark.parametrize("effect", FAULTS)
+def test_a_fault_beyond_its_tolerance_fails_the_check_that_the_docs_name(effect: str) -> None:
+    found = failing(effect, FAULTS[effect])
+    assert found
+    assert f"| `{effect}` | {_size(effect)} | {', '.join(found)} |" in TABLE.read_text("utf-8")
+
+
+def test_the_docs_name_every_fault_of_the_library() -> None:
+    text = TABLE.read_text(encoding="utf-8")
+    for effect, why in UNSEEN.items():
+        assert f"| `{effect}` | any | none: {why} |" in text
+    assert {*FAULTS, *UNSEEN} >= set(BY_NAME)
+
+
+def _size(effect: str) -> str:
+    """Return a fault's size as the table has it."""
+    values = [f"{name.format(d='m')} {value:.3g}" for name, value in FAULTS[effect].items()]
+    return ", ".join(values)
 
 
 def test_a_release_begins_where_it_was_held_and_springs_back_by_the_bend() -> None:

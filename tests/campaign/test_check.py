@@ -14,8 +14,9 @@ import pytest
 
 from coupled.authority.compare import Flight, Outcome
 from coupled.campaign.check import check_run, read_expecting
-from coupled.campaign.standards import judge_standard
-from coupled.campaign.verdict import UnjudgedError, judge_expectation
+from coupled.campaign.standards import UnjudgedError, judge_standard
+from coupled.campaign.tolerances import sustained_force
+from coupled.campaign.verdict import judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect, Figure
 from coupled.flight.runfile import read_run
@@ -113,18 +114,92 @@ def test_what_lies_before_an_early_end_is_judged() -> None:
     assert judge_expectation(reached, flight(RISE, ended=True), None).passed
 
 
-def test_the_limits_are_those_of_the_standards() -> None:
-    """14 CFR 25.143(d): 75, 50 and 150 lbf for two hands; 222.4 N for one hand in pitch."""
-    value, (least, most) = judge_standard("25.143(d) two hands", None, flight(RISE), None)
-    assert value == pytest.approx(9.0)
-    assert least is None
-    assert most == pytest.approx(333.6, abs=0.1)
-    _, (least, most) = judge_standard("25.143(d) one hand", "column", flight(RISE), None)
-    assert least is None
-    assert most == pytest.approx(222.4, abs=0.1)
-    value, bounds = judge_standard("Part 60 2.b.4 rate", None, flight(RISE), flight(RISE))
-    assert value == 0.25
-    assert bounds == pytest.approx((0.2, 0.3))
+LBF = 4.4482216
+
+# 14 CFR 25.143(d) as printed, lbf: two hands, one hand, long-term.
+PRINTED = {"column": (75, 50, 10), "wheel": (50, 25, 5), "pedals": (150, 150, 20)}
+DURATIONS = ("25.143(d) two hands", "25.143(d) one hand", "25.143(d) long-term")
+
+
+def held(lbf: float, seconds: float, control: str = "column", least_s: float = 30.0) -> Flight:
+    """Return a flight of 10 Hz in which a force is held for so long, and none for the rest."""
+    base = flight(RISE)
+    rows = round(10.0 * max(seconds, least_s))
+    time = 0.1 * np.arange(rows)
+    force = np.where(time < seconds - 1e-9, lbf * LBF, 0.0)
+    record = Record(
+        ("time_s", f"{control}_force_N"), np.column_stack((time, force)), {"ended_early": None}
+    )
+    return replace(base, record=record)
+
+
+@pytest.mark.parametrize("control", ["column", "wheel", "pedals"])
+@pytest.mark.parametrize("which", [0, 1])
+def test_short_term_forces_are_those_of_25_143(control: Any, which: int) -> None:
+    """A second of 1 % less than what is printed passes, of 1 % more does not."""
+    limit = PRINTED[control][which]
+    for share, passes in ((0.99, True), (1.01, False)):
+        figure = judge_standard(DURATIONS[which], control, held(share * limit, 1.0, control), None)
+        assert figure.value == pytest.approx(share * limit * LBF)
+        assert figure.least is None
+        assert figure.most == pytest.approx(limit * LBF, rel=1e-6)
+        assert (figure.value <= limit * LBF) is passes
+        assert figure.note == ""
+
+
+@pytest.mark.parametrize("control", ["column", "wheel", "pedals"])
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_what_is_held_for_long_is_held_against_the_long_term_limit(
+    control: Any, which: int
+) -> None:
+    """Well within the short-term limit, and held for 25 s: 1 % over the long-term one fails."""
+    limit = PRINTED[control][2]
+    for share, passes in ((0.99, True), (1.01, False)):
+        figure = judge_standard(DURATIONS[which], control, held(share * limit, 25.0, control), None)
+        assert figure.value == pytest.approx(share * limit * LBF)
+        assert figure.most == pytest.approx(limit * LBF, rel=1e-6)
+        assert (figure.value <= limit * LBF) is passes
+        assert "long-term" in figure.note
+
+
+def test_a_peak_that_passes_may_be_held_for_too_long() -> None:
+    """50 lbf with two hands is short-term; held for 27 s it is not."""
+    short = judge_standard("25.143(d) two hands", "column", held(50.0, 2.0, least_s=60.0), None)
+    assert short.value < (short.most or 0.0)
+    for force in (held(50.0, 27.0, least_s=60.0), held(-50.0, 27.0, least_s=60.0)):
+        long = judge_standard("25.143(d) two hands", "column", force, None)
+        assert long.value == pytest.approx(50.0 * LBF)
+        assert long.most == pytest.approx(10.0 * LBF, rel=1e-6)
+
+
+def test_a_moment_of_ease_does_not_start_the_time_anew() -> None:
+    force = np.full(300, 40.0)
+    force[150] = 0.0
+    assert sustained_force(force, 0.1) == pytest.approx(40.0 * 199.0 / 200.0)
+    assert sustained_force(np.where(np.arange(300) % 2, 40.0, -40.0), 0.1) == pytest.approx(40.0)
+    assert sustained_force(np.full(100, 40.0), 0.1) == 0.0  # 10 s are no long term
+
+
+def test_a_small_pitch_input_is_one_of_half_to_two_degrees_a_second() -> None:
+    """Table A2A, 2.b.4: ±0.15°/s or ±20 % of the peak rate, for 0.5 to 2°/s."""
+
+    def peaking(deg_per_s: float) -> Flight:
+        base = flight(RISE)
+        rate = np.radians(deg_per_s)
+        return replace(base, outcome=replace(base.outcome, peak_rate_rad_per_s=rate))
+
+    for rigid, allowed in ((0.6, 0.15), (1.5, 0.3)):
+        figure = judge_standard("Part 60 2.b.4 rate", None, peaking(1.0), peaking(rigid))
+        assert figure.value == pytest.approx(np.radians(1.0))
+        assert figure.least == pytest.approx(np.radians(rigid - allowed))
+        assert figure.most == pytest.approx(np.radians(rigid + allowed))
+    for rigid in (0.4, 2.1, 14.0):
+        with pytest.raises(UnjudgedError, match=r"2\.b\.4 is for 0\.5 to 2 °/s"):
+            judge_standard("Part 60 2.b.4 rate", None, peaking(rigid), peaking(rigid))
+        assert judge_standard("rate against rigid", None, peaking(rigid), peaking(rigid)).most
+    wheel = replace(peaking(1.0), manoeuvre=read_run("roll-authority")[0])
+    with pytest.raises(UnjudgedError, match="not for the wheel"):
+        judge_standard("Part 60 2.b.4 rate", None, wheel, wheel)
 
 
 def test_every_figure_of_a_comparison_may_be_expected() -> None:
