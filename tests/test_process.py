@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from coupled.record.record import read_record
+from tests.support.commands import coupled, files
 from tests.support.processes import PATIENCE_s, begun, stopped
-from tests.test_cli import SHORT, coupled, files
+from tests.support.runs import SHORT
 
 COUPLED = f"{sys.executable} -m coupled"
 
@@ -62,10 +63,10 @@ def test_streams_that_take_no_more(folder: Path, line: str, code: int, says: byt
 
 
 def test_what_is_flown_is_kept_where_the_table_cannot_be_shown(folder: Path) -> None:
-    done = shell(folder, "coupled compare short.toml --figure f.png --json t.json > /dev/full")
+    done = shell(folder, "coupled fly short.toml -o r.csv --json t.json > /dev/full")
     assert done.returncode == 2
     assert done.stderr == FULL
-    assert files(folder) == {"short.toml", "f.png", "t.json"}
+    assert files(folder) == {"short.toml", "r.csv", "r.manifest.json", "t.json"}
 
 
 def test_a_library_that_prints_does_not_print_into_the_record(folder: Path) -> None:
