@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from coupled.record.record import read_record
-from tests.support.commands import coupled, files
+from tests.support.commands import ROOT, coupled, files
 from tests.support.processes import PATIENCE_s, begun, stopped
 from tests.support.runs import SHORT
 
@@ -193,3 +193,35 @@ def test_sigterm_keeps_the_diagnoses_of_a_folder(folder: Path) -> None:
     for kept in out.glob("r*.json"):
         assert json.loads(kept.read_text())["record"] == kept.stem
     assert not [name for name in files(out) if ".coupled-" in name]
+
+
+def test_json_does_not_overwrite_what_a_command_reads(folder: Path) -> None:
+    (folder / "push.toml").write_text(SHORT.replace('"report-column"', '"rig.toml"'))
+    rig = (ROOT / "aircraft" / "T37" / "report-column.toml").read_text(encoding="utf-8")
+    (folder / "rig.toml").write_text(rig, encoding="utf-8")
+    (folder / "b").mkdir()
+    (folder / "link.json").symlink_to(folder / "rig.toml")
+    (folder / "r.csv").write_text("time_s,column_force_N\n0,0\n1,1\n")
+    (folder / "r.manifest.json").write_text("{}")
+    sweep = (
+        'name = "s"\nrun = "push.toml"\n[[vary]]\nkey = "pilot.column.force_N"\nvalues = [1.0]\n'
+    )
+    (folder / "s.toml").write_text(sweep)
+    before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    for words in (
+        ("fly", "push.toml", "--json", "link.json"),
+        ("compare", "push.toml", "--no-figure", "--json", "b/../rig.toml"),
+        ("check", "push.toml", "--json", "rig.toml"),
+        ("sweep", "s.toml", "--json", "rig.toml"),
+        ("bench", "--rig", "rig.toml", "--json", "link.json"),
+        ("calibrate", "--plan", "--rig", "rig.toml", "--json", "b/../rig.toml"),
+        ("diagnose", "r.csv", "--rig", "rig.toml", "--json", "r.manifest.json"),
+        ("diagnose", "r.csv", "--rig", "rig.toml", "--improve", "b/../rig.toml"),
+        ("stability", "rig.toml", "--json", "link.json"),
+        ("document", "rig.toml", "--json", "b/../rig.toml"),
+    ):
+        done = coupled(folder, *words)
+        assert done.returncode == 2, words
+        assert {path: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
+        if words[0] != "check":  # which finds nothing to hold this run against
+            assert "of this command" in done.stderr or "this command reads" in done.stderr
