@@ -136,6 +136,8 @@ def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = (), why: str =
     for path in paths:
         try:
             _check_place(path)
+        except InputError:
+            raise
         except (OSError, ValueError):
             raise InputError(path, "", "cannot be written there") from None
         identities = _identities(path)

@@ -17,7 +17,7 @@ from pathlib import Path
 from coupled.campaign.entry import JournalEntry, read_entry
 from coupled.campaign.plan import SweepPlan
 from coupled.errors import InputError
-from coupled.files import clear
+from coupled.files import clear, read_bytes
 
 JOURNAL = "flights.jsonl"
 LOCK = ".lock"
@@ -42,7 +42,7 @@ class Journal:
         header = json.dumps({"sweep": identity}) + "\n"
         whole = b""
         if self.path.exists():
-            content = self.path.read_bytes()
+            content = read_bytes(self.path)
             whole = content[: content.rfind(b"\n") + 1]
         if not whole:
             self._write(header, "wb")

@@ -49,13 +49,14 @@ class PlannedFlight:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A sweep, ready to fly: `table` are the tables of the run's file."""
+    """A sweep, ready to fly: `table` are the run's tables, `files` all that its flights read."""
 
     sweep: SweepFile
     file: Path
     run_file: Path
     table: Mapping[str, Any]
     identity: str
+    files: frozenset[Path] = frozenset()
 
     @property
     def keys(self) -> list[str]:
@@ -113,7 +114,7 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
         if channel not in base.channels:
             hint = nearest(channel, base.channels)
             raise InputError(file, key, f"no channel {channel!r}; {hint}")
-    return SweepPlan(sweep, file, run_file, run_table, _identity(sweep, files))
+    return SweepPlan(sweep, file, run_file, run_table, _identity(sweep, files), frozenset(files))
 
 
 def planned_flights(plan: SweepPlan) -> list[PlannedFlight]:

@@ -99,7 +99,14 @@ def sweep(
     if target.is_file():
         raise InputError(target, "", "is a file; give a folder")
     path = figure or target / "sweep.png"
-    own = [file, plan.run_file, target / JOURNAL, target / TABLE, target / INDICES]
+    own = [
+        file,
+        plan.run_file,
+        *sorted(plan.files),
+        target / JOURNAL,
+        target / TABLE,
+        target / INDICES,
+    ]
     check_format(path)
     check_target(path, own)
     check_json(json_file, [*own, path])

@@ -52,6 +52,8 @@ def diagnose(
 ) -> None:
     """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
     name = _control(control, records[0])
+    from coupled.record.record import manifest_path
+
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--json": json_file}
         for option, value in asked.items():
@@ -64,7 +66,7 @@ def diagnose(
     if not rig:
         raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
     rig_file = find(rig, shipped_rigs(), "rig")
-    inputs = [*records, rig_file]
+    inputs = [*records, *map(manifest_path, records), rig_file]
     if improve is not None and improve.suffix != ".toml":
         raise InputError(improve, "--improve", "is a rig file: its name ends in .toml")
     drawn = _plot_targets(plots)

@@ -51,7 +51,7 @@ def import_log(
 
         nominal = read_rig(rig_file)
     record, account = import_file(log, map_file, nominal)
-    table = {"record": str(path), **account}
+    table = {"record": str(path), **account.as_dict()}
     with Outputs() as outputs:
         write_record(record, outputs.at(path))
         keep_json(table, json_file, outputs)

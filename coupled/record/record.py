@@ -155,8 +155,9 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         path.lstat()
     except OSError:
         return {}
+    content = read_bytes(path, MOST_TEXT_bytes)
     try:
-        manifest = json.loads(read_bytes(path, MOST_TEXT_bytes))
+        manifest = json.loads(content)
     except (ValueError, RecursionError):
         return {}
     if not isinstance(manifest, dict):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from coupled.record.importing.account import ImportAccount
 from coupled.record.importing.convert import import_log
 from coupled.record.record import Record
 
@@ -49,7 +50,7 @@ LINES = GOOD.splitlines()
 
 def imported(
     folder: Path, log: str | bytes = GOOD, log_map: str = MAP, name: str = "log.csv"
-) -> tuple[Record, dict[str, Any]]:
+) -> tuple[Record, ImportAccount]:
     (folder / name).write_bytes(log.encode() if isinstance(log, str) else log)
     (folder / "map.toml").write_text(log_map, encoding="utf-8")
     return import_log(folder / name, folder / "map.toml")

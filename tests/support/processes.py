@@ -1,4 +1,4 @@
-"""Commands begun in the background, to be killed while they work."""
+"""Commands begun in the background, to be stopped or killed while they work."""
 
 from __future__ import annotations
 
@@ -10,22 +10,32 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+PATIENCE_s = 300.0  # a command that takes so long hangs, however busy the machine is
 
-def begun(folder: Path, *words: str, until: Callable[[], bool]) -> subprocess.Popen[bytes]:
-    """Return a command in its own group of processes, once it has come so far."""
+
+def begun(
+    folder: Path, *words: str, until: Callable[[], bool], script: str = ""
+) -> subprocess.Popen[bytes]:
+    """Return a command, or a script, in its own group of processes, once it has come so far."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "coupled", *words],
+        [sys.executable, *(["-c", script] if script else ["-m", "coupled", *words])],
         cwd=folder,
         start_new_session=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    patience = time.monotonic() + 90.0
+    patience = time.monotonic() + PATIENCE_s
     while not until():
         assert process.poll() is None
         assert time.monotonic() < patience
         time.sleep(0.01)
     return process
+
+
+def stopped(process: subprocess.Popen[bytes], number: int) -> int:
+    """Send a command, and no worker of its, a signal; return its exit code."""
+    process.send_signal(number)
+    return process.wait(PATIENCE_s)
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
@@ -37,7 +47,7 @@ def kill(process: subprocess.Popen[bytes]) -> None:
 
 def ended(process: subprocess.Popen[bytes]) -> None:
     """Wait until nothing of a command's group of processes is left."""
-    patience = time.monotonic() + 30.0
+    patience = time.monotonic() + PATIENCE_s
     while True:
         try:
             os.killpg(process.pid, 0)

@@ -18,6 +18,7 @@ from coupled.blind.trials.deck import KNOWN
 from coupled.blind.trials.truth import Truth, truth_from
 from coupled.errors import InputError
 from coupled.files import check_format, read_json, read_text
+from coupled.schema import MOST_TOML_bytes
 
 FORMATS = {f"coupled blind key {version}": version for version in KNOWN}
 SEAL_FORMAT = 1
@@ -98,7 +99,7 @@ def _truth(path: Path, name: str, entry: Any) -> Truth:
 
 def read_seal(path: Path) -> Seal:
     """Return the seal of a set. Raises InputError."""
-    text = read_text(path, "the seal of coupled blind make is wanted")
+    text = read_text(path, "the seal of coupled blind make is wanted", MOST_TOML_bytes)
     try:
         table = tomllib.loads(text)
     except ValueError:

@@ -1,47 +1,47 @@
-"""What became of a log, on a terminal of 80 columns."""
+"""The account of an import, on a terminal of 80 columns."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from coupled.record.importing.account import ClockAccount, ImportAccount
+
 LISTED = 12  # unmapped columns named on the terminal; the manifest has all
 
 
-def print_account(console: Console, account: dict[str, Any]) -> None:
+def print_account(console: Console, account: ImportAccount) -> None:
     """Print how the clock was read, a row a channel, and what was left out."""
-    console.print(clock_in_words(account["clock"]), highlight=False)
+    console.print(clock_in_words(account.clock), highlight=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("channel", no_wrap=True)
     for head in ("least", "greatest", "rms", "noise"):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("verdict")
-    for name, found in account["channels"].items():
-        figures = [f"{found[key]:.4g}" for key in ("least", "greatest", "rms")]
-        doubts = list(found["doubts"])
-        if found["filled_cells"]:
-            doubts.append(f"{found['filled_cells']} empty cells filled")
-        words = f"[yellow]{escape('; '.join(doubts))}[/]" if doubts else "ok"
-        table.add_row(escape(name), *figures, f"{found['noise']:.2g}", words)
+    for name, found in account.channels.items():
+        figures = [f"{value:.4g}" for value in (found.least, found.greatest, found.rms)]
+        doubts = list(found.doubts)
+        if found.filled_cells:
+            doubts.append(f"{found.filled_cells} empty cells filled")
+        verdict = f"[yellow]{escape('; '.join(doubts))}[/]" if doubts else "ok"
+        table.add_row(escape(name), *figures, f"{found.noise:.2g}", verdict)
     console.print(table, highlight=False)
-    for warning in account["warnings"]:
+    for warning in account.warnings:
         console.print(f"[yellow]{escape(warning)}[/]", highlight=False)
-    left = account["unmapped"]
+    left = account.unmapped
     if left:
         more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
         console.print(f"not mapped: {escape(', '.join(left[:LISTED]))}{more}", highlight=False)
 
 
-def clock_in_words(clock: dict[str, Any]) -> str:
+def clock_in_words(clock: ClockAccount) -> str:
     """Return how the rows of the log became frames of the record."""
-    rows = f"{clock['rows_used']} of {clock['log_rows']} rows at {clock['log_rate_Hz']:.4g} Hz"
-    if clock["method"] == "pchip":
-        steps = f"{1e3 * clock['least_step_s']:.3g} to {1e3 * clock['greatest_step_s']:.3g} ms"
+    rows = f"{clock.rows_used} of {clock.log_rows} rows at {clock.log_rate_Hz:.4g} Hz"
+    if clock.method == "pchip":
+        steps = f"{1e3 * clock.least_step_s:.3g} to {1e3 * clock.greatest_step_s:.3g} ms"
         how = f"{steps} apart, interpolated (PCHIP)"
     else:
         how = "even, taken as they are"
-    frames = f"{clock['frames']} frames at {clock['frame_rate_Hz']:g} Hz"
+    frames = f"{clock.frames} frames at {clock.frame_rate_Hz:g} Hz"
     return f"clock: {rows}, {how};\n       {frames}"

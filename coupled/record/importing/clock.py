@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from coupled.errors import InputError
+from coupled.record.importing.account import ClockAccount
 from coupled.record.importing.mapping import Clock, LogMap, known_unit
 from coupled.record.importing.reading import Log
 
@@ -41,7 +41,7 @@ class Grid:
     even: bool
     frame_rate_Hz: float
     frames: int
-    report: dict[str, Any]
+    account: ClockAccount
 
     @property
     def frame_time_s(self) -> Floats:
@@ -72,7 +72,7 @@ def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | N
     rounding_s = _rounding(time_s)
     rate, median_s = (time_s.size - 1) / float(np.ptp(time_s)), float(np.median(np.diff(time_s)))
     wished = clock.frame_rate or frame_rate_Hz
-    even = _stands(time_s - start_s, wished, rounding_s) if wished else None
+    even = _frames_at(time_s - start_s, wished, rounding_s) if wished else None
     if wished is None:
         wished, even = _own_rate(log, time_s - start_s, (rate, 1.0 / median_s), rounding_s)
     if wished * median_s > MOST_UPSAMPLED:
@@ -87,21 +87,21 @@ def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | N
         raise InputError(log.file, "", f"would make a record of {max(frames, 0)} frames")
     steps_s = np.diff(time_s)
     bridged = np.maximum(np.rint(steps_s / median_s) - 1.0, 0.0)
-    report = {
-        "log_rows": len(stamps_s),
-        "rows_used": int(time_s.size),
-        "log_rate_Hz": 1.0 / median_s if bridged.any() else rate,
-        "least_step_s": float(steps_s.min()),
-        "greatest_step_s": float(steps_s.max()),
-        "stamp_rounding_s": rounding_s,
-        "start_s": start_s,
-        "frame_rate_Hz": wished,
-        "frames": frames,
-        "method": "rows as they are" if even is not None else "pchip",
-        "missing_rows": int(bridged.sum()),
-    }
+    account = ClockAccount(
+        log_rows=len(stamps_s),
+        rows_used=int(time_s.size),
+        log_rate_Hz=1.0 / median_s if bridged.any() else rate,
+        least_step_s=float(steps_s.min()),
+        greatest_step_s=float(steps_s.max()),
+        stamp_rounding_s=rounding_s,
+        start_s=start_s,
+        frame_rate_Hz=wished,
+        frames=frames,
+        method="rows as they are" if even is not None else "pchip",
+        missing_rows=int(bridged.sum()),
+    )
     frame = np.zeros(time_s.size, dtype=np.int64) if even is None else even
-    return Grid(kept, on_grid, frame, even is not None, wished, frames, report)
+    return Grid(kept, on_grid, frame, even is not None, wished, frames, account)
 
 
 def _stamps(log: Log, clock: Clock, map_file: Path) -> Floats:
@@ -169,7 +169,7 @@ def _rounding(time_s: Floats) -> float:
     return 0.0
 
 
-def _stands(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
+def _frames_at(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
     """Return the frame on which each row stands at a rate, or None where they stray from it."""
     frame = np.rint(time_s * rate)
     stray_s = float(np.ptp(time_s - frame / rate))
@@ -185,7 +185,7 @@ def _own_rate(
     for guess in guesses:
         for digits in (0, 1, 2, 3, 9):
             rate = round(guess, digits)
-            frame = _stands(time_s, rate, rounding_s) if rate > 0.0 else None
+            frame = _frames_at(time_s, rate, rounding_s) if rate > 0.0 else None
             # A row a frame, but for those missing: a multiple of the rate would stand as well.
             if frame is not None and np.median(np.diff(frame)) == 1.0:
                 return rate, frame

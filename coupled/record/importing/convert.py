@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.files import sha256
 from coupled.record.channels import TIME
+from coupled.record.importing.account import ChannelAccount, ImportAccount
 from coupled.record.importing.clock import Grid, lay_grid, on_frames
 from coupled.record.importing.judging import judge
 from coupled.record.importing.mapping import (
@@ -36,11 +35,11 @@ TURNING = ("roll_rad", "heading_rad")  # angles that jump by a turn
 
 def import_log(
     log_file: Path, map_file: Path, rig: Rig | None = None
-) -> tuple[Record, dict[str, Any]]:
+) -> tuple[Record, ImportAccount]:
     """Return the record of a log, and the account of how it came to be.
 
-    The account has `clock`, `channels` (figures and doubts by channel), `unmapped` (columns
-    that the map leaves out) and `warnings`; the record's manifest holds it too.
+    The record's manifest holds the account too. A `rig` gives the frame rate, and its travels
+    and force gradients are held against the channels. Raises InputError.
     """
     log_map = read_map(map_file)
     log = read_log(log_file, log_map.log)
@@ -66,20 +65,19 @@ def import_log(
         if logged[name].size < 2:
             raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
     judged = judge(record, logged, rig, log_file)
-    account = {
-        "clock": grid.report,
-        "channels": {
-            name: {
-                "from": log_map.channels[name].source,
-                **asdict(judged[name]),
-                "doubts": list(judged[name].doubts),
-                "filled_cells": filled[name],
-            }
-            for name in names
-        },
-        "unmapped": _unmapped(log, log_map),
-        "warnings": warnings,
+    channels = {
+        name: ChannelAccount(
+            source=log_map.channels[name].source,
+            least=found.least,
+            greatest=found.greatest,
+            rms=found.rms,
+            noise=found.noise,
+            doubts=found.doubts,
+            filled_cells=filled[name],
+        )
+        for name, found in judged.items()
     }
+    account = ImportAccount(grid.account, channels, _unmapped(log, log_map), tuple(warnings))
     manifest = {
         "imported_from": log_file.name,
         "inputs_sha256": {path.name: sha256(path) for path in (log_file, map_file)},
@@ -87,7 +85,7 @@ def import_log(
         "channels": [TIME, *names],
         "rows": grid.frames,
         "rig": rig.model_dump() if rig is not None else None,
-        "import": account,
+        "import": account.as_dict(),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("coupled", "numpy", "scipy", "polars")},
@@ -101,12 +99,12 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     """Return a channel at the log's rows, in the unit that it ends in."""
     key = f"channels.{name}"
     values = log.values(channel.source, map_file, f"{key}.from")
-    told = log.units.get(channel.source, "")
-    if not channel.unit and not told:
+    stated = log.units.get(channel.source, "")
+    if not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log's units_row gives none")
-    factor = factor_of(name, channel.unit or told, map_file)
-    if channel.unit and told and parse_unit(told) not in (None, parse_unit(channel.unit)):
-        warnings.append(f"{name}: the map says {channel.unit}, the log's own units row {told}")
+    factor = factor_of(name, channel.unit or stated, map_file)
+    if channel.unit and stated and parse_unit(stated) not in (None, parse_unit(channel.unit)):
+        warnings.append(f"{name}: the map says {channel.unit}, the log's own units row {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)
     huge = np.abs(si) > LARGEST
     if huge.any():
@@ -117,7 +115,7 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
 
 
 def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats) -> int:
-    """Return how many empty cells were led over; refuse those at an end, or too many in a row."""
+    """Return how many empty cells were interpolated; refuse those at an end, or too many."""
     channel = log_map.channels[name]
     most = log_map.clock.longest_gap if channel.longest_gap is None else channel.longest_gap
     empty = ~np.isfinite(values)
@@ -129,7 +127,7 @@ def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats
     end_s = (grid.frames - 1) / grid.frame_rate_Hz + channel.delay
     slack_s = 0.5 / grid.frame_rate_Hz
     if grid.time_s[valid[0]] > channel.delay + slack_s or grid.time_s[valid[-1]] < end_s - slack_s:
-        from_s, to_s = (grid.time_s[valid[i]] + grid.report["start_s"] for i in (0, -1))
+        from_s, to_s = (grid.time_s[valid[i]] + grid.account.start_s for i in (0, -1))
         where = f"has numbers only from {from_s:.3f} to {to_s:.3f} s"
         raise InputError(log.file, channel.source, f"{where}; cut by clock.start_s and end_s")
     holes = np.diff(valid) - 1
@@ -158,20 +156,19 @@ def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
 
 
 def _clock_warnings(grid: Grid) -> list[str]:
-    report = grid.report
     warnings = []
-    ratio = grid.frame_rate_Hz / report["log_rate_Hz"]
+    ratio = grid.frame_rate_Hz / grid.account.log_rate_Hz
     if ratio > 1.1:
         share = f"{ratio:.3g} frames a row of the log"
         warnings.append(f"{share}: nothing faster is in it, and its noise is no longer white")
     elif ratio < 0.9:
         half = f"{0.5 * grid.frame_rate_Hz:g} Hz"
         warnings.append(f"{1 / ratio:.3g} rows a frame: what the log has above {half} folds down")
-    if report["missing_rows"]:
-        warnings.append(f"{report['missing_rows']} missing rows were led over")
+    if grid.account.missing_rows:
+        warnings.append(f"{grid.account.missing_rows} missing rows were interpolated")
     return warnings
 
 
-def _unmapped(log: Log, log_map: LogMap) -> list[str]:
+def _unmapped(log: Log, log_map: LogMap) -> tuple[str, ...]:
     used = {channel.source for channel in log_map.channels.values()} | {log_map.clock.source}
-    return [name for name in log.columns if name not in used]
+    return tuple(name for name in log.columns if name not in used)

@@ -38,11 +38,11 @@ def judge(
     them, before any interpolation, which would blur a copy or a quantisation. Raises InputError
     for what cannot be on this rig at all.
     """
-    pairs = _between(record, rig, file)
+    pairs = _by_others(record, rig, file)
     found = {}
     for name, values in record.items():
         raw = logged[name]
-        doubts = [] if plausible.is_constant(raw) else _alone(name, raw)
+        doubts = [] if plausible.is_constant(raw) else _by_itself(name, raw)
         if plausible.is_constant(raw):
             doubts.append("constant")
         twin = plausible.copy_of(name, logged)
@@ -56,7 +56,7 @@ def judge(
     return found
 
 
-def _alone(name: str, values: Floats) -> list[str]:
+def _by_itself(name: str, values: Floats) -> list[str]:
     doubts = []
     clip = plausible.clipped_at(values)
     if clip is not None:
@@ -70,7 +70,7 @@ def _alone(name: str, values: Floats) -> list[str]:
     return doubts
 
 
-def _between(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dict[str, list[str]]:
+def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dict[str, list[str]]:
     """Return the doubts that take two channels, or a channel and the rig, to see."""
     doubts: dict[str, list[str]] = {}
     for control in CONTROL_NAMES:
@@ -85,12 +85,12 @@ def _between(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dic
                 _add(doubts, name, _travel(name, record[name], data, file))
         if moved:
             force = channel(control, "force")
-            if force in record and plausible.against(record[force], record[moved[0]]):
+            if force in record and plausible.move_oppositely(record[force], record[moved[0]]):
                 _add(doubts, force, "moves against the deflection: sign?")
             _add(doubts, force, _force(record, control, moved[0], data))
     pulled = next((n for n in ("column_computed_m", "column_deflection_m") if n in record), None)
     elevator = record.get("elevator_rad")
-    if pulled and elevator is not None and plausible.against(-elevator, record[pulled]):
+    if pulled and elevator is not None and plausible.move_oppositely(-elevator, record[pulled]):
         _add(doubts, "elevator_rad", "positive nose up: sign?")
     air = ("dynamic_pressure_Pa", "true_airspeed_m_per_s", "altitude_m")
     if all(name in record for name in air):

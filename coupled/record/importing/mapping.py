@@ -7,7 +7,10 @@ unit; what a sensor reads `delay_s` late is moved forward by that.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
+from pydantic_core import PydanticCustomError
 
 from coupled.errors import InputError, nearest
 from coupled.record.channels import CONTROL_NAMES, LATERAL, LONGITUDINAL, TIME, control_channels
@@ -50,12 +53,18 @@ class Clock(Section):
     longest_gap: int = quantity("rows", 2, ge=0, le=1000)
 
 
+def _no_bool(value: object) -> object:
+    if isinstance(value, bool):  # which Python takes for 1
+        raise PydanticCustomError("sign", "should be 1 or -1")
+    return value
+
+
 class Channel(Section):
     """One channel of the record, from one column of the log."""
 
     source: str = named("from", min_length=1)
     unit: str = ""
-    sign: Literal[1, -1] = 1
+    sign: Annotated[Literal[1, -1], BeforeValidator(_no_bool)] = 1
     scale: float = 1.0
     offset: float = 0.0
     delay: float = quantity("s", 0.0, ge=0, le=1)

@@ -45,11 +45,11 @@ def read_matlab(
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:
-    """Return the variables. What a damaged file raises ends the process apart, which tells."""
+    """Return the variables; what a damaged file raises ends this separate process."""
     listed = [name for name, _, _ in scipy_io.whosmat(io.BytesIO(content))]
     doubled = sorted({name for name in listed if listed.count(name) > 1})
     if doubled:
-        raise InputError(path, doubled[0], "stands there twice")
+        raise InputError(path, doubled[0], "duplicate variable")
     wanted = [name for name in listed if not name.startswith("__")]
     loaded = scipy_io.loadmat(
         io.BytesIO(content), variable_names=wanted, verify_compressed_data_integrity=True

@@ -102,14 +102,14 @@ def quantised_step(values: Floats) -> float | None:
 
 
 def spikes(values: Floats) -> list[int]:
-    """Return the rows that stand out alone between neighbours that agree."""
+    """Return the rows that stand out between neighbours that agree."""
     if values.size < 5:
         return []
-    away = values[1:-1] - 0.5 * (values[2:] + values[:-2])
-    apart = np.abs(values[2:] - values[:-2])
+    deviation = values[1:-1] - 0.5 * (values[2:] + values[:-2])
+    spacing = np.abs(values[2:] - values[:-2])
     least = max(12.0 * noise_level(values), 0.02 * float(np.ptp(values)))
-    alone = (np.abs(away) > least) & (3.0 * apart < np.abs(away))
-    return [int(row) + 1 for row in np.flatnonzero(alone)]
+    single = (np.abs(deviation) > least) & (3.0 * spacing < np.abs(deviation))
+    return [int(row) + 1 for row in np.flatnonzero(single)]
 
 
 def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float | None:
@@ -129,7 +129,7 @@ def from_newtons(ratio: float) -> bool:
     return abs(ratio / POUND_N - 1.0) < 0.25
 
 
-def against(first: Floats, second: Floats) -> bool:
+def move_oppositely(first: Floats, second: Floats) -> bool:
     """Tell whether two channels that ought to move together move against each other."""
     a, b = first - np.median(first), second - np.median(second)
     scale = float(np.sqrt((a @ a) * (b @ b)))

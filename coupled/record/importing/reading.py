@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
-from coupled.record.importing.apart import read_apart
 from coupled.record.importing.mapping import Layout
+from coupled.record.importing.separate import read_separately
 
 Floats = NDArray[np.float64]
 Lines = NDArray[np.int64]
@@ -46,7 +46,7 @@ class Log:
     def find(self, name: str, map_file: Path, key: str) -> pl.Series:
         """Return the column of a name that a map gives under `key`."""
         if name in self.doubled:
-            raise InputError(self.file, name, "stands there twice; which is meant?")
+            raise InputError(self.file, name, "duplicate column; which is meant?")
         if name not in self.columns:
             hint = nearest(name, self.columns)
             if len(self.columns) == 1:
@@ -92,7 +92,7 @@ def read_log(path: Path, layout: Layout) -> Log:
     content = read_bytes(path)
     if kind == "csv":
         return _read_csv(path, content, layout)
-    return Log(path, read_apart(path, content, kind, layout))
+    return Log(path, read_separately(path, content, kind, layout))
 
 
 def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:

@@ -90,5 +90,5 @@ def test_the_map_of_the_manual_reads_the_log_that_it_describes(tmp_path: Path) -
     np.testing.assert_allclose(record["column_computed_m"], 0.0254 * signal, atol=1e-9)
     np.testing.assert_allclose(record["column_deflection_m"], 0.0254 * signal, atol=1e-8)
     np.testing.assert_allclose(record["dynamic_pressure_Pa"], 20.9 * 47.88025898)
-    assert account["unmapped"] == ["NOTE"]
-    assert account["channels"]["dynamic_pressure_Pa"]["filled_cells"] > 1000
+    assert account.unmapped == ("NOTE",)
+    assert account.channels["dynamic_pressure_Pa"].filled_cells > 1000

@@ -1,7 +1,7 @@
 """Parquet and MATLAB files are read in a process of their own.
 
-Their readers are compiled code that a damaged file can crash, past any `except`: then the
-process apart dies, and the command says in one line that the file is damaged.
+Their readers are compiled code that a damaged file can crash, past any `except`: then only
+that process dies, and the command says in one line that the file is damaged.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 
@@ -24,13 +24,23 @@ REFUSED = 3  # exit code of a process that says itself what is wrong
 _KINDS = {"parquet": "Parquet", "mat": "MATLAB"}
 
 
-def read_apart(path: Path, content: bytes, kind: str, layout: Layout) -> dict[str, pl.Series]:
+@dataclass(frozen=True)
+class Task:
+    """What a separate process is to read: a `kind` of file, and of a MATLAB file which matrix."""
+
+    kind: str
+    file: str
+    matrix: str
+    names: list[str] | str
+
+
+def read_separately(path: Path, content: bytes, kind: str, layout: Layout) -> dict[str, pl.Series]:
     """Return the columns of a Parquet or MATLAB file."""
-    task = {"kind": kind, "file": str(path), "matrix": layout.matrix, "names": layout.names}
+    task = Task(kind, str(path), layout.matrix, layout.names)
     # The packages are found where this process finds them, and nowhere else.
     found = {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "coupled.record.importing.apart", json.dumps(task)],
+        [sys.executable, "-P", "-m", "coupled.record.importing.separate", json.dumps(asdict(task))],
         check=False,
         input=content,
         capture_output=True,
@@ -47,17 +57,17 @@ def read_apart(path: Path, content: bytes, kind: str, layout: Layout) -> dict[st
     return dict(zip(table["name"], table["values"], strict=True))
 
 
-def _read(task: dict[str, Any], content: bytes) -> pl.DataFrame:
-    if task["kind"] == "parquet":
+def _read(task: Task, content: bytes) -> pl.DataFrame:
+    if task.kind == "parquet":
         return pl.read_parquet(io.BytesIO(content))
-    vectors = read_matlab(Path(task["file"]), content, task["matrix"], task["names"])
+    vectors = read_matlab(Path(task.file), content, task.matrix, task.names)
     values = [pl.Series(vector) for vector in vectors.values()]  # each of its own length
     return pl.DataFrame({"name": list(vectors), "values": values})
 
 
 def _main() -> int:
     try:
-        table = _read(json.loads(sys.argv[1]), sys.stdin.buffer.read())
+        table = _read(Task(**json.loads(sys.argv[1])), sys.stdin.buffer.read())
     except InputError as error:
         sys.stdout.write(json.dumps({"key": error.key, "problem": error.problem}))
         return REFUSED

@@ -1,0 +1,61 @@
+"""How a record came of a log: its clock, each channel's figures and doubts, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class ClockAccount:
+    """How the rows of a log became frames; `method` tells whether they were interpolated."""
+
+    log_rows: int
+    rows_used: int
+    log_rate_Hz: float
+    least_step_s: float
+    greatest_step_s: float
+    stamp_rounding_s: float
+    start_s: float
+    frame_rate_Hz: float
+    frames: int
+    method: Literal["rows as they are", "pchip"]
+    missing_rows: int
+
+
+@dataclass(frozen=True)
+class ChannelAccount:
+    """A channel's source in the log, its figures in its own unit, and what speaks against it."""
+
+    source: str
+    least: float
+    greatest: float
+    rms: float
+    noise: float
+    doubts: tuple[str, ...]
+    filled_cells: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        table = asdict(self)
+        return {"from": table.pop("source"), **table, "doubts": list(self.doubts)}
+
+
+@dataclass(frozen=True)
+class ImportAccount:
+    """The account of an import; `unmapped` are the log's columns that the map leaves out."""
+
+    clock: ClockAccount
+    channels: Mapping[str, ChannelAccount]
+    unmapped: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON, as a record's manifest holds it."""
+        return {
+            "clock": asdict(self.clock),
+            "channels": {name: found.as_dict() for name, found in self.channels.items()},
+            "unmapped": list(self.unmapped),
+            "warnings": list(self.warnings),
+        }

@@ -1,0 +1,71 @@
+"""A record's file: its columns are numbers, its manifest has a format."""
+
+from __future__ import annotations
+
+import json
+import os
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from coupled.errors import InputError
+from coupled.record.record import FORMAT, Record, manifest_path, read_record, write_record
+
+TIME = [0.0, 0.1, 0.2]
+RECORD = Record(("time_s", "a"), np.column_stack([TIME, [1.0, np.pi, 3.0]]), {"seed": 3})
+
+
+@pytest.mark.parametrize("name", ["r.csv", "r.parquet"])
+def test_a_record_comes_back_to_the_last_bit_with_its_format(tmp_path: Path, name: str) -> None:
+    write_record(RECORD, tmp_path / name)
+    back = read_record(tmp_path / name)
+    assert back.channels == RECORD.channels
+    np.testing.assert_array_equal(back.data, RECORD.data)
+    assert back.manifest == {"seed": 3, "format": FORMAT}
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        pl.Series([[1.0], [2.0], [3.0]]),
+        pl.Series([np.ones(2)] * 3, dtype=pl.Array(pl.Float64, 2)),
+        pl.Series([b"1", b"2", b"3"]),
+        pl.Series(["1", "2", "1"], dtype=pl.Categorical),
+        pl.Series(["1", "2", "1"], dtype=pl.Enum(["1", "2"])),
+        pl.Series([{"x": 1.0}] * 3),
+        pl.Series([datetime(2026, 1, 1)] * 3),
+    ],
+    ids=lambda column: str(column.dtype).split("(")[0],
+)
+def test_a_column_that_holds_no_numbers_is_refused(tmp_path: Path, column: pl.Series) -> None:
+    path = tmp_path / "r.parquet"
+    pl.DataFrame({"time_s": TIME, "a": column}).write_parquet(path)
+    with pytest.raises(InputError, match=r"r\.parquet: a: holds .*, no numbers"):
+        read_record(path)
+
+
+def test_an_old_manifest_is_read_and_a_newer_one_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    write_record(RECORD, path)
+    manifest = manifest_path(path)
+    manifest.write_text('{"seed": 3}')
+    assert read_record(path).manifest == {"seed": 3}
+    manifest.write_text("[1")  # another program's file of that name
+    assert read_record(path).manifest == {}
+    manifest.write_text(json.dumps({"format": FORMAT + 1}))
+    with pytest.raises(InputError, match=r"r\.manifest\.json: format: this record is of format 2"):
+        read_record(path)
+    manifest.unlink()
+    os.mkfifo(manifest)
+    with pytest.raises(InputError, match="is a pipe or a device"):
+        read_record(path)
+
+
+def test_a_record_and_its_manifest_are_written_together(tmp_path: Path) -> None:
+    (tmp_path / "r.manifest.json").mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_record(RECORD, tmp_path / "r.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["r.manifest.json"]

@@ -1,0 +1,70 @@
+"""Malformed files of every kind, thrown at the commands that read them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.cli import main
+from tests.support.mutations import cases, mutated, write_inputs
+
+SEED = 11
+FEW, MANY = 3, 150  # changed files for each file of a command
+
+
+def ends_well(folder: Path, words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
+    """Run a command here; it must end by an exit code, and a refusal by one line."""
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(SystemExit) as ended:
+        main()
+    printed = capfd.readouterr()
+    assert ended.value.code in (0, 1, 2), words
+    assert "Traceback" not in printed.err
+    assert "\x1b" not in printed.out + printed.err
+    if ended.value.code == 2:
+        assert printed.err.startswith("error: "), printed.err
+        assert printed.err.count("\n") == 1, printed.err
+        assert len(printed.err) < 4000
+        if words[0] != "sweep":  # finished flights are kept
+            assert sorted(folder.rglob("*")) == before
+
+
+def throw(folder: Path, number: int, count: int, capfd: pytest.CaptureFixture[str]) -> None:
+    words, name = cases()[number]
+    write_inputs(folder)
+    good = (folder / name).read_bytes()
+    for i in range(count):
+        content = mutated(good, np.random.default_rng([SEED, number, i]))
+        (folder / name).write_bytes(content)
+        ends_well(folder, words, capfd)
+
+
+NUMBERS = range(len(cases()))
+NAMES = [f"{words[0]} {name}" for words, name in cases()]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_COLOR", "1")
+    return tmp_path
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=NAMES)
+def test_a_changed_file(
+    here: Path, number: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["coupled", *cases()[number][0]])
+    throw(here, number, FEW, capfd)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", NUMBERS, ids=NAMES)
+def test_many_changed_files(
+    here: Path, number: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["coupled", *cases()[number][0]])
+    throw(here, number, MANY, capfd)
