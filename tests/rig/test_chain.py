@@ -346,14 +346,14 @@ def test_scales_and_word_length_set_the_steps() -> None:
     assert p["gradient_range"] == pytest.approx(500.0 / 0.2)
 
 
-def command(changes: dict[str, Any], believed: np.ndarray, q: float = 1000.0) -> np.ndarray:
+def command(changes: dict[str, Any], estimated: np.ndarray, q: float = 1000.0) -> np.ndarray:
     rig = bench({f"controls.column.rigging.{k}": v for k, v in changes.items()})
-    return replay_surface(rig, "column", believed, np.full_like(believed, q))
+    return replay_surface(rig, "column", estimated, np.full_like(estimated, q))
 
 
 def test_surface_command_sign_travel_and_clip() -> None:
-    believed = np.array([0.0, 0.0889, -0.1778, 0.5])
-    assert command({}, believed) == pytest.approx([0.0, -0.5, 1.0, -1.0])
+    estimated = np.array([0.0, 0.0889, -0.1778, 0.5])
+    assert command({}, estimated) == pytest.approx([0.0, -0.5, 1.0, -1.0])
 
 
 def test_the_command_is_clipped_before_the_cable_yields() -> None:

@@ -87,7 +87,7 @@ def test_compensated_the_host_always_has_the_true_deflection(
     assert record["column_gradient_N_per_m"][-1] * held == pytest.approx(force, rel=1e-5)
 
 
-def test_the_host_may_believe_another_bend_than_the_real_one() -> None:
+def test_the_host_may_assume_another_bend_than_the_real_one() -> None:
     changes = {"controls.column.compensation.bend_m_per_N": 0.5 * K_REPORT}
     record = run({"kind": "step", "force_N": 60.0}, changes, seconds=8.0)
     half = 0.5 * K_REPORT * 60.0
