@@ -28,7 +28,7 @@ from coupled.rig.replay import (
     replay_surface,
 )
 from coupled.rig.rig import Rig
-from tests.reference.make_records import make, rigs
+from tests.support.make_records import make, rigs
 from tests.support.records import NOISE, OWN, available, reference
 
 Floats = NDArray[np.float64]

@@ -1,11 +1,11 @@
 """Make the reference records: clean rigs, by the twin, which shares no stage with the library.
 
-    python tests/reference/make_records.py
+    python -m tests.support.make_records
 
-The twin steps its loader 128 times a frame, 15 kHz, eight times as finely as the rigs here are
-flown, and solves every stage by other means. Each record has the noise of the contract's sensors,
-is rounded as a logger rounds, and lies beside the rig file that it was made with. They are kept
-in the repository so that a change of twin and stages together is noticed too.
+The twin steps its loader 128 times a frame, 15 kHz, some eight times as finely as these rigs are
+flown, and solves every stage by other means. Each record has the noise of the contract's sensors
+and a logger's digits, and lies in tests/reference with the rig file that it was made with. They
+are kept in the repository so that a change of twin and stages together is noticed too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "reference"
 DURATION_s = 30.0
 LOADER = "controls.column.loader"
 PLAIN = {f"{LOADER}.{key}": 0.0 for key in ("breakout_N", "friction_N", "bob_weight_N_per_g")}
@@ -77,7 +77,7 @@ def make(rig: Rig, level_N: float, seed: int) -> Record:
 
 
 def main() -> None:
-    """Write each record and its rig file beside this script."""
+    """Write each record and its rig file beside each other."""
     for seed, (name, (rig, level_N)) in enumerate(rigs().items()):
         text = rig_text(rig, f"The rig of {name}.parquet, made by make_records.py")
         (HERE / f"{name}.toml").write_text(text, encoding="utf-8")
