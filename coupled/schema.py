@@ -247,8 +247,10 @@ def _section_of(annotation: Any) -> type[Section] | None:
 
 
 def _refuse_unreal(value: Any, file: object, key: str) -> None:
-    values = value.values() if isinstance(value, dict) else value
-    for number in values if isinstance(value, (list, dict)) else [value]:
+    if isinstance(value, dict):
+        for name, one in value.items():
+            _refuse_unreal(one, file, f"{key}.{name}")
+    for number in value if isinstance(value, list) else [value]:
         if not isinstance(number, (int, float)):
             continue
         if LARGEST < abs(number) < float("inf"):

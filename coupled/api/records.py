@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from coupled.record import record as files
 from coupled.record.importing import convert
+from coupled.record.importing.account import ImportAccount
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -48,7 +48,7 @@ def write_record(record: Record, path: str | PathLike[str]) -> None:
 
 def import_log(
     log: str | PathLike[str], log_map: str | PathLike[str], rig: Rig | None = None
-) -> tuple[Record, dict[str, Any]]:
+) -> tuple[Record, ImportAccount]:
     r'''Return the record of a log of your own, and the account of how it was made.
 
     `log_map` is a TOML file that names the log's columns and their units; `rig` gives the frame

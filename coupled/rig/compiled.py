@@ -2,7 +2,7 @@
 
 Two decorators: `stage` for a function that other kernels call, `entry` for one
 that Python calls and whose machine code is kept on disk. numba looks only at an
-entry's own file to tell whether its cache is stale, which would fly old physics
+entry's own file to see whether its cache is stale, which would fly old physics
 after an edit of a stage; so the cache lies in a folder named by a hash of all
 sources in `coupled/rig`, and of those beside the entry.
 """

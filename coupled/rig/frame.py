@@ -130,7 +130,7 @@ def step_frame(
     script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
     record    shape (frames, channels): t, 9 a control, the motion; comes holding the noise
               that is added to what is read
-    motion    what the airframe tells at t_k, q̄ in Pa first
+    motion    of the airframe at t_k, q̄ in Pa first
     The commands are in ±1, one a control, 0 for a control that is absent.
     """
     first_command = second_command = third_command = 0.0

@@ -1,7 +1,7 @@
 """How fast a control let go from a small deflection grows or dies, by the stages that fly.
 
-Every frame is that of `frame`. The state is brought back to its size before it leaves the
-range of doubles, which a linear rig does not notice, and what it had grown is kept.
+Every frame is that of `frame`. Before the state leaves the range of doubles it is scaled down,
+which changes nothing in a linear rig, and the scale is added to the growth.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
 
     The slope of the logarithm of the state's size over the latter half of the time, which must
     be long beside the motion's period. Infinite where a frame is more than doubles can hold.
-    The rig is to be linear: without friction, breakout, play and limits.
+    The rig must be linear: without friction, breakout, play and limits.
     """
     frames = max(_LEAST_FRAMES, math.ceil(seconds * rig.frame_rate))
     (name, control), *others = rig.controls.items()
@@ -37,13 +37,8 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
     stiffness = control.loader.basic_gradient + max(control.schedule.total_gradient)
     packed = pack(rig, {name: hand})
     logs = np.empty(frames)
-    _grow(
-        packed,
-        packed.view(np.float64),
-        _growing(),
-        math.sqrt(stiffness / control.loader.mass),
-        logs,
-    )
+    rate = math.sqrt(stiffness / control.loader.mass)
+    _grow(packed, packed.view(np.float64), _growing(), rate, logs)
     late = logs[frames // 2 :]
     if not np.all(np.isfinite(late)):
         return math.inf

@@ -3,22 +3,20 @@
     F = F_script(t) + u_lag + k_h·(δ_set − δ) + c_h·(δ_set' − δ') + k_I·∫(δ_set − δ) dt
 
 With every gain zero the hand is the scripted force. With gains it holds the grip
-where δ_set says, and the force is what that takes (a clamp). u is what a pilot
-who looks at the aircraft asks for, once a frame; it reaches the grip through the
-muscle's lag.
+at δ_set with whatever force that takes (a clamp). u is the command of a pilot in the
+loop, held over a frame; it reaches the grip through the muscle's lag.
 
 The force bends the structure, so δ on the right depends on F on the left. The
 bend's local slope K is taken implicitly, which keeps a stiff hand stable at any
 K; the motion of the loader enters as it stood at the node (an exchange once a
 substep, first order in it).
 
-A hand is no stronger than it is: beyond its strength it gives way, and no impedance acts.
-Its full strength lasts for an endurance, after which it has its lasting strength only,
-until it has rested:
+Beyond its strength a hand gives way, and no impedance acts. Its full strength lasts for an
+endurance; after that it has its lasting strength only, until it has rested:
 
     effort' = (|F| − F_lasting)/(F_strongest − F_lasting), within 0 and the endurance
 
-Nor does it go further than its reach r, on either side: where the limb is straight, or the
+A hand goes no further than its reach r, on either side: there the limb is straight, or the
 control at its stop in the cab. Its force is then at most
 
     F = c·w·(r − δ) − m·w·δ' + I,      I' = G·w·(r − δ)

@@ -270,8 +270,8 @@ def _move(
             s.computed, s.rate = s.stop * p.travel, 0.0
         else:  # the preload stops a control too slow to leave neutral within the substep
             s.computed = 0.0
-            spare = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
-            if p.mass * abs(s.rate) <= (h - done) * spare:
+            surplus = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
+            if p.mass * abs(s.rate) <= (h - done) * surplus:
                 s.rate = 0.0
     s.rate = 0.0
 

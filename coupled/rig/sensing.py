@@ -19,8 +19,8 @@ from coupled.rig.parameters import Sensing
 class SensingParameters(Protocol):
     """Scales and converter steps, already divided into the quantity's own unit."""
 
-    deflection_scale: float  # S₁ real over believed
-    force_scale: float  # S₃ real over believed
+    deflection_scale: float  # S₁ real over assumed
+    force_scale: float  # S₃ real over assumed
     computed_step: float  # converter step of δc, d; 0 for none
     computed_range: float  # converter range of δc, d
     force_step: float  # of F, N

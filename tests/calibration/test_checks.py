@@ -22,7 +22,8 @@ from coupled.calibration.specification import SweepLeg, specified_legs, specifie
 from coupled.calibration.sweeps import Release, feel_pressures, release, sweep
 from coupled.campaign.tolerances import STATIC, SURFACE_rad, force_band
 from coupled.flight.manoeuvre import configure
-from coupled.gap.effects import BY_NAME, apply
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME
 from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.rig import Rig
 from tests.support.rigs import G_STIFF, K_REPORT, bench

@@ -18,7 +18,7 @@ from coupled.campaign.standards import UnjudgedError, judge_standard
 from coupled.campaign.tolerances import sustained_force
 from coupled.campaign.verdict import judge_expectation
 from coupled.errors import InputError
-from coupled.flight.expectation import Expect, Figure
+from coupled.flight.expectation import Expect, Figure, Standard
 from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 from coupled.resources import shipped_runs
@@ -118,7 +118,11 @@ LBF = 4.4482216
 
 # 14 CFR 25.143(d) as printed, lbf: two hands, one hand, long-term.
 PRINTED = {"column": (75, 50, 10), "wheel": (50, 25, 5), "pedals": (150, 150, 20)}
-DURATIONS = ("25.143(d) two hands", "25.143(d) one hand", "25.143(d) long-term")
+DURATIONS: tuple[Standard, ...] = (
+    "25.143(d) two hands",
+    "25.143(d) one hand",
+    "25.143(d) long-term",
+)
 
 
 def held(lbf: float, seconds: float, control: str = "column", least_s: float = 30.0) -> Flight:

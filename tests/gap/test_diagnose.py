@@ -17,11 +17,11 @@ from coupled.gap.effect import apply
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import white
 from coupled.gap.smooth import smoothed
-from coupled.record.record import Record, read_record, write_record
+from coupled.record.record import Record, write_record
 from coupled.rig.rigfile import read_rig
 from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
-from tests.support.records import FOUNDERS, OWN, RECORDS, available
+from tests.support.records import OWN, available, reference
 
 SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "coulomb_friction", {"friction_N": 2.0}),
@@ -141,8 +141,7 @@ def test_clean_records_have_no_gap(name: str, tmp_path: Path) -> None:
         rig = nominal_rig(True)
         record = made(tmp_path, rig, {}, 14)
     else:
-        rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
-        record = read_record(FOUNDERS / "examples" / f"{name}.csv")
+        rig, record = reference(name)
     found = diagnose(rig, {"r.csv": record}, "column")
     assert found.verdict == "no_gap", found.stages
 

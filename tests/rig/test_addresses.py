@@ -1,4 +1,4 @@
-"""The frame step that is told where its arrays lie does what the frame step does."""
+"""The frame step by its arrays' addresses does what the frame step does."""
 
 from __future__ import annotations
 

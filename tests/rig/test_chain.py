@@ -272,6 +272,21 @@ def test_servo_rate_limit_is_the_slope() -> None:
     assert x[-1] == pytest.approx(0.08, rel=1e-6)
 
 
+def test_a_servo_off_its_rate_limit_arrives_with_the_limits_speed() -> None:
+    """It leaves the limit where ω²·(u − x) = 2ζω·v, and swings out freely from there."""
+    w, z, v, u = 2 * math.pi * 18.0, 0.7, 0.5, 0.15
+    t = np.arange(4000) / 2000.0
+    x = servo({"servo_rate_limit_m_per_s": v}, np.where(t < 0.01, 0.0, u))
+    off = -2 * z * v / w
+    start = float(np.interp(u + off, x[: np.argmax(x)], t[: np.argmax(x)]))
+    since, wd = t[t > start] - start, w * math.sqrt(1 - z * z)
+    swing = np.exp(-z * w * since) * (
+        off * np.cos(wd * since) + (v + z * w * off) / wd * np.sin(wd * since)
+    )
+    assert np.max(swing) > 1e-4
+    assert x[t > start] == pytest.approx(u + swing, abs=5e-6)
+
+
 def test_backlash_lets_the_grip_lag_by_half_the_play_each_way() -> None:
     t = np.arange(40000) / 2000.0
     x = 0.04 * np.sin(2 * np.pi * t / 10.0)
@@ -331,14 +346,47 @@ def test_scales_and_word_length_set_the_steps() -> None:
     assert p["gradient_range"] == pytest.approx(500.0 / 0.2)
 
 
-def command(changes: dict[str, Any], believed: np.ndarray, q: float = 1000.0) -> np.ndarray:
+def command(changes: dict[str, Any], estimated: np.ndarray, q: float = 1000.0) -> np.ndarray:
     rig = bench({f"controls.column.rigging.{k}": v for k, v in changes.items()})
-    return replay_surface(rig, "column", believed, np.full_like(believed, q))
+    return replay_surface(rig, "column", estimated, np.full_like(estimated, q))
 
 
 def test_surface_command_sign_travel_and_clip() -> None:
-    believed = np.array([0.0, 0.0889, -0.1778, 0.5])
-    assert command({}, believed) == pytest.approx([0.0, -0.5, 1.0, -1.0])
+    estimated = np.array([0.0, 0.0889, -0.1778, 0.5])
+    assert command({}, estimated) == pytest.approx([0.0, -0.5, 1.0, -1.0])
+
+
+def test_the_command_is_clipped_before_the_cable_yields() -> None:
+    """A host asks for no more than full travel, of which the air load takes its share."""
+    twice = np.full(3, 2 * 0.1778)
+    assert command({"stretch_loss_per_Pa": 2e-4}, twice) == pytest.approx(-1.0 / 1.2)
+
+
+def test_the_yield_is_lagged_with_the_command() -> None:
+    """Stretch before lag: where q̄ steps, the surface goes over with the lag's time."""
+    rig = bench(
+        {
+            "controls.column.rigging.stretch_loss_per_Pa": 2e-4,
+            "controls.column.rigging.lag_s": 0.1,
+        }
+    )
+    frames = np.arange(200)
+    q = np.where(frames < 120, 0.0, 2500.0)
+    moved = -replay_surface(rig, "column", np.full(200, 0.0889), q)
+    assert moved[119] == pytest.approx(0.5, rel=1e-4)
+    after = 1.0 - np.exp(-(frames[120:] - 119) * 0.01 / 0.1)
+    assert moved[120:] == pytest.approx(0.5 - (0.5 - 0.5 / 1.5) * after, rel=1e-4)
+
+
+def test_the_rate_limit_follows_the_lag_and_the_play_follows_both() -> None:
+    """A step: min(r·t, 1 − exp(−t/τ)), and half the play behind; the offset is put on last."""
+    t = 0.01 * np.arange(1, 201)
+    settings = {"lag_s": 0.2, "rate_limit_norm_per_s": 1.0}
+    moved = np.minimum(1.0 * t, 1.0 - np.exp(-t / 0.2))
+    step = np.full(200, -0.1778)
+    assert command(settings, step) == pytest.approx(moved, rel=1e-9)
+    loose = command({**settings, "play_norm": 0.1, "offset_norm": 0.03}, step)
+    assert loose == pytest.approx(np.maximum(moved - 0.05, 0.0) + 0.03, rel=1e-9)
 
 
 def test_cable_stretch_lag_rate_play_and_offset() -> None:

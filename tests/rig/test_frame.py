@@ -13,6 +13,8 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
 from coupled.record.record import Record
+from coupled.rig.growth import growth
+from coupled.rig.packing import Hand
 from coupled.schema import build
 from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
@@ -85,7 +87,7 @@ def test_compensated_the_host_always_has_the_true_deflection(
     assert record["column_gradient_N_per_m"][-1] * held == pytest.approx(force, rel=1e-5)
 
 
-def test_the_host_may_believe_another_bend_than_the_real_one() -> None:
+def test_the_host_may_assume_another_bend_than_the_real_one() -> None:
     changes = {"controls.column.compensation.bend_m_per_N": 0.5 * K_REPORT}
     record = run({"kind": "step", "force_N": 60.0}, changes, seconds=8.0)
     half = 0.5 * K_REPORT * 60.0
@@ -114,6 +116,60 @@ def test_a_wrong_scale_is_read_and_used_by_the_host() -> None:
     }
     record = run({"kind": "step", "force_N": 50.0}, changes, seconds=8.0)
     assert record["column_estimate_m"][-1] / record["column_deflection_m"][-1] == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("multiplier", ["hybrid", "digital"])
+def test_the_breakouts_term_is_given_once(multiplier: str) -> None:
+    """F = F_BO + G·δ at rest, whoever makes the product: the digital one holds F_extra itself."""
+    changes = {"multiplier": multiplier, "breakout_N": 9.0}
+    record = run({"kind": "step", "force_N": 60.0}, changes, seconds=8.0)
+    assert record["column_deflection_m"][-1] == pytest.approx((60.0 - 9.0) / G_STIFF, rel=1e-6)
+
+
+@pytest.mark.parametrize("multiplier", ["hybrid", "digital"])
+def test_the_products_way_is_through_a_converter(multiplier: str) -> None:
+    """A digital host sends F_mod in steps of 2·100 V/2⁸/S₂, a hybrid one ΔG in 2·S₁/S₂/2⁸."""
+    sensing = "controls.column.sensing"
+    scales = {"s1_V_per_m": 500.0, "s2_V_per_N": 0.2, "s3_V_per_N": 0.25}
+    changes = {
+        "multiplier": multiplier,
+        **{f"{sensing}.{name}": value for name, value in scales.items()},
+        f"{sensing}.word_length_bits": 8,
+    }
+    record = run({"kind": "ramp", "force_N": 80.0, "ramp_s": 4.0}, changes)
+    product, computed = record["column_modifying_force_N"], record["column_computed_m"]
+    if multiplier == "digital":
+        sent, step = product, 200.0 / 256 / 0.2
+        assert len(np.unique(sent)) > 10
+    else:  # the multiplier's δc is the true one, which rests where the balance has it
+        true = (80.0 - product[-1]) / 560.0
+        sent, step = product[-1:] / true, 2 * 500.0 / 0.2 / 256
+        asked = G_STIFF / (1 - K_REPORT * G_STIFF) - 560.0
+        assert sent[0] == pytest.approx(asked, abs=0.5 * step)
+        assert computed[-1] == pytest.approx(true, abs=200.0 / 256 / 500.0)
+    assert sent / step == pytest.approx(np.round(sent / step), abs=1e-2)
+
+
+def test_noise_on_the_pressure_read_does_not_reach_the_surface() -> None:
+    """The cable yields to the air load itself; the schedule gets what is read."""
+    changes = {
+        "controls.column.rigging.stretch_loss_per_Pa": 1e-4,
+        "noise.dynamic_pressure_Pa": 100.0,
+    }
+    record = run({"kind": "step", "force_N": 50.0}, changes, q=2000.0, seconds=2.0)
+    assert np.std(record["dynamic_pressure_Pa"]) > 50.0
+    assert np.std(record["column_gradient_N_per_m"]) > 20.0
+    asked = -record["column_estimate_m"] / 0.1778 / 1.2
+    assert record["column_surface_norm"] == pytest.approx(asked, rel=1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.0, 30.0, 60.0])
+def test_an_arm_damps_the_control_it_holds(damping: float) -> None:
+    """m·x'' + (c + c_h)·x' + G·x = 0 on a rigid rig dies by (c + c_h)/2m."""
+    rig = configure(bench({"servo_frequency_Hz": 800.0}), "rigid")
+    flat = {"controls.column.schedule.total_gradient_N_per_m": [G_STIFF, G_STIFF]}
+    found = growth(rig.changed({**flat, "loader_rate_Hz": 20_000.0}), Hand(damping=damping), 1.0)
+    assert found == pytest.approx(-(75.0 + damping) / (2 * 4.0), rel=0.02)
 
 
 def test_a_coarse_converter_shows_in_the_estimate() -> None:

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coupled.rig.friction import running_friction
+from coupled.rig.packing import pack
 from coupled.rig.replay import drive_loader
 from tests.support.rigs import amounts, bench, push
 
@@ -90,6 +92,15 @@ def test_it_breaks_away_at_the_breakaway_and_runs_at_the_running_friction() -> N
     flown = push(rig, 60.0, 10.0)
     plain = push(bench({**PLAIN, "friction_N": 6.0}), 60.0, 10.0)
     assert np.max(flown) == pytest.approx(np.max(plain), rel=5e-3)
+
+
+def test_breakaway_fades_with_the_square_of_the_speed() -> None:
+    """F_c + (F_s − F_c)·exp(−(v/v_s)²), here 6 + 8·exp(−(v/v_s)²)."""
+    rig = bench({**PLAIN, "friction_N": 6.0, "breakaway_N": 14.0, "stribeck_rate_m_per_s": 0.004})
+    p = pack(rig)[0]["parameters"]["friction"]
+    for share in (0.0, 0.5, 1.0, 2.0, -2.0):
+        expected = 6.0 + 8.0 * math.exp(-(share**2))
+        assert running_friction(p, share * 0.004) == pytest.approx(expected, rel=1e-12)
 
 
 def test_breakout_holds_at_neutral_and_then_adds_to_the_gradient() -> None:

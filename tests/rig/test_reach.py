@@ -56,11 +56,11 @@ def test_at_the_reach_the_surface_gets_the_closed_form(
 
 @pytest.mark.parametrize("hand", ["step", "clamp"])
 def test_a_hand_that_does_not_come_to_its_reach_is_no_other(hand: str) -> None:
-    told = {"step": {"force_N": 100.0, "rise_s": 0.5}, "clamp": {"deflection_m": 0.05}}[hand]
-    free = pushed(bench(), {"kind": hand, **told})
-    near = pushed(bench(), {"kind": hand, **told, "reach_m": REACH})
+    settings = {"step": {"force_N": 100.0, "rise_s": 0.5}, "clamp": {"deflection_m": 0.05}}[hand]
+    free = pushed(bench(), {"kind": hand, **settings})
+    near = pushed(bench(), {"kind": hand, **settings, "reach_m": REACH})
     assert np.array_equal(free.data, near.data)
-    stopped = pushed(bench(), {"kind": hand, **told, "reach_m": 0.03})
+    stopped = pushed(bench(), {"kind": hand, **settings, "reach_m": 0.03})
     assert stopped["column_deflection_m"][-1] == pytest.approx(0.03, rel=1e-6)
 
 

@@ -1,11 +1,16 @@
-"""Records made by another program from the report's description, and the noise of their sensors.
+"""Records made by another program than the library, and the noise of their sensors.
 
-They lie beside the project, where it was founded; elsewhere the tests use records flown here.
+Those of the twin come with the project (tests.support.make_records.py). Three more, made by a
+separate program from the rig's description, lie beside the project where it was founded.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+
+from coupled.record.record import Record, read_record
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
 
 FOUNDERS = Path(__file__).parents[3] / "shared" / "rig"
 OWN = "flown here"
@@ -30,6 +35,18 @@ NOISE = {
 }
 
 
+TWINS = Path(__file__).parents[1] / "reference"
+BY_TWIN = ("twin-bench", "twin-c172p")
+
+
 def available() -> list[str]:
     """Return the names of the records that this machine has."""
-    return [OWN, *(RECORDS if FOUNDERS.is_dir() else [])]
+    return [OWN, *BY_TWIN, *(RECORDS if FOUNDERS.is_dir() else [])]
+
+
+def reference(name: str) -> tuple[Rig, Record]:
+    """Return a record made by another program, and the rig that it is of."""
+    if name in BY_TWIN:
+        return read_rig(TWINS / f"{name}.toml"), read_record(TWINS / f"{name}.parquet")
+    rig = read_rig(FOUNDERS / "rigs" / f"{RECORDS[name]}.toml")
+    return rig, read_record(FOUNDERS / "examples" / f"{name}.csv")
