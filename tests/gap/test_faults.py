@@ -20,8 +20,8 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.result import FORMAT, StageResult
 from coupled.record.record import Record, write_record
 from coupled.rig.rigwrite import rig_text
+from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
-from tests.test_cli import ROOT, coupled
 
 Floats = NDArray[np.float64]
 RIG = nominal_rig(False)
