@@ -107,7 +107,7 @@ def _diagnose(
     read: dict[str, Record] = {}
     for file in files:
         if str(file) in read:
-            raise InputError(file, "", "is given twice: give each record once")
+            raise InputError(file, "", "is a duplicate: give each record once")
         read[str(file)] = read_record(file)
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance)

@@ -1,9 +1,9 @@
-"""How the air moves, told by kinematics alone, without any aerodynamics.
+"""How the air moves, by kinematics alone, without any aerodynamics.
 
     w = ḣ − V·sin(θ − α),
 
 with ḣ from the load factor, held to the altitude. The model is then flown through that air: a
-gust is believed where the *pitch rate* follows it, which had no part in finding it.
+gust is accepted where the *pitch rate* follows it, which had no part in finding it.
 
 The noise in w is white, that of turbulence falls as 1/ω²: the smoother is Whittaker's with first
 differences, which is Wiener's for such a signal, H = S_w/(S_w + S_n). What is wrong with its
@@ -54,13 +54,13 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
     rng = np.random.default_rng(seed)
     climb, climb_error = _climb(record, frame_s, rng)
     rough = climb - smoothed(speed) * np.sin(pitch - alpha)
-    hiss = white(rough)
+    level = white(rough)
     smoother = Smoother.of(rough, (1,))
-    calm = smoother.smooth(rough)
-    error = smoother.wiener_error(hiss, len(rough), rng) + climb_error
+    smooth = smoother.smooth(rough)
+    error = smoother.wiener_error(level, len(rough), rng) + climb_error
     # The smoother takes some of a faint gust with the noise, which its own rms would miss.
-    true = max(float(np.var(rough)) - hiss**2, float(np.var(calm)))
-    return Air(calm, math.sqrt(true), error)
+    true = max(float(np.var(rough)) - level**2, float(np.var(smooth)))
+    return Air(smooth, math.sqrt(true), error)
 
 
 def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -70,15 +70,15 @@ def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Fl
         climb = rate_of(smoothed(height), 1.0 / frame_s)
         noisy = climb + rng.normal(0.0, white(height), len(height))
         return climb, smoothed(noisy) - climb
-    normal, calm = record[LOAD] * GRAVITY_m_per_s2, smoothed(alpha)
+    normal, attack = record[LOAD] * GRAVITY_m_per_s2, smoothed(alpha)
     # What the aircraft feels along its path is of its thrust and drag, and of a part of its lift.
     path = rate_of(smoothed(speed), 1.0 / frame_s)
     path += GRAVITY_m_per_s2 * np.sin(smoothed(pitch - alpha))
-    ahead = (path + normal * np.sin(calm)) / np.cos(calm)
+    ahead = (path + normal * np.sin(attack)) / np.cos(attack)
     upward = normal * np.cos(pitch) + ahead * np.sin(pitch) - GRAVITY_m_per_s2
     sigma = GRAVITY_m_per_s2 * white(record[LOAD]), white(height)
-    hiss = rng.normal(0.0, sigma[0], len(height)), rng.normal(0.0, sigma[1], len(height))
-    return _held(upward, height, frame_s, sigma), _held(*hiss, frame_s, sigma)
+    noise = rng.normal(0.0, sigma[0], len(height)), rng.normal(0.0, sigma[1], len(height))
+    return _held(upward, height, frame_s, sigma), _held(*noise, frame_s, sigma)
 
 
 def _held(upward: Floats, height: Floats, frame_s: float, sigma: tuple[float, float]) -> Floats:
@@ -110,7 +110,7 @@ def _whittaker(signal: Floats, weight: float) -> Floats:
 def spread_of_air(record: Record, frame_s: float) -> float:
     """Return the relative standard error of the gusts' rms, from how few of them a record meets.
 
-    The variance of a Gaussian process is told by N/(Σρ²) independent samples (Bartlett).
+    The variance of a Gaussian process has N/(Σρ²) independent samples (Bartlett).
     """
     air = vertical_air(record, frame_s)
     if air is None:

@@ -3,7 +3,7 @@
 The surfaces' positions are taken back to commands (`surfaces`), and the model flown by those, open
 loop. The rates, angle of attack, sideslip and load factor are compared: they hold up, since
 what they owe to the surfaces fades within seconds; attitude, speed and height integrate every small
-error and are left to the kinematics. How the air moved over them, `air` tells.
+error and are left to the kinematics. How the air moved is found by `air`.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Model:
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = moves + self.air.error if with_error else moves
-            air = (*moves[1:].tolist(), 0.0)  # row k + 1 tells of the air over the frame before
+            air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
         frame_s, controls = 1.0 / self.rig.frame_rate, list(self.rig.controls)
         gusts = Gusts(still, frame_s, air_m_per_s=air)
         airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)

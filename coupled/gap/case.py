@@ -31,7 +31,7 @@ class Case:
 
     @property
     def settings(self) -> tuple[Effect, ...]:
-        """The nominal rig's settings that the outputs tell of: nuisances of every fit."""
+        """The nominal rig's settings that the outputs depend on: nuisances of every fit."""
         stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
         return tuple(s for s in SETTINGS.values() if s.stage in stages)
 

@@ -45,7 +45,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Found:
-    """One effect found: its gain, and the others that the record cannot tell from it."""
+    """One effect found: its gain, and the others that the record does not distinguish from it."""
 
     effect: Effect
     gain: float

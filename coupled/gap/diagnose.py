@@ -1,7 +1,7 @@
 """A diagnosis: where the gap lies, which effects cause it, how far it shrinks.
 
 The verdict is `no_gap` where every stage stays within its floor, `effect` where the effects
-found close the gap, `ambiguous` where the record cannot tell the first of them from another, and
+found close the gap, `ambiguous` where the record does not distinguish them from others, and
 `unexplained` where structure is left, or none of the library's effects earns its place.
 """
 
@@ -172,7 +172,7 @@ class _Judge:
         if "sensing" in self.blamed:
             widest = max(before[name] for name in neighbours)
             return StageResult("sensing", widest, guilty=True, shown_in=neighbours)
-        why = f"shows in {' and '.join(neighbours or shown)}"
+        why = f"see {', '.join(neighbours or shown)}"
         return StageResult("sensing", why=why, shown_in=tuple(shown))
 
     def _without_output(self, name: str) -> StageResult | None:

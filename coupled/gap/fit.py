@@ -165,7 +165,7 @@ class _Slopes:
     """Derivatives by differences, over steps that change the residual by about a third of a floor.
 
     Friction, breakout and play move the residual in small jumps: a difference over less than
-    those tells nothing of where the fit should go, nor of how well it knows.
+    those says nothing of where the fit should go, nor of how well it knows.
     """
 
     def __init__(self, residual: Callable[[Floats], Floats], low: Floats, high: Floats) -> None:

@@ -1,7 +1,7 @@
 """What a model that is free in form could still take of a stage's residual.
 
 The effects of the library are physics, each with a number or two. Where they leave structure, ridge
-regressions tell whether the stage's own signals could explain it: a function of one of them, with
+regressions say whether the stage's own signals could explain it: a function of one of them, with
 bends at its quantiles, lagged copies, and as the stage answers to it; or of all, with products of
 two. Each is fitted on every other stretch and held against those between, so noise is not taken.
 """

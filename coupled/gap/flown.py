@@ -17,7 +17,7 @@ from coupled.flight.pilot.base import Start
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
-from coupled.gap.thresholds import TOLD_EVERY
+from coupled.gap.thresholds import PROFILE_EVERY
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -71,7 +71,7 @@ def fly_force(
 ) -> Record:
     """Return the record of a rig under forces given at each frame, shape (frames,) each.
 
-    `pressure_Pa` is what a bench is told, at each frame; `air_m_per_s` how fast the air rises.
+    `pressure_Pa` is the q̄ of a bench, at each frame; `air_m_per_s` how fast the air rises.
     """
     frames = len(next(iter(forces_N.values())))
     times = np.arange(frames) / rig.frame_rate
@@ -82,7 +82,7 @@ def fly_force(
     bench = None
     if rig.flight is None:
         assert pressure_Pa is not None
-        points = slice(None, None, TOLD_EVERY)
+        points = slice(None, None, PROFILE_EVERY)
         bench = PressureProfile(time_s=times[points], dynamic_pressure_Pa=pressure_Pa[points])
     again = Manoeuvre(
         rig, pilots, frames / rig.frame_rate, seed=seed, bench=bench, name="flown-again"

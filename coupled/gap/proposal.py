@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProposedTest:
-    """A test that would tell two rivals apart, and by what log-likelihood."""
+    """A test that would separate two rivals, and by what log-likelihood."""
 
     text: str
     rivals: tuple[str, str]

@@ -131,7 +131,7 @@ class Findings:
     """What records say of a rig: where it departs from them, by which effects, and how far.
 
     `stages` are in the order of the chain, `effects` the largest first; `rivals` are groups of
-    effects that the records cannot tell apart.
+    effects that the records do not distinguish.
     """
 
     control: str

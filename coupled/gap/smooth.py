@@ -63,8 +63,8 @@ class Smoother:
 
         For a signal of which this smoother is the Wiener filter; `level` is the rms of the noise.
         """
-        hiss = rng.normal(0.0, level, frames + 2 * self.reach)
-        out = np.fft.irfft(np.fft.rfft(hiss) * np.sqrt(self.gain), len(hiss))
+        noise = rng.normal(0.0, level, frames + 2 * self.reach)
+        out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(self.gain), len(noise))
         return np.asarray(out[self.reach : self.reach + frames])
 
 

@@ -87,7 +87,7 @@ class Reader:
         return channel(self.control, quantity)
 
     def _gradient_from(self) -> list[str]:
-        """Return the channel that tells G_T: its own, or q̄ where the record lacks it."""
+        """Return the channel that G_T is taken from: its own, or q̄ where the record lacks it."""
         own, pressure = self._name("gradient"), "dynamic_pressure_Pa"
         return [pressure if own not in self.record and pressure in self.record else own]
 

@@ -124,8 +124,9 @@ def _signal(name: str) -> str:
 
 def _sure(found: Findings) -> str:
     if found.rivals:
-        groups = "; ".join(" or ".join(plain(name) for name in group) for group in found.rivals)
-        return f"The record cannot tell {groups}."
+        groups = [[plain(name) for name in group] for group in found.rivals]
+        pairs = "; ".join(f"{first} from {' and '.join(rest)}" for first, *rest in groups)
+        return f"The record does not distinguish {pairs}."
     if found.verdict == "unexplained" or not found.effects:
         return ""
     return f"Probability {min(effect.probability for effect in found.effects):.2f}."

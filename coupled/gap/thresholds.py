@@ -16,7 +16,7 @@ SHORTEST_RECORD_s = 10.0  # four stretches of 2.5 s: two to fit, two to hold out
 
 # Noise and rounding of a channel (`output`).
 ECHO_FRAMES = 12  # chosen: a tenth of a second at 120 Hz, over which noise may echo
-ROUNDED = 3.0  # of the noise, from which even steps are a ramp's: told pressures had even steps
+ROUNDED = 3.0  # of the noise, from which even steps are a ramp's: q̄ profiles of benches had such
 ROUNDING_SPAN = 1e-6  # chosen: of a channel's span, the least that a file's figures keep
 UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
 
@@ -28,7 +28,7 @@ STRETCH_POWER = 0.125  # of the residual's power, from which a stretch is cut; b
 # What noise alone may leave of a stage (`output`).
 GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at up to 1.1
 NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
-SMOOTHING_LOST = 0.15  # at kinks of an input; a bench told its q̄ in ramps stands at 1.15
+SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps stands at 1.15
 
 # Inputs of the stages (`stages`, `airframe`, `surfaces`).
 ECHO_SHARE = 0.1  # of G_T's noise that echoes q̄'s, from which the host made it of q̄ as recorded
@@ -77,7 +77,7 @@ SURE = 0.97  # share of what the search was sure of that was right in blind tria
 DOUBT = 0.3  # a decision: structure is left, and an effect found may only imitate it
 
 # Where a gap lies (`where`).
-WHERE_WINDOW_s = 0.5  # chosen: windows whose rms tells the onset
+WHERE_WINDOW_s = 0.5  # chosen: windows whose rms gives the onset
 WHERE_LOUD = 2.0  # chosen: floors from which a window shows the gap
 WHERE_SHARE = 0.05  # chosen: least share of the variance that is worth saying
 NO_SIGN = 0.05  # chosen: of a signal's rms, under which its sign is not sure
@@ -103,7 +103,7 @@ SETTING_NUDGE = 1.01  # chosen: factor by which a setting's signature is taken
 TEST_s = 15.0  # chosen: length of a test
 TEST_EDGE_s = 0.25  # chosen: in which a hand can begin or end a push
 SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
-TOLD_EVERY = 12  # chosen: frames between the points at which a bench is told q̄
+PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 
 # What the summary says (`summary`).
 ONSET_s = 5.0  # chosen: a gap that begins later has a beginning

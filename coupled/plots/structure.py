@@ -121,7 +121,7 @@ def _spectrum(left: Floats, frame_rate_Hz: float) -> _Spectrum:
 
 
 def _draw_spectrum(axes: Any, found: _Spectrum, unit: str) -> None:
-    """Draw the amplitude of each frequency, which tells of a motion of its own."""
+    """Draw the amplitude of each frequency, which shows a motion of its own."""
     axes.plot(found.frequency[1:], found.amplitude[1:], color=look.RIVAL, linewidth=0.9)
     at = found.frequency[found.peak]
     axes.plot(at, found.amplitude[found.peak], "o", color=look.WRONG, markersize=4)

@@ -68,7 +68,7 @@ def test_sensing_is_not_given_a_gap_that_nobody_measured(clean: Record) -> None:
     assert found.stage("sensing").as_dict() == {
         "judged": False,
         "missing": [],
-        "why": "shows in loader and linkage",
+        "why": "see loader, linkage",
     }
     assert "sensing" not in found.summary  # its neighbours were judged
 

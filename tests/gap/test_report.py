@@ -159,7 +159,7 @@ def test_a_folder_is_diagnosed_by_one_command(tmp_path: Path) -> None:
         (("."), "--output: is missing"),
         ((".", "--rig", "737", "--output", "x"), "leave it out"),
         (("a.csv", "--rig", "737", "--output", "x"), "is for a folder"),
-        (("a.csv", "a.csv", "--rig", "737"), "given twice"),
+        (("a.csv", "a.csv", "--rig", "737"), "is a duplicate"),
         (("a.csv",), "--rig: is missing"),
         (("a.csv", "--rig", "737", "--improve", "x.csv"), "ends in .toml"),
     ):
