@@ -24,7 +24,7 @@ from coupled.record.channels import TIME
 from coupled.record.csvfile import read_columns, write_table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from coupled.plots.histories import Figure
 
 Floats = NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet")
