@@ -32,6 +32,17 @@ FORMAT = 1  # of a record and its manifest; one without is from before this was 
 
 
 @dataclass(frozen=True)
+class EndedEarly:
+    """Why, and after how long, a flight ended before its time."""
+
+    reason: str
+    time_s: float
+
+    def __str__(self) -> str:
+        return f"{self.reason} at {self.time_s:.2f} s"
+
+
+@dataclass(frozen=True)
 class Record:
     """Channels over time: `data` has shape (rows, channels), SI, one row a frame.
 
@@ -78,6 +89,12 @@ class Record:
             return f"Record({rows} rows; {what})"
         step_s = float(np.median(np.diff(self.time_s)))
         return f"Record({rows} rows, {rows * step_s:g} s at {1.0 / step_s:g} Hz; {what})"
+
+    @property
+    def ended_early(self) -> EndedEarly | None:
+        """Why and when the flight ended before its time, by the manifest; None if it did not."""
+        ended = self.manifest.get("ended_early")
+        return EndedEarly(str(ended["reason"]), float(ended["time_s"])) if ended else None
 
     def between(self, start_s: float, end_s: float) -> Record:
         """Return the rows with start ≤ t < end."""
