@@ -41,8 +41,10 @@ def diagnose(
     >>> sweep = coupled.FrequencySweep(force_N=40, start_s=0.5, duration_s=8)
     >>> flight = coupled.fly(worn, column=sweep, duration_s=10)
     >>> found = coupled.diagnose(rig, flight.record)
-    >>> round(1e4 * found.improved.controls["column"].loader.bend, 1)
-    4.0
+    >>> found.verdict, found.effects[0].name, round(found.effects[0].value, 5)
+    ('effect', 'bend', 0.0004)
+    >>> round(found.improved.controls["column"].loader.bend, 5)
+    0.0004
     """
     if control not in CONTROL_NAMES:
         problem = f"is {control!r}; one of {', '.join(CONTROL_NAMES)}"

@@ -52,8 +52,8 @@ def import_log(
     r'''Return the record of a log of your own, and the account of how it was made.
 
     `log_map` is a TOML file that names the log's columns and their units; `rig` gives the frame
-    rate that the record is laid on. The account has `clock`, `channels`, `unmapped` and
-    `warnings`. Raises InputError, naming file, column and row.
+    rate that the record is laid on. The account has `.clock`, `.channels`, `.unmapped` and
+    `.warnings`. Raises InputError, naming file, column and row.
 
     >>> import coupled, tempfile, pathlib
     >>> columns = """

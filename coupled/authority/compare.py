@@ -44,7 +44,7 @@ class Outcome:
     reached_norm: float  # surface command reached
     loss: float  # share of the asked command that is lost
     loss_closed_form: float  # the same by the rig's statics
-    felt_ratio: float  # force felt over force specified, breakout apart
+    felt_ratio: float  # force felt over force specified, breakout taken off
     felt_ratio_closed_form: float
     force_N: float  # greatest force of the pilot
     force_step_N: float  # greatest jump of the modifying force from frame to frame
@@ -180,8 +180,7 @@ def fly_and_judge(
 def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     """Return the figures of a flight's record."""
     control, rig = manoeuvre.control, manoeuvre.rig
-    ended = record.manifest["ended_early"]
-    why = f"{ended['reason']} at {ended['time_s']:.2f} s" if ended else ""
+    why = "" if record.ended_early is None else str(record.ended_early)
     nan = float("nan")
     if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
         return Outcome(manoeuvre.label, configuration, control, *(nan,) * 8, None, None, None, why)

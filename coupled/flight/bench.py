@@ -1,4 +1,4 @@
-"""What the frame loop flies, and the simplest of it: a bench, where q̄ is told."""
+"""What the frame loop flies, and the simplest of it: a bench, where q̄ is given."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 
 class Airframe(Protocol):
-    """What the frame loop flies: an aircraft, or a bench that only tells q̄."""
+    """What the frame loop flies: an aircraft, or a bench that only gives q̄."""
 
     motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
@@ -22,17 +22,17 @@ class Airframe(Protocol):
 
 
 class Bench:
-    """No aircraft: the dynamic pressure that the host is told, from a schedule in time."""
+    """No aircraft: the dynamic pressure that the host is given, from a schedule in time."""
 
     def __init__(self, frame_s: float, pressures_Pa: Sequence[tuple[float, float]]) -> None:
         self._frame_s = frame_s
         self._points = list(pressures_Pa)
         self._k = 0
         self.safe_altitude_m = 0.0
-        self.motion = self._told
+        self.motion = self._now
         self.step = self._next
 
-    def _told(self) -> tuple[float, ...]:
+    def _now(self) -> tuple[float, ...]:
         time = self._k * self._frame_s
         points = self._points
         if time <= points[0][0]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -37,7 +37,7 @@ from coupled.record.channels import (
     channel,
     record_channels,
 )
-from coupled.record.record import Record
+from coupled.record.record import EndedEarly, Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
 from coupled.rig.equations import specified_gradient
@@ -78,14 +78,14 @@ def fly(
     place = int(arrays.ctypes.data)
     rig_frame = bound(step_frame_at, place, 0, read(), 1.0)
     flown, asked = rig.flight is not None, bool(properties)
-    ended: dict[str, Any] | None = None
+    ended: EndedEarly | None = None
     done = 0
     try:
         for k in range(frames):
             motion = read()
             # Not above it: near the ground, or not a number.
             if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
-                ended = {"reason": why, "time_s": k / rig.frame_rate}
+                ended = EndedEarly(why, k / rig.frame_rate)
                 break
             if looks:
                 for state, look in looks:
@@ -99,12 +99,12 @@ def fly(
             if not done & 63 and progress is not None:
                 progress(done, frames)
     except KeyboardInterrupt:
-        ended = {"reason": "interrupted", "time_s": done / rig.frame_rate}
+        ended = EndedEarly("interrupted", done / rig.frame_rate)
     data = data[:done]
     lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
     if lost.size:
         data = data[: lost[0]]
-        ended = {"reason": "the state is not finite", "time_s": int(lost[0]) / rig.frame_rate}
+        ended = EndedEarly("the state is not finite", int(lost[0]) / rig.frame_rate)
     data[:, 0] = np.arange(len(data)) / rig.frame_rate
     if asked:
         channels = (*channels, *properties)
@@ -120,21 +120,22 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
         profile = manoeuvre.bench
         points = list(zip(profile.time_s, profile.dynamic_pressure_Pa, strict=True))
         return Bench(1.0 / rig.frame_rate, points)
-    where: dict[str, Any] = {"models": [aircraft_folder()], "file": manoeuvre.rig_file}
+    models, rig_file = [aircraft_folder()], manoeuvre.rig_file
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
     try:
-        check_direct_controls(rig.flight, frame_s, controls, **where)
+        check_direct_controls(rig.flight, frame_s, controls, models, rig_file)
         return make_aircraft(
             rig.flight,
             frame_s,
             controls,
+            models,
+            rig_file,
             record=manoeuvre.record_properties,
             run_file=manoeuvre.file,
             conditions=condition_wrappers(
                 manoeuvre.conditions, manoeuvre.file, frame_s, manoeuvre.seed
             ),
             gusts=Gusts(rig.flight, frame_s, manoeuvre.seed, air_m_per_s),
-            **where,
         )
     except InputError as error:
         if source is None or error.key not in source.changes:
@@ -195,7 +196,7 @@ def input_files(manoeuvre: Manoeuvre) -> list[Path]:
 
 
 def _manifest(
-    manoeuvre: Manoeuvre, channels: tuple[str, ...], data: Floats, ended: dict[str, Any] | None
+    manoeuvre: Manoeuvre, channels: tuple[str, ...], data: Floats, ended: EndedEarly | None
 ) -> dict[str, Any]:
     stops = {}
     for control in manoeuvre.rig.controls:
@@ -210,7 +211,7 @@ def _manifest(
         "seed": manoeuvre.seed,
         "channels": list(channels),
         "rows": len(data),
-        "ended_early": ended,
+        "ended_early": None if ended is None else asdict(ended),
         "stop_first_met_s": stops,
         "inputs_sha256": {path.name: sha256(path) for path in files},
         "versions": dict(_versions()),

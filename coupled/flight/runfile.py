@@ -39,7 +39,7 @@ class Case(Section):
 
 
 class RunFile(Flown, Conditions):
-    """The tables of a run file, its pilots apart."""
+    """The tables of a run file, without its pilots."""
 
     card: str = quantity("", min_length=1)
     rig: str = quantity("", min_length=1)

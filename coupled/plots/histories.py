@@ -13,6 +13,8 @@ from coupled.errors import InputError, nearest
 from coupled.record.channels import CONTROL_NAMES, RATE, control_channels, unit_of
 from coupled.units import DEGREE_rad
 
+__all__ = ["Figure", "Histories", "draw_channels", "draw_record", "plain"]
+
 Line = tuple[str, str, float]  # a channel, its name in the legend, and the factor to its unit
 
 

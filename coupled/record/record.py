@@ -24,11 +24,22 @@ from coupled.record.channels import TIME
 from coupled.record.csvfile import read_columns, write_table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from coupled.plots.histories import Figure
 
 Floats = NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet")
 FORMAT = 1  # of a record and its manifest; one without is from before this was written
+
+
+@dataclass(frozen=True)
+class EndedEarly:
+    """Why, and after how long, a flight ended before its time."""
+
+    reason: str
+    time_s: float
+
+    def __str__(self) -> str:
+        return f"{self.reason} at {self.time_s:.2f} s"
 
 
 @dataclass(frozen=True)
@@ -78,6 +89,12 @@ class Record:
             return f"Record({rows} rows; {what})"
         step_s = float(np.median(np.diff(self.time_s)))
         return f"Record({rows} rows, {rows * step_s:g} s at {1.0 / step_s:g} Hz; {what})"
+
+    @property
+    def ended_early(self) -> EndedEarly | None:
+        """Why and when the flight ended before its time, by the manifest; None if it did not."""
+        ended = self.manifest.get("ended_early")
+        return EndedEarly(str(ended["reason"]), float(ended["time_s"])) if ended else None
 
     def between(self, start_s: float, end_s: float) -> Record:
         """Return the rows with start ≤ t < end."""

@@ -28,7 +28,7 @@ seed = 3
 """
 
 
-def scenario(folder: Path, pilot: str, duration: float = 4.0, more: str = "") -> Manoeuvre:
+def manoeuvre(folder: Path, pilot: str, duration: float = 4.0, more: str = "") -> Manoeuvre:
     path = folder / "test.toml"
     path.write_text(RUN.format(duration=duration, pilot=pilot) + more, encoding="utf-8")
     return read_run(str(path))[0]
@@ -36,7 +36,7 @@ def scenario(folder: Path, pilot: str, duration: float = 4.0, more: str = "") ->
 
 def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
     noise = '\n[[case]]\nlabel = "noisy"\nrig = { "noise.column_force_N" = 0.2 }\n'
-    flown = scenario(tmp_path, 'kind = "doublet"\nforce_N = 40.0\nhalf_period_s = 0.7', more=noise)
+    flown = manoeuvre(tmp_path, 'kind = "doublet"\nforce_N = 40.0\nhalf_period_s = 0.7', more=noise)
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path in paths:
         write_record(fly(flown), path)
@@ -46,7 +46,7 @@ def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_record_is_read_back_as_it_was_written(tmp_path: Path, suffix: str) -> None:
-    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 30.0'))
+    record = fly(manoeuvre(tmp_path, 'kind = "step"\nforce_N = 30.0'))
     path = tmp_path / f"flight{suffix}"
     write_record(record, path)
     again = read_record(path)
@@ -57,7 +57,7 @@ def test_a_record_is_read_back_as_it_was_written(tmp_path: Path, suffix: str) ->
 
 
 def test_the_manifest_says_what_went_in(tmp_path: Path) -> None:
-    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 30.0'))
+    record = fly(manoeuvre(tmp_path, 'kind = "step"\nforce_N = 30.0'))
     manifest = record.manifest
     assert manifest["seed"] == 3
     assert manifest["ended_early"] is None
@@ -70,7 +70,7 @@ def test_the_manifest_says_what_went_in(tmp_path: Path) -> None:
 def test_a_dive_ends_at_the_ground_and_keeps_the_record(tmp_path: Path) -> None:
     low = '\n[[case]]\nlabel = "low"\nrig = { "flight.altitude_m" = 60.0 }\n'
     push = 'kind = "step"\nforce_N = -60.0'
-    record = fly(scenario(tmp_path, push, duration=30.0, more=low))
+    record = fly(manoeuvre(tmp_path, push, duration=30.0, more=low))
     ended = record.manifest["ended_early"]
     assert ended["reason"] == "the aircraft met the ground"
     assert 1.0 < ended["time_s"] < 29.0
@@ -82,7 +82,7 @@ def test_a_state_that_is_not_finite_ends_the_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A NaN command gives JSBSim an all-NaN state while run() goes on saying true."""
-    flown = scenario(tmp_path, 'kind = "step"\nforce_N = 10.0')
+    flown = manoeuvre(tmp_path, 'kind = "step"\nforce_N = 10.0')
     calls = 0
 
     def breaking(kernel: Any, *arguments: Any) -> Any:
@@ -108,7 +108,7 @@ def test_an_interrupted_flight_keeps_its_record(tmp_path: Path) -> None:
         if done >= 128:
             raise KeyboardInterrupt
 
-    record = fly(scenario(tmp_path, 'kind = "step"\nforce_N = 10.0'), stop)
+    record = fly(manoeuvre(tmp_path, 'kind = "step"\nforce_N = 10.0'), stop)
     assert record.manifest["ended_early"]["reason"] == "interrupted"
     assert len(record) == 128
     assert record["true_airspeed_m_per_s"].min() > 100.0
@@ -117,7 +117,7 @@ def test_an_interrupted_flight_keeps_its_record(tmp_path: Path) -> None:
 def test_the_attitude_hand_captures_and_holds(tmp_path: Path) -> None:
     hand = 'kind = "attitude"\nchange_rad = 0.05\ngain_N_per_rad = 900.0\n'
     hand += "rate_gain_N_s_per_rad = 150.0\nintegral_gain_N_per_rad_s = 300.0"
-    record = fly(scenario(tmp_path, hand, duration=30.0))
+    record = fly(manoeuvre(tmp_path, hand, duration=30.0))
     pitch = record["pitch_rad"] - record["pitch_rad"][0]
     assert pitch[record.time_s > 20.0] == pytest.approx(0.05, abs=0.004)
     assert np.max(np.abs(record["column_force_N"])) < 330.0

@@ -39,7 +39,7 @@ kind = "track"
 _PERIOD_s = 60.0
 
 
-def scenario(
+def manoeuvre(
     folder: Path, pilot: str, rig: str = "report-column", duration: float = 6
 ) -> Manoeuvre:
     path = folder / "test.toml"
@@ -91,7 +91,7 @@ def test_the_loop_crosses_over_as_set(
     pilot = f'what = "{what}"\ncrossover_rad_per_s = {crossover}\nphase_margin_rad = {margin}\n'
     pilot += f"sine_rates_rad_per_s = {rates}\n{size}\n"
     wait = 60.0 if what == "airspeed" else 20.0
-    flown = scenario(tmp_path, pilot, rig, 1.0 + wait + _PERIOD_s)
+    flown = manoeuvre(tmp_path, pilot, rig, 1.0 + wait + _PERIOD_s)
     record = fly(flown.configured("rigid"))
     assert record.manifest["ended_early"] is None
     climb = np.diff(record["altitude_m"], prepend=record["altitude_m"][0]) / record.time_s[1]
@@ -138,7 +138,7 @@ def test_a_stiffer_feel_or_arm_gives_the_pilot_less(tmp_path: Path) -> None:
     steady = "crossover_rad_per_s = 2.0\nchange_rad = 0.01"
     peaks = {}
     for arm in (0.0, 4000.0):
-        flown = scenario(tmp_path, f"{steady}\narm_stiffness_N_per_m = {arm}")
+        flown = manoeuvre(tmp_path, f"{steady}\narm_stiffness_N_per_m = {arm}")
         rigid = fly(flown.configured("rigid"))["pitch_rad"]
         bent = fly(flown.configured("uncompensated"))["pitch_rad"]
         peaks[arm] = float(np.ptp(bent) / np.ptp(rigid))
@@ -149,7 +149,7 @@ def test_a_stiffer_feel_or_arm_gives_the_pilot_less(tmp_path: Path) -> None:
 def test_strength_is_limited_and_does_not_last(tmp_path: Path) -> None:
     limits = "force_limit_N = 40.0\nlasting_force_N = 15.0\nendurance_s = 2.0"
     far = f"crossover_rad_per_s = 2.0\nchange_rad = 0.8\nintegral_rad_per_s = 0.5\n{limits}"
-    record = fly(scenario(tmp_path, far, duration=5.0))
+    record = fly(manoeuvre(tmp_path, far, duration=5.0))
     force, t = np.abs(record["column_force_N"]), record.time_s
     assert force.max() == pytest.approx(40.0, abs=1e-9)
     full = np.flatnonzero(force > 39.999)
@@ -163,8 +163,8 @@ def test_the_remnant_comes_from_the_seed_and_has_its_size(tmp_path: Path) -> Non
     # Covariance π·ρ through a lag τ: variance π·ρ/(2τ).
     assert np.std(made[2000:]) == pytest.approx(np.sqrt(np.pi * 0.01 / 0.2), rel=0.05)
     pilot = "crossover_rad_per_s = 2.0\nchange_rad = 0.02\nremnant = 0.01"
-    one, two = (fly(scenario(tmp_path, pilot))["column_force_N"] for _ in range(2))
-    quiet = fly(scenario(tmp_path, pilot.replace("0.01", "0.0")))["column_force_N"]
+    one, two = (fly(manoeuvre(tmp_path, pilot))["column_force_N"] for _ in range(2))
+    quiet = fly(manoeuvre(tmp_path, pilot.replace("0.01", "0.0")))["column_force_N"]
     assert np.array_equal(one, two)
     assert not np.array_equal(one, quiet)
 
@@ -194,7 +194,7 @@ def test_far_above_the_short_period_pitch_falls_by_four_an_octave() -> None:
 )
 def test_a_pilot_who_cannot_be_is_refused(tmp_path: Path, pilot: str, key: str, says: str) -> None:
     with pytest.raises(InputError) as caught:
-        fly(scenario(tmp_path, pilot))
+        fly(manoeuvre(tmp_path, pilot))
     assert f"pilot.column.{key}" in str(caught.value)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)

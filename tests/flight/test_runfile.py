@@ -28,9 +28,9 @@ force_N = 30.0
 
 @pytest.mark.parametrize("name", list(shipped_runs()))
 def test_every_shipped_run_reads_and_has_a_card(name: str) -> None:
-    scenarios = read_run(name)
-    assert scenarios[0].name == name
-    assert len(scenarios[0].card.split()) > 12
+    cases = read_run(name)
+    assert cases[0].name == name
+    assert len(cases[0].card.split()) > 12
 
 
 @pytest.mark.parametrize(

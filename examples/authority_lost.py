@@ -1,0 +1,44 @@
+# %% [markdown]
+# # What a bending column takes from a 737
+#
+# A control loader measures where its own motor stands. The structure between motor and grip
+# bends under the pilot's pull, so the host moves the elevator less than the pilot asks for, and
+# the feel is softer than specified. Both grow with the gradient, and so with dynamic pressure.
+
+# %%
+import coupled
+
+rig = coupled.load_rig("737")
+column = rig.controls["column"]
+print(f"K = {1e3 * column.loader.bend:.3f} mm/N, travel ±{100 * column.travel:.1f} cm")
+
+# %% [markdown]
+# The same pull, held at 6 cm, on a rigid structure, on the one that bends, and with each of the
+# host's two corrections. `Clamp` holds the grip; the force is what that takes.
+
+# %%
+pull = coupled.Clamp(deflection_m=0.06, start_s=0.5)
+table = coupled.compare(rig, column=pull, duration_s=4)
+for flight in table:
+    figures = flight.outcome
+    print(
+        f"{flight.configuration:16} {100 * figures.loss:5.1f} % of the elevator lost,"
+        f" {figures.felt_ratio:.2f} of the specified force felt"
+    )
+
+# %% [markdown]
+# The closed form of the rig's statics agrees to what friction adds, which it leaves out. The
+# aircraft shows the loss: less elevator is less pitch rate.
+
+# %%
+bent, rigid = table.flight("uncompensated").outcome, table.flight("rigid").outcome
+print(f"uncompensated, by the closed form: {100 * bent.loss_closed_form:.1f} % lost")
+if bent.peak_rate_rad_per_s is not None and rigid.peak_rate_rad_per_s is not None:
+    share = bent.peak_rate_rad_per_s / rigid.peak_rate_rad_per_s
+    print(f"peak pitch rate is {100 * share:.0f} % of that with a rigid structure")
+
+# %%
+figure = table.flight("uncompensated").record.plot(
+    "column_force_N", "column_deflection_m", "column_estimate_m", "pitch_rate_rad_per_s"
+)
+frame = table.to_polars().select("configuration", "loss", "felt_ratio", "peak_load_factor")

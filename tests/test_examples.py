@@ -1,0 +1,50 @@
+"""The examples run as they are, and what they show is so."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from coupled.rig.rig import Rig
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def test_every_example_is_run_here() -> None:
+    shown = {"authority_lost", "calibrating_a_loader", "diagnosing_a_record"}
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == shown
+    for path in EXAMPLES.glob("*.py"):
+        assert path.read_text(encoding="utf-8").startswith("# %% [markdown]\n# # "), path
+
+
+def test_authority_lost(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = runpy.run_path(str(EXAMPLES / "authority_lost.py"))
+    table = shown["table"]
+    assert table.loss("uncompensated") == pytest.approx(shown["bent"].loss_closed_form, abs=0.02)
+    assert table.loss("uncompensated") > 0.2
+    assert abs(table.loss("compensated")) < 0.001
+    assert shown["share"] < 0.9
+    assert f"{100 * table.loss('uncompensated'):.1f} % of the elevator" in capsys.readouterr().out
+    assert len(shown["figure"].axes) == 4
+
+
+def test_calibrating_a_loader(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = runpy.run_path(str(EXAMPLES / "calibrating_a_loader.py"))
+    assert shown["bend"].holds(shown["true"])
+    before, after = capsys.readouterr().out.splitlines()[-2:]
+    # S1 4 % low and no K: 1 − 0.96/1.2 is lost; then what the errors of the readings leave.
+    assert float(before.split()[1]) == pytest.approx(20.0, abs=0.1)
+    assert abs(float(after.split()[1])) < 1.5
+
+
+def test_diagnosing_a_record() -> None:
+    shown = runpy.run_path(str(EXAMPLES / "diagnosing_a_record.py"))
+    found = shown["found"]
+    assert found.verdict == "effect"
+    [effect] = found.effects
+    assert effect.name == "viscous_damping"
+    improved: Rig = found.improved
+    assert improved.controls["column"].loader.damping == pytest.approx(110.0, rel=0.01)
+    assert shown["off"] < 1e-4
