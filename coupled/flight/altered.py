@@ -5,6 +5,7 @@ about what. `modelfile` scales that part of the model itself, so a moment is mad
 whatever function the model has for it, and nothing else comes along.
 
     pitch_damping            C_mq: the pitching moment due to the pitch rate alone
+    pitch_stiffness          C_mα: the pitching moment due to the angle of attack; the trim with it
     elevator_effectiveness   all forces and moments due to the elevator, about its place in trim
 """
 
@@ -45,6 +46,14 @@ ALTERATIONS = (
             "pitch_damping",
             "pitching moment due to the pitch rate",
             ("velocities/q-aero-rad_sec", "velocities/q-rad_sec"),
+            axes=("PITCH",),
+        )
+    ),
+    Alteration(
+        Scaled(
+            "pitch_stiffness",
+            "pitching moment due to the angle of attack",
+            ("aero/alpha-rad", "aero/alpha-deg"),
             axes=("PITCH",),
         )
     ),

@@ -147,7 +147,7 @@ class Control(Section):
 
 
 class Flight(Section):
-    """The JSBSim model, how it is loaded, trimmed and flown, two of its moments, the air."""
+    """The JSBSim model, how it is loaded, trimmed and flown, factors on its moments, the air."""
 
     model: str = quantity("", min_length=1)
     altitude: float = quantity("m")
@@ -159,6 +159,7 @@ class Flight(Section):
     steps_per_frame: int = quantity("", 1, ge=1, le=100)
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
+    pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
     cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
     fuel: float = quantity("", 1.0, ge=0, le=100)
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)

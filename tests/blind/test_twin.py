@@ -23,6 +23,7 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.gap.library import BY_NAME
+from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -126,7 +127,7 @@ def test_rising_air_raises_alpha() -> None:
     craft.set_gust(2.0)
     for _ in range(3):
         craft.step((0.0, 0.0, 0.0))
-    assert craft.motion()[4] - before[4] == pytest.approx(2.0 / before[6], rel=0.15)
+    assert craft.motion()[ALPHA] - before[ALPHA] == pytest.approx(2.0 / before[SPEED], rel=0.15)
 
 
 @pytest.mark.parametrize("name", ["bench-compensated", "c172p-compensated", "737-uncompensated"])

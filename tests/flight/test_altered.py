@@ -77,6 +77,22 @@ def test_pitch_damping_is_the_coefficient_of_the_pitch_rate(
     assert np.max(np.abs(nominal - wanted)[:, PITCH_RATE]) > 0.02 * scale[PITCH_RATE]
 
 
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("factor", [0.7, 1.6])
+def test_pitch_stiffness_is_the_coefficient_of_the_angle_of_attack(
+    tmp_path: Path, name: str, factor: float
+) -> None:
+    """It trims with another elevator, and answers as the edited model does."""
+    flight = shipped(name)
+    models = edited_model(tmp_path, flight.model, multiplied({"/Cmalpha": factor}))
+    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    found = motions(make_aircraft(shipped(name, pitch_stiffness=factor), FRAME))
+    nominal = motions(make_aircraft(flight, FRAME))
+    scale = np.ptp(nominal, axis=0) + 1e-6
+    assert np.max(np.abs(found - wanted) / scale) < 1e-6
+    assert abs(found[0, ELEVATOR] - nominal[0, ELEVATOR]) > 1e-3
+
+
 def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> None:
     """The Augmentor Wing's tail meets the pitch rate in functions that its lift shares."""
     factor = 0.4
