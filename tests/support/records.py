@@ -1,6 +1,6 @@
 """Records made by another program than the library, and the noise of their sensors.
 
-Those of the twin come with the project (tests.support.make_records.py). Three more, made by a
+Those of the twin come with the project (tests/support/make_records.py). Three more, made by a
 separate program from the rig's description, lie beside the project where it was founded.
 """
 
