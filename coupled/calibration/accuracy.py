@@ -20,6 +20,8 @@ from coupled.calibration.estimate import Estimate, total
 from coupled.rig.equations import bend_loss, felt_gradient, modifying_gradient
 from coupled.rig.parameters import Control
 
+DEFLECTION_WITHIN, FELT_WITHIN = 0.005, 0.01  # what a compensated rig is to reach
+
 
 @dataclass(frozen=True)
 class Accuracy:

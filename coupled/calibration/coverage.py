@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from coupled.calibration.accuracy import deflection_off, felt_off
+from coupled.calibration.accuracy import (
+    DEFLECTION_WITHIN,
+    FELT_WITHIN,
+    deflection_off,
+    felt_off,
+)
 from coupled.calibration.assumed import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
@@ -20,7 +25,6 @@ from coupled.rig.parameters import Control
 Progress = Callable[[str, int, int], None]
 FIGURES = ("K", "S1", "S3", "S2")
 NEAR = 0.05
-DEFLECTION_WITHIN, FELT_WITHIN = 0.005, 0.01  # what a compensated rig is to reach
 _BLOCK = 25
 
 

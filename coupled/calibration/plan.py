@@ -10,12 +10,13 @@ bend is straight. The interval has the degrees of freedom that a fit of the desi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from coupled.calibration.accuracy import DEFLECTION_WITHIN
 from coupled.calibration.assumed import real_scales
 from coupled.calibration.errors_in_variables import expected_design
 from coupled.calibration.estimate import Estimate, Instruments
@@ -23,7 +24,7 @@ from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.equations import specified_gradient, volts, volts_of_computed
+from coupled.rig.equations import bend_loss, specified_gradient, volts, volts_of_computed
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
@@ -32,8 +33,9 @@ STRONGEST_N = 150.0  # two thirds of what 14 CFR 25.143(d) allows one hand for a
 NEAREST, FARTHEST = 0.4, 1.0  # deflections within what travel and force allow, as shares
 FULL_TRAVEL = 0.95
 MOST_READINGS = 400
+FINEST = 100.0  # times an instrument may err less: 3 µm for 0.3 mm
 NORMAL_95 = 1.96
-USUAL_LOSS = 0.1  # K·G taken at the stiffest gradient where the host believes no K yet
+USUAL_LOSS = 0.1  # K·G taken at the stiffest gradient where the host assumes no K yet
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def precision(
     instruments: Instruments,
     looks: int = 2,
 ) -> Precision:
-    """Return what a design gives, for the K that the host believes or a usual one.
+    """Return what a design gives, for the K that the host assumes or a usual one.
 
     `looks`: how often ruler and scale are read.
     """
@@ -145,8 +147,7 @@ def fewest(
     grid = stations(rig, control, 5, 4, strongest_N)
     rows, c, bend = _rows(rig, control, grid, instruments, looks)
     counts = np.zeros(len(grid), dtype=int)
-    ends = [int(np.argmax(rows[:, 0, 0])), int(np.argmax(rows[:, 1, 2]))]
-    counts[ends] += 1
+    counts[_ends(rows)] += 1
     while counts.sum() < MOST_READINGS:
         information = np.einsum("n,nmp,nmq->pq", counts, rows, rows)
         error = np.sqrt(c @ np.linalg.solve(information, c)) / bend
@@ -157,6 +158,18 @@ def fewest(
         counts[_most_helpful(rows, information, c)] += 1
     problem = f"{MOST_READINGS} readings do not give K to ±{100 * share:g} %; ask for less"
     raise InputError(rig.name, "--precision", problem)
+
+
+def _ends(rows: Floats) -> list[int]:
+    """Return the two readings that tell most of a, b and S₃ together: far out, at full force."""
+    ends = [int(np.argmax(rows[:, 0, 0])), int(np.argmax(rows[:, 1, 2]))]
+    if ends[0] != ends[1]:
+        return ends
+    # One place is both: the other is the one that makes the information's determinant largest.
+    own = np.einsum("nmp,nmq->npq", rows, rows)
+    size = np.sqrt(np.diag(own[ends[0]])) + 1e-300
+    together = np.linalg.det((own + own[ends[0]]) / np.outer(size, size))
+    return [ends[0], int(np.argmax(together))]
 
 
 def _most_helpful(rows: Floats, information: Floats, c: Floats) -> int:
@@ -201,6 +214,70 @@ def _precision(rows: Floats, c: Floats, bend: float) -> Precision:
     return Precision(count, bend, found.error, found.half_width)
 
 
+@dataclass(frozen=True)
+class DeflectionNeeds:
+    """What it takes for a compensated rig's δ̂ to be within a share of δ, in 95 % of cases.
+
+    `half_width` is what the design itself gives, at the gradient where that is most. Each of
+    the rest alone gets it to `wanted`: so many `readings`, spread as the design is; a ruler
+    that errs less by the factor `ruler`; or every instrument and the hand by `all`. None where
+    that alone does not do.
+    """
+
+    wanted: float
+    half_width: float
+    readings: int | None
+    ruler: float | None
+    all: float | None
+
+
+def deflection_needs(
+    rig: Rig,
+    control: ControlName,
+    design: Sequence[Station],
+    instruments: Instruments,
+    looks: int = 2,
+    wanted: float = DEFLECTION_WITHIN,
+) -> DeflectionNeeds:
+    """Return what a design gives of δ̂, and what it would take to have it within `wanted`."""
+    names = ("ruler", "ruler_step", "scale", "scale_step", "meter", "meter_step", "hand")
+
+    def reached(times: int, factor: float = 1.0, finer: Sequence[str] = ()) -> float:
+        better = {name: getattr(instruments, name) / factor for name in finer}
+        rows, _, bend = _rows(rig, control, design, replace(instruments, **better), looks)
+        return _deflection_half_width(rig, control, np.repeat(rows, times, axis=0), bend)
+
+    def factor_of(finer: Sequence[str]) -> float | None:
+        if reached(1, FINEST, finer) > wanted:
+            return None
+        return float(brentq(lambda f: reached(1, f, finer) - wanted, 1.0, FINEST, rtol=1e-3))
+
+    now = reached(1)
+    if now <= wanted:
+        return DeflectionNeeds(wanted, now, len(design), 1.0, 1.0)
+    most = MOST_READINGS // len(design) + 1
+    enough = next((n * len(design) for n in range(2, most) if reached(n) <= wanted), None)
+    return DeflectionNeeds(wanted, now, enough, factor_of(names[:2]), factor_of(names))
+
+
+def _deflection_half_width(rig: Rig, control: ControlName, rows: Floats, bend: float) -> float:
+    """Return half of the 95 % interval of δ̂/δ, at the gradient where that is most."""
+    if len(rows) < 3:
+        return float("inf")
+    errors, scales = sandwich(rows, np.zeros(rows.shape[:2])), real_scales(rig.controls[control])
+    table = rig.controls[control].schedule.total_gradient
+    widths = []
+    for g in np.linspace(min(table), max(table), 9):
+        lost = bend_loss(bend, float(g))
+        # of δ̂/δ = (S₁/Ŝ₁)·(1 − K·G) + K̂·G·S₃/Ŝ₃ by a = S₁, b = −K·S₁ and S₃
+        by_a = -(1.0 - lost) / scales.s1 - lost / scales.s1
+        slope = np.array([by_a, -float(g) / scales.s1, -lost / scales.s3])
+        variance = float(np.sum((errors.back.T @ slope) ** 2))
+        found = Estimate(1.0, float(np.sqrt(variance)), errors.freedom(slope))
+        widths.append(found.half_width)
+    return max(widths)
+
+
 def form(chosen: Sequence[tuple[Station, int]], control: str, looks: int = 2) -> str:
     """Return a plan as a CSV to be filled in: where to hold, and empty cells to write into."""
     unit = unit_of(control)
@@ -210,6 +287,6 @@ def form(chosen: Sequence[tuple[Station, int]], control: str, looks: int = 2) ->
     empty = "," * (7 + 2 * (looks == 2))
     for station, count in chosen:
         where = f"hold at {station.deflection:.4g} {unit} and about {station.force:.3g} N"
-        where += f" with the host told {station.pressure_Pa:.5g} Pa"
+        where += f" with {station.pressure_Pa:.5g} Pa given to the host"
         lines += [f"{station.label}{empty}{where}"] * count
     return "\n".join(lines) + "\n"

@@ -80,7 +80,7 @@ def _units(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, f
     known += [_after(head) for head in [*ours, *FORCES]]
     for head in heads:
         if heads.count(head) > 1:
-            raise InputError(path, f"row 1: {head}", "stands there twice")
+            raise InputError(path, f"row 1: {head}", "duplicate column")
         if head in other or head in [_after(name) for name in other]:
             raise InputError(path, f"row 1: {head}", f"a {control} is read in {', '.join(ours)}")
         if head not in known:

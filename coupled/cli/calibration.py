@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -130,7 +131,7 @@ def _plan(
     wanted: tuple[float, float, int],
     targets: tuple[Path | None, str],
 ) -> None:
-    from coupled.calibration.plan import fewest, form, precision, stations
+    from coupled.calibration.plan import deflection_needs, fewest, form, precision, stations
     from coupled.cli.tables.calibration import print_plan
 
     (file, rig, control), (write, json_file) = of_rig, targets
@@ -148,9 +149,11 @@ def _plan(
     chosen = fewest(rig, control, tools, share, strongest, looks)
     design = [s for s, count in chosen for _ in range(count)]
     reached = precision(rig, control, design, tools, looks)
+    needs = deflection_needs(rig, control, design, tools, looks)
     table = {
         "half_width": reached.half_width,
         "bend": reached.bend,
+        "deflection": asdict(needs),
         "readings": [{**s.__dict__, "count": count} for s, count in chosen],
         "grids": [
             {"gradients": few, "deflections": many, "half_width": grid.half_width}
@@ -161,8 +164,9 @@ def _plan(
         if write is not None:
             write_text(outputs.at(write), form(chosen, control, looks))
         keep_json(table, json_file, outputs)
+    needs = deflection_needs(rig, control, design, tools, looks)
     if json_file != "-":
-        print_plan(out, control, grids, chosen, reached)
+        print_plan(out, control, grids, chosen, reached, needs)
         if write is not None:
             say(f"form: {write}")
     print_json(table, json_file)

@@ -14,9 +14,10 @@ since the loader sees δc = δ − K·F. With a breakout, solving that for δ gi
 which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too
 little at every deflection, G being the slope there.
 
-The break lies at δc₁ = δ₁ − K·F(δ₁). Where K·F(δ₁) ≥ δ₁ it lies within what the breakout
-bends: δc leaves neutral at the force at which δ = K·F(δ), which is on the second segment, so
-that G₂ holds from there on and F_extra fills up to it,
+The break lies at δc₁ = δ₁ − K·F(δ₁): the author's reading, since the report's flow chart is
+lost, and its text says only that the bend is included. Where K·F(δ₁) ≥ δ₁ it lies within what
+the breakout bends: δc leaves neutral at the force at which δ = K·F(δ), which is on the second
+segment, so that G₂ holds from there on and F_extra fills up to it,
 
     F_extra = F₀/(1 − K·G₂) − F_BO,    F₀ = F_BO + (G₁ − G₂)·δ₁
 

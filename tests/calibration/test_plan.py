@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from coupled.calibration.bench import CalibrationBench
+from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import usual_instruments
-from coupled.calibration.plan import fewest, form, gradient_sets, precision, stations
+from coupled.calibration.plan import (
+    deflection_needs,
+    fewest,
+    form,
+    gradient_sets,
+    precision,
+    stations,
+)
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
@@ -95,3 +106,28 @@ def test_a_form_has_a_row_a_reading() -> None:
     once = form(chosen, "column", looks=1).splitlines()
     assert once[0] == "gradient_set,deflection_m,force_N,v1_V,v3_V,v2_V,approach,remark"
     assert all(line.count(",") == once[0].count(",") for line in once)
+
+
+def test_what_a_stiff_wheel_needs_is_said_and_does() -> None:
+    """The T-37's stick bends little: of 25 readings δ̂ is right to 1.5 %, and 0.5 % is wanted."""
+    rig, tools = read_rig(shipped_rigs()["t37"]), usual_instruments("wheel")
+    grid = stations(rig, "wheel", 5, 5)
+    needs = deflection_needs(rig, "wheel", grid, tools)
+    assert needs.half_width == pytest.approx(0.0154, rel=0.02)
+    assert needs.readings == 200
+    assert needs.ruler is not None
+    assert needs.ruler == pytest.approx(3.83, rel=0.02)
+    finer = replace(
+        tools, ruler=tools.ruler / needs.ruler, ruler_step=tools.ruler_step / needs.ruler
+    )
+    shares = [
+        measure_coverage(CalibrationBench(rig, "wheel", places, with_tools), 60).deflection
+        for places, with_tools in ((grid, tools), (8 * grid, tools), (grid, finer))
+    ]
+    assert shares[0] < 0.5
+    assert min(shares[1:]) > 0.86  # 95 % by 3 standard deviations of 60
+
+
+def test_a_plan_of_one_place_that_is_both_ends_takes_a_second() -> None:
+    chosen = fewest(read_rig(shipped_rigs()["t37"]), "wheel", usual_instruments("wheel"), 0.1)
+    assert len(chosen) >= 2

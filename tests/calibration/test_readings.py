@@ -75,7 +75,7 @@ HOSTILE = [
     (CSV.replace("force_lb", "force_kg"), "row 1: force_kg: is no column"),
     (CSV.replace("force_lb", "force_N"), "row 1: mixes units: deflection_in with force_N"),
     (CSV.replace("remark", "deflection_m"), "row 1: mixes units: deflection_in and deflection_m"),
-    (CSV.replace("remark", "v1_V"), "row 1: v1_V: stands there twice"),
+    (CSV.replace("remark", "v1_V"), "row 1: v1_V: duplicate column"),
     (CSV.replace("deflection_in", "deflection_deg"), "a column is read in deflection_m"),
     (CSV.replace(",", ";"), "columns are parted by commas"),
     (CSV.replace(",", "\t"), "columns are parted by commas"),

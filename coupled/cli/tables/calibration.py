@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from coupled.calibration.checks import ControlCheck
     from coupled.calibration.coverage import Coverage
     from coupled.calibration.estimate import Estimate
-    from coupled.calibration.plan import Precision, Station
+    from coupled.calibration.plan import DeflectionNeeds, Precision, Station
     from coupled.calibration.result import CalibrationResult
 
 CREEP = 3.0  # standard errors of the mean rise that are no chance
@@ -168,6 +168,7 @@ def print_plan(
     grids: dict[tuple[int, int], Precision],
     chosen: Sequence[tuple[Station, int]],
     reached: Precision,
+    needs: DeflectionNeeds,
 ) -> None:
     """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
     d = unit_of(control)
@@ -200,6 +201,25 @@ def print_plan(
         "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
         " between them show whether the bend is straight, which the ends alone cannot."
     )
+    console.print(_deflection_line(needs, reached.readings), highlight=False)
+
+
+def _deflection_line(needs: DeflectionNeeds, readings: int) -> str:
+    """Return what the readings give of the deflection, and what it takes to have it right."""
+    wanted = f"{100 * needs.wanted:g} %"
+    text = "Compensated with these, the aircraft gets the deflection to"
+    text += f" {100 * needs.half_width:.2g} % (95 %)."
+    if needs.half_width <= needs.wanted:
+        return text
+    ways = []
+    if needs.readings is not None:
+        ways.append(f"{needs.readings} readings")
+    if needs.ruler is not None:
+        ways.append(f"these {readings} with a ruler {needs.ruler:.2g} times finer")
+    elif needs.all is not None:
+        better = f"{needs.all:.2g} times better"
+        ways.append(f"these {readings} with every instrument and the hand {better}")
+    return f"{text} For {wanted} it takes {', or '.join(ways) or 'more than readings give'}."
 
 
 def print_coverage(console: Console, coverage: Coverage) -> None:
