@@ -13,11 +13,10 @@ import pytest
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.coverage import measure_coverage
+from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import usual_instruments
 from coupled.calibration.plan import stations
 from tests.support.readings import report_rig
-
-pytestmark = pytest.mark.bench
 
 USUAL = usual_instruments("column")
 
@@ -27,7 +26,8 @@ def usual_bench() -> CalibrationBench:
     return CalibrationBench(rig, "column", stations(rig, "column", 5, 5), USUAL)
 
 
-def test_1000_benches_in_30_s_whose_intervals_hold_the_truth() -> None:
+@pytest.mark.slow
+def test_the_intervals_of_1000_benches_hold_the_truth() -> None:
     made = usual_bench()
     take_readings(made, 0)  # the first compiles the physics
     start, before = time.perf_counter(), os.times()
@@ -46,17 +46,21 @@ def test_1000_benches_in_30_s_whose_intervals_hold_the_truth() -> None:
     assert found.within > 0.99
     assert abs(found.bias) < 0.003
     assert found.accused < 0.01
-    assert worked / 2.0 < 30.0  # so that what else the machine does is not counted
 
 
-def test_a_calibration_fits_in_under_50_ms() -> None:
+@pytest.mark.bench
+def test_a_calibration_costs_less_than_20_of_its_fits() -> None:
     made = usual_bench()
     readings = take_readings(made, 1)
     data = made.rig.controls["column"]
-    taken = []
+    taken, fits = [], []
     for _ in range(30):
         start = time.perf_counter()
         calibrate_control(readings, data, "column", USUAL, "bench")
-        taken.append(time.perf_counter() - start)
-    print(f"\na calibration from 25 readings and 6 nulls: {1e3 * min(taken):.1f} ms")
-    assert min(taken) < 0.05
+        between = time.perf_counter()
+        errors_in_variables(readings, USUAL)
+        taken.append(between - start)
+        fits.append(time.perf_counter() - between)
+    print(f"\na calibration from 25 readings and 6 nulls: {1e3 * min(taken):.1f} ms,", end=" ")
+    print(f"{min(taken) / min(fits):.1f} of its fits")
+    assert min(taken) < 20.0 * min(fits)

@@ -79,13 +79,16 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
     assert float(done.stdout) < 60.0
 
 
-def test_a_second_start_takes_under_2_s() -> None:
-    code = "from coupled.flight.loop import fly;"
-    code += "from tests.support.runs import shortened; fly(shortened('pull-up-c172p', 1, 2))"
-    taken = []
+def test_a_second_start_takes_little_more_than_its_libraries() -> None:
+    flight = "from coupled.flight.loop import fly;"
+    flight += "from tests.support.runs import shortened; fly(shortened('pull-up-c172p', 1, 2))"
+    libraries = "import jsbsim, numba, numpy, polars, pydantic, scipy.interpolate"
+    taken: dict[str, list[float]] = {flight: [], libraries: []}
     for _ in range(4):
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
-        taken.append(time.perf_counter() - start)
-    print(f"\nstart to first frame, compiled code cached: {min(taken[1:]):.2f} s")
-    assert min(taken[1:]) < 2.0
+        for code, seconds in taken.items():
+            start = time.perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+            seconds.append(time.perf_counter() - start)
+    first, bare = min(taken[flight][1:]), min(taken[libraries][1:])
+    print(f"\nstart to first frame, compiled code cached: {first:.2f} s; libraries {bare:.2f} s")
+    assert first < 4.0 * bare
