@@ -101,7 +101,7 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
             known = deck.kinds(plan.category)
             kinds = [known[i] for i in rng.choice(len(known), len(kinds), replace=False)]
         rig = _choose_rig(rng, kinds, pool)
-        begun = fly_clean(draw_setting(rng, rig)) if rig else None
+        begun = fly_clean(draw_setting(rng, rig, deck.realism)) if rig else None
         if begun is None:
             continue
         trial = _flown(rng, plan, kinds, *begun)
@@ -126,7 +126,7 @@ def _flown(
     """Return the trial in its setting, or None where its kinds cannot be made as wide as wanted."""
     if plan.category == "none":
         return _without(rng, setting)
-    bare = stage_gaps(clean.rig, clean.record, any(k.stage == "airframe" for k in kinds))
+    bare = stage_gaps(clean.rig, clean.record, any(k.widens == "airframe" for k in kinds))
     parts = []
     for kind in kinds:
         part = _part(rng, plan, kind, setting, clean, bare)
@@ -138,9 +138,9 @@ def _flown(
     except LostError:
         return None
     sizes = Sizes(
-        clean_gap={kind.stage: bare[kind.stage] for kind in kinds},
+        clean_gap={kind.widens: bare[kind.widens] for kind in kinds},
         alone=tuple(part.gap for part in parts),
-        ratio=min(part.gap / bare[part.put.kind.stage] for part in parts),
+        ratio=min(part.gap / bare[part.put.kind.widens] for part in parts),
     )
     truth = Truth(
         plan.category,
@@ -152,6 +152,7 @@ def _flown(
         stages=tuple(sorted({kind.stage for kind in kinds})),
         gap=stage_gaps(setting.rig, flown.record),
         sizes=sizes,
+        also=_also(setting),
         conditions=setting.conditions,
     )
     if plan.category == "single":
@@ -165,14 +166,14 @@ def _part(
     rng: Rng, plan: Plan, kind: Kind, setting: Setting, clean: Clean, bare: Mapping[str, float]
 ) -> _Sized | None:
     """Return a kind at a size that makes it as wide as its category wants, or None."""
-    if kind.stage not in bare:  # a gradient that never changes shows nothing of its schedule
+    if kind.widens not in bare:  # a gradient that never changes shows nothing of its schedule
         return None
     clear = plan.category in ("pair", "outsider")
     low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
     wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     shares = (float(rng.uniform()), float(rng.uniform()), float(rng.uniform()))
     draw = Draw(float(rng.choice([-1.0, 1.0])), shares, int(rng.integers(2**31)))
-    sized = _sized(setting, clean, kind, draw, wanted, bare[kind.stage])
+    sized = _sized(setting, clean, kind, draw, wanted, bare[kind.widens])
     if sized is None or (clear and not CLEAR <= sized.gap <= CLEAREST):
         return None
     return sized
@@ -193,9 +194,16 @@ def _without(rng: Rng, setting: Setting) -> Trial | None:
         setting.rig.name,
         gap=stage_gaps(setting.rig, record),
         tolerance=tolerance,
+        also=_also(setting),
         conditions=setting.conditions,
     )
     return Trial(setting.rig, record, truth)
+
+
+def _also(setting: Setting) -> tuple[str, ...]:
+    """Return what the rig has beside its category: friction that yields, in the later versions."""
+    dry = setting.rig.controls["column"].loader.friction > 0.0
+    return ("presliding_friction",) if dry and setting.conditions.presliding_m else ()
 
 
 def _lacking(rng: Rng, trial: Trial) -> Trial:
@@ -222,7 +230,7 @@ def _sized(
         except LostError:
             size = max(kind.least, 0.4 * size)
             continue
-        gap = stage_gaps(setting.rig, record, kind.stage == "airframe")[kind.stage]
+        gap = stage_gaps(setting.rig, record, kind.widens == "airframe")[kind.widens]
         excess = math.sqrt(max(gap**2 - bare**2, 0.01))
         off = abs(math.log(wanted / excess))
         if off < miss:

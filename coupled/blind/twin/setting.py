@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from coupled.blind.twin.excitation import bench_pressure, pilot_force, pilot_shape
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
+from coupled.blind.twin.twin import RIG_CHANNELS, Bristles, LostError, fly_twin, nominal_twin
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -41,28 +42,73 @@ TRIES = 8
 
 
 @dataclass(frozen=True)
+class Realism:
+    """What the rigs and loggers of a version have that the nominal rig does not say.
+
+    presliding_m    least and most of the length over which friction yields before it slips,
+                    drawn log-uniform; None for bristles of 0.3 to 1.5 μJ
+    coloured_noise  share of the records in which half of the channels have noise with a corner
+    corner_Hz       least and most of that corner, drawn log-uniform
+    skewed_clock    share of the records in which force or motion is stamped late
+    """
+
+    presliding_m: tuple[float, float] | None = None
+    coloured_noise: float = 0.0
+    corner_Hz: tuple[float, float] = (8.0, 40.0)
+    skewed_clock: float = 0.0
+
+
+PLAIN = Realism()
+SKEW_s = 5e-4  # the most by which a clock is skewed: settings, no effect
+
+
+@dataclass(frozen=True)
 class Conditions:
     """What a record was made with, as its key says it.
 
-    level_N    of the pilot's force
-    noise      standard deviation of each channel's noise, SI
-    bristle_J  friction times the bristles' length: what a reversal gives back
+    level_N        of the pilot's force
+    noise          standard deviation of each channel's noise, SI
+    bristle_J      friction times the bristles' length, what a reversal gives back; of version 1
+    presliding_m   the bristles' length, where it is drawn by itself
+    elastic_share  of that length which bends before any of it slips
+    corner_Hz      of the channels whose noise is a first-order lag's and not white
+    force_skew_s, motion_skew_s  how late force and motion are stamped
     """
 
     duration_s: float
     excitation: tuple[str, ...]
     level_N: float
     noise: Mapping[str, float]
-    bristle_J: float
+    bristle_J: float | None = None
+    presliding_m: float | None = None
+    elastic_share: float = 0.0
+    corner_Hz: Mapping[str, float] = field(default_factory=dict)
+    force_skew_s: float = 0.0
+    motion_skew_s: float = 0.0
+
+    @property
+    def bristles(self) -> Bristles:
+        """The bristles of the rig's friction."""
+        if self.bristle_J is not None:
+            return Bristles(energy_J=self.bristle_J)
+        return Bristles(self.presliding_m, elastic_share=self.elastic_share)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the conditions as the key has them."""
-        return {
+        table: dict[str, Any] = {
             "duration_s": self.duration_s,
             "excitation": list(self.excitation),
             "level_N": self.level_N,
             "noise": dict(self.noise),
-            "bristle_J": self.bristle_J,
+        }
+        if self.bristle_J is not None:
+            return table | {"bristle_J": self.bristle_J}
+        return table | {
+            "presliding_m": self.presliding_m,
+            "elastic_share": self.elastic_share,
+            "corner_Hz": dict(self.corner_Hz),
+            "force_skew_s": self.force_skew_s,
+            "motion_skew_s": self.motion_skew_s,
         }
 
 
@@ -116,7 +162,9 @@ class Setting:
         are factors on the twin's own numbers within their setting, which is no effect. Raises
         LostError where the aircraft leaves the envelope.
         """
-        twin = nominal_twin(self.rig, self.conditions.bristle_J)
+        twin = nominal_twin(self.rig, self.conditions.bristles)
+        twin.set(force_late=self.conditions.force_skew_s)
+        twin.air.late_s = self.conditions.motion_skew_s
         for name, factor in (tolerance or {}).items():
             twin.set(**{name: twin.get(name) * factor})
         found = []
@@ -128,7 +176,7 @@ class Setting:
         return Flown(_logged(record), tuple(found))
 
 
-def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
+def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -> Setting:
     """Return a setting drawn for a rig: 20 to 60 s of a pilot's work, and noise."""
     frames = round(rng.uniform(20.0, 60.0) * rig.frame_rate)
     shape, shapes = pilot_shape(rng, frames, rig.frame_rate)
@@ -146,15 +194,52 @@ def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
     factors = factors * np.ones(len(names))
     sigma = np.array([NOISE[name][0] for name in names]) * factors
     noise = rng.standard_normal((frames, len(names))) * sigma
-    bristle = float(np.exp(rng.uniform(np.log(3e-7), np.log(1.5e-6))))
     conditions = Conditions(
         duration_s=frames / rig.frame_rate,
         excitation=tuple(shapes),
         level_N=level,
         noise={n: float(s) for n, s in zip(names, sigma, strict=True) if s > 0.0},
-        bristle_J=bristle,
     )
+    if realism.presliding_m is None:
+        energy_J = _log_uniform(rng, 3e-7, 1.5e-6)
+        conditions = replace(conditions, bristle_J=energy_J)
+        return Setting(rig, shape, frames, pressures, noise, conditions)
+    conditions = replace(
+        conditions,
+        presliding_m=_log_uniform(rng, *realism.presliding_m),
+        elastic_share=float(rng.uniform(0.05, 0.8)),
+    )
+    if rng.uniform() < realism.coloured_noise:
+        corners = {n: _log_uniform(rng, *realism.corner_Hz) for n in names if rng.uniform() < 0.5}
+        for i, name in enumerate(names):
+            if name in corners:
+                noise[:, i] = coloured(noise[:, i], corners[name], rig.frame_rate)
+        conditions = replace(conditions, corner_Hz=corners)
+    if rng.uniform() < realism.skewed_clock:
+        late = float(rng.uniform(0.0, SKEW_s))
+        of_force = rig.flight is None or rng.uniform() < 0.5
+        conditions = replace(
+            conditions,
+            force_skew_s=late if of_force else 0.0,
+            motion_skew_s=0.0 if of_force else late,
+        )
     return Setting(rig, shape, frames, pressures, noise, conditions)
+
+
+def coloured(white: Floats, corner_Hz: float, frame_rate_Hz: float) -> Floats:
+    """Return noise of the same standard deviation, its spectrum falling beyond a corner.
+
+    A first-order lag, x[k] = a·x[k − 1] + √(1 − a²)·white[k], a = e^(−2π·corner/rate), begun in
+    its steady state; so neighbours correlate by a.
+    """
+    a = float(np.exp(-2.0 * np.pi * corner_Hz / frame_rate_Hz))
+    gain = np.sqrt(1.0 - a * a)
+    start = [(1.0 - gain) * white[0]] if len(white) else [0.0]
+    return np.asarray(lfilter([gain], [1.0, -a], white, zi=start)[0])
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def channels(rig: Rig) -> tuple[str, ...]:
@@ -170,7 +255,7 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
         except LostError:
             setting = setting.gentler()
             continue
-        return setting, Clean(setting.rig, record, setting.conditions.bristle_J)
+        return setting, Clean(setting.rig, record, setting.conditions.bristles)
     return None
 
 
