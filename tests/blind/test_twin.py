@@ -16,7 +16,14 @@ from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.revision2 import REVISION_2
-from coupled.blind.twin.setting import NOISE, Installed, Setting, draw_setting, fly_clean
+from coupled.blind.twin.setting import (
+    NOISE,
+    Installed,
+    Setting,
+    draw_setting,
+    fly_clean,
+    with_other,
+)
 from coupled.blind.twin.twin import STIFF, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
@@ -173,7 +180,8 @@ def test_every_effect_of_the_library_has_its_twin() -> None:
 def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     name = "c172p-compensated" if kind.flown else "bench-compensated"
     rig = POOL[name]
-    begun = fly_clean(_short(rig))
+    setting = _short(rig)
+    begun = fly_clean(with_other(np.random.default_rng(3), setting) if kind.other else setting)
     assert begun is not None
     setting, clean = begun
     size = (kind.least * kind.most) ** 0.5 if kind.least < kind.most else kind.most

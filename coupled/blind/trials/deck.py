@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from coupled.blind.twin.conditions import PLAIN, Realism
 from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.revision2 import REVISION_2
-from coupled.blind.twin.setting import PLAIN, Realism
 from coupled.errors import InputError, nearest
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
@@ -70,7 +70,13 @@ def _realism(table: Mapping[str, Any] | None) -> Realism:
         return PLAIN
     least, most = table["presliding_m"]
     low, high = table["corner_Hz"]
-    return Realism((least, most), table["coloured_noise"], (low, high), table["skewed_clock"])
+    return Realism(
+        presliding_m=(least, most),
+        coloured_noise=table["coloured_noise"],
+        corner_Hz=(low, high),
+        skewed_clock=table["skewed_clock"],
+        wheels=table["wheels"],
+    )
 
 
 def _chosen(

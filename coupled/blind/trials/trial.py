@@ -12,8 +12,15 @@ from coupled.blind.trials.deck import Deck
 from coupled.blind.trials.measure import alike, stage_gaps
 from coupled.blind.trials.rigs import DRAWN
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
+from coupled.blind.twin.conditions import Realism
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.setting import Installed, Setting, draw_setting, fly_clean
+from coupled.blind.twin.setting import (
+    Installed,
+    Setting,
+    draw_setting,
+    fly_clean,
+    with_other,
+)
 from coupled.blind.twin.twin import LostError
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -101,13 +108,21 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
             known = deck.kinds(plan.category)
             kinds = [known[i] for i in rng.choice(len(known), len(kinds), replace=False)]
         rig = _choose_rig(rng, kinds, pool)
-        begun = fly_clean(draw_setting(rng, rig, deck.realism)) if rig else None
+        begun = fly_clean(_set(rng, rig, kinds, deck.realism)) if rig else None
         if begun is None:
             continue
         trial = _flown(rng, plan, kinds, *begun)
         if trial is not None:
             return trial
     raise AssertionError(f"no rig of the pool can be flown with {plan}")
+
+
+def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], realism: Realism) -> Setting:
+    """Return a setting; with a wheel where a kind needs one, and in a share of the others."""
+    setting = draw_setting(rng, rig, realism)
+    if any(kind.other for kind in kinds) or (realism.wheels and rng.uniform() < realism.wheels):
+        return with_other(rng, setting)
+    return setting
 
 
 def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from coupled.blind.twin.setting import Conditions
+from coupled.blind.twin.conditions import Conditions
 
 
 @dataclass(frozen=True)

@@ -123,6 +123,7 @@ def twin_frame(
     parameters: NDArray[np.void],
     state: NDArray[np.void],
     nodes: Floats,
+    others: Floats,
     row: Floats,
     k: int,
     pressure: float,
@@ -131,7 +132,7 @@ def twin_frame(
     """Run frame k; return the surface command about trim.
 
     parameters, state  shape (1,)
-    nodes              shape (frames·NODES + 1,): the pilot's force, N
+    nodes, others      shape (frames·NODES + 1,): the pilot's force, and that on another control, N
     row                shape (7,): F, δc, δ, δ̂, G_T, F_mod, q̄; comes holding their noise
     `pressure` is q̄ in Pa, `load_factor` +1 in level flight.
     """
@@ -162,7 +163,10 @@ def twin_frame(
     for step in range(STEPS):
         at = k * NODES + (step + 0.5) * NODES / STEPS
         before = s.x
-        step_loader(p, s, _force(nodes, at - late) + constant, time + (step + 0.5) * h, h)
+        pull = _force(nodes, at - late) + constant
+        if p.crosstalk != 0.0:
+            pull += p.crosstalk * _force(others, at - late)
+        step_loader(p, s, pull, time + (step + 0.5) * h, h)
         step_servo(p, s, before, s.x, h)
         half = 0.5 * NODES / STEPS
         step_structure(p, s, _force(nodes, at - half), _force(nodes, at + half), h)

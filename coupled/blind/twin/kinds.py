@@ -70,7 +70,8 @@ class Kind:
     """An effect or an outsider: its stage, its sizes, and how it enters the twin.
 
     `least` and `most` bound the size, which the residual grows with; equal for a switch.
-    `shows` is the stage whose residual it widens, where that is not its own.
+    `shows` is the stage whose residual it widens, where that is not its own; `other` says that it
+    needs another control's force.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Kind:
     install: Install
     flown: bool = False
     shows: str = ""
+    other: bool = False
 
     @property
     def widens(self) -> str:

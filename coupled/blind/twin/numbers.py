@@ -63,6 +63,7 @@ class TwinParameters(Protocol):
     relaxing: float  # stiffness of a spring in series with a damper, N/m
     relaxing_s: float
     force_limit: float  # of the modification, N
+    crosstalk: float  # share of another control's force that reaches the loader
     bob_weight: float
     offset: float
     delay: float

@@ -61,6 +61,11 @@ def _force_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"limit_N": limit}
 
 
+def _crosstalk(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(crosstalk=draw.side * size)
+    return {"factor": draw.side * size}
+
+
 def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     """Give what bends a mass: a lightly damped mode of 2/size hertz."""
     bend = clean.loader.bend or STIFF_BEND_m_per_N * size
@@ -137,6 +142,7 @@ REVISION_2 = (
     Kind("friction_ripple", "loader", 0.05, 15.0, _ripple),
     Kind("relaxation", "loader", 0.002, 1.0, _relaxation),
     Kind("force_limit", "loader", 0.05, 2.5, _force_limit),
+    Kind("crosstalk", "loader", 5e-4, 0.5, _crosstalk, other=True),
     Kind("structural_mode", "linkage", 0.03, 0.7, _mode),
     Kind("bend_hysteresis", "linkage", 0.01, 0.8, _bend_hysteresis),
     Kind("soft_backlash", "linkage", 2e-5, 4e-3, _soft_backlash),
@@ -147,5 +153,5 @@ REVISION_2 = (
     Kind("force_skew", "sensing", 0.001, 0.15, _force_skew),
     Kind("motion_skew", "sensing", 0.001, 0.3, _motion_skew, flown=True, shows="airframe"),
     Kind("mains_hum", "sensing", 1e-5, 3e-3, _hum),
-    Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped),
+    Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped, shows="schedule"),
 )

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from coupled.blind.twin.conditions import PLAIN, Conditions, Realism
 from coupled.blind.twin.excitation import bench_pressure, pilot_force, pilot_shape
+from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.twin import RIG_CHANNELS, Bristles, LostError, fly_twin, nominal_twin
+from coupled.blind.twin.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
+
+OTHER_FORCE = "wheel_force_N"
 
 # Standard deviation of each channel's white noise on a rig of middling care, and the digits
 # after the point that its logger writes.
@@ -36,80 +39,13 @@ NOISE = {
     "pitch_rad": (2e-4, 6),
     "true_airspeed_m_per_s": (0.05, 4),
     "altitude_m": (0.2, 3),
+    OTHER_FORCE: (0.15, 3),
 }
 GENTLER = 0.6  # factor on the pilot's force after an aircraft is lost
 TRIES = 8
 
 
-@dataclass(frozen=True)
-class Realism:
-    """What the rigs and loggers of a version have that the nominal rig does not say.
-
-    presliding_m    least and most of the length over which friction yields before it slips,
-                    drawn log-uniform; None for bristles of 0.3 to 1.5 μJ
-    coloured_noise  share of the records in which half of the channels have noise with a corner
-    corner_Hz       least and most of that corner, drawn log-uniform
-    skewed_clock    share of the records in which force or motion is stamped late
-    """
-
-    presliding_m: tuple[float, float] | None = None
-    coloured_noise: float = 0.0
-    corner_Hz: tuple[float, float] = (8.0, 40.0)
-    skewed_clock: float = 0.0
-
-
-PLAIN = Realism()
 SKEW_s = 5e-4  # the most by which a clock is skewed: settings, no effect
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What a record was made with, as its key says it.
-
-    level_N        of the pilot's force
-    noise          standard deviation of each channel's noise, SI
-    bristle_J      friction times the bristles' length, what a reversal gives back; of version 1
-    presliding_m   the bristles' length, where it is drawn by itself
-    elastic_share  of that length which bends before any of it slips
-    corner_Hz      of the channels whose noise is a first-order lag's and not white
-    force_skew_s, motion_skew_s  how late force and motion are stamped
-    """
-
-    duration_s: float
-    excitation: tuple[str, ...]
-    level_N: float
-    noise: Mapping[str, float]
-    bristle_J: float | None = None
-    presliding_m: float | None = None
-    elastic_share: float = 0.0
-    corner_Hz: Mapping[str, float] = field(default_factory=dict)
-    force_skew_s: float = 0.0
-    motion_skew_s: float = 0.0
-
-    @property
-    def bristles(self) -> Bristles:
-        """The bristles of the rig's friction."""
-        if self.bristle_J is not None:
-            return Bristles(energy_J=self.bristle_J)
-        return Bristles(self.presliding_m, elastic_share=self.elastic_share)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the conditions as the key has them."""
-        table: dict[str, Any] = {
-            "duration_s": self.duration_s,
-            "excitation": list(self.excitation),
-            "level_N": self.level_N,
-            "noise": dict(self.noise),
-        }
-        if self.bristle_J is not None:
-            return table | {"bristle_J": self.bristle_J}
-        return table | {
-            "presliding_m": self.presliding_m,
-            "elastic_share": self.elastic_share,
-            "corner_Hz": dict(self.corner_Hz),
-            "force_skew_s": self.force_skew_s,
-            "motion_skew_s": self.motion_skew_s,
-        }
 
 
 @dataclass(frozen=True)
@@ -130,12 +66,21 @@ class Flown:
 
 
 @dataclass(frozen=True)
+class Other:
+    """The force on the wheel, N: on the pilot's nodes, and its noise, shape (frames,)."""
+
+    nodes: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True)
 class Setting:
     """All of a trial but what is wrong with its rig.
 
     shape      of the pilot's force, in ±1, shape (frames·NODES + 1,)
     pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
     noise      shape (frames, channels without time), SI
+    other      the force on another control, where the record holds it
     """
 
     rig: Rig
@@ -144,6 +89,7 @@ class Setting:
     pressures: Floats | None
     noise: Floats
     conditions: Conditions
+    other: Other | None = None
 
     def gentler(self) -> Setting:
         """Return the setting with less force."""
@@ -165,6 +111,7 @@ class Setting:
         twin = nominal_twin(self.rig, self.conditions.bristles)
         twin.set(force_late=self.conditions.force_skew_s)
         twin.air.late_s = self.conditions.motion_skew_s
+        twin.others = None if self.other is None else self.other.nodes
         for name, factor in (tolerance or {}).items():
             twin.set(**{name: twin.get(name) * factor})
         found = []
@@ -173,7 +120,19 @@ class Setting:
             found.append(put.kind.install(twin, clean, put.size, put.draw))
         nodes = pilot_force(self.rig, self.shape, self.conditions.level_N)
         record = fly_twin(self.rig, twin, nodes, self.frames, self.pressures, self.noise)
+        if self.other is not None:
+            force = self.other.nodes[: self.frames * NODES : NODES] + self.other.noise
+            data = np.column_stack((record.data, force))
+            record = Record((*record.channels, OTHER_FORCE), data)
         return Flown(_logged(record), tuple(found))
+
+
+def with_other(rng: np.random.Generator, setting: Setting) -> Setting:
+    """Return the setting with a wheel beside the column: pushes at its rim, and their noise."""
+    shape, _ = pilot_shape(rng, setting.frames, setting.rig.frame_rate)
+    level_N = _log_uniform(rng, 10.0, 60.0)
+    noise = NOISE[OTHER_FORCE][0] * rng.standard_normal(setting.frames)
+    return replace(setting, other=Other(level_N * shape, noise))
 
 
 def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -> Setting:

@@ -80,10 +80,14 @@ class Air:
 
 @dataclass
 class Twin:
-    """A real rig: the kernel's numbers, shape (1,), and its air."""
+    """A real rig: the kernel's numbers, shape (1,), its air, and the force on another control.
+
+    `others` is that force on the nodes of the pilot's, N; None where the rig has no other control.
+    """
 
     numbers: NDArray[np.void]
     air: Air = field(default_factory=Air)
+    others: Floats | None = None
 
     def set(self, **values: float) -> None:
         """Set numbers by their names."""
@@ -180,14 +184,15 @@ def fly_twin(
     rows = noise[:, :7].copy()
     state = np.zeros(1, TWIN_STATE)
     time = np.arange(frames) / rig.frame_rate
-    kernel = bound(twin_frame, twin.numbers, state, nodes, rows[0], 0, 1.0, 1.0)
+    others = np.zeros_like(nodes) if twin.others is None else twin.others
+    kernel = bound(twin_frame, twin.numbers, state, nodes, others, rows[0], 0, 1.0, 1.0)
     if pressures is not None:
         for k in range(frames):
-            kernel(twin.numbers, state, nodes, rows[k], k, float(pressures[k]), 1.0)
+            kernel(twin.numbers, state, nodes, others, rows[k], k, float(pressures[k]), 1.0)
         return Record(("time_s", *RIG_CHANNELS), np.column_stack((time, rows)))
     assert rig.flight is not None
     motions = _stamped(
-        _fly(rig, twin, nodes, rows, kernel, state), twin.air.late_s * rig.frame_rate
+        _fly(rig, twin, (nodes, others), rows, kernel, state), twin.air.late_s * rig.frame_rate
     )
     motions[:, 1:] += noise[:, 7:]
     data = np.column_stack((time, rows, motions[:, 1:]))
@@ -214,7 +219,7 @@ def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
 def _fly(
     rig: Rig,
     twin: Twin,
-    nodes: Floats,
+    forces: tuple[Floats, Floats],
     rows: Floats,
     kernel: Callable[..., float],
     state: NDArray[np.void],
@@ -239,7 +244,7 @@ def _fly(
         if abs(motion[ALPHA] - start[ALPHA]) > 0.22 or motion[SPEED] < 0.7 * start[SPEED]:
             raise LostError
         motions.append(motion)
-        command = kernel(twin.numbers, state, nodes, rows[k], k, motion[PRESSURE], motion[LOAD])
+        command = kernel(twin.numbers, state, *forces, rows[k], k, motion[PRESSURE], motion[LOAD])
         commands[k] = command
         if moment is not None:
             change = [now - then for now, then in zip(motion, start, strict=True)]
