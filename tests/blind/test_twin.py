@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.measure import stage_gaps
 from coupled.blind.trials.rigs import random_rig
 from coupled.blind.twin.effects import EFFECTS, dryden
@@ -17,8 +15,16 @@ from coupled.blind.twin.excitation import SHAPES, pilot_force, pilot_shape
 from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
-from coupled.blind.twin.setting import NOISE, Installed, Setting, draw_setting, fly_clean
-from coupled.blind.twin.twin import Twin, airframe, fly_twin, nominal_twin
+from coupled.blind.twin.revision2 import REVISION_2
+from coupled.blind.twin.setting import (
+    NOISE,
+    Installed,
+    Setting,
+    draw_setting,
+    fly_clean,
+    with_other,
+)
+from coupled.blind.twin.twin import STIFF, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
@@ -26,31 +32,9 @@ from coupled.gap.library import BY_NAME
 from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+from tests.support.twin import POOL, STEP_N, alone, plain, stepped
 
-Floats = NDArray[np.float64]
-POOL = read_deck(1).rigs
-STEP_N = 20.0
-
-
-def alone(rig: Rig, twin: Twin, force: Floats, pressure_Pa: float = 0.0) -> Record:
-    """Return a noiseless bench record."""
-    frames = (len(force) - 1) // NODES
-    pressures = np.full(frames, pressure_Pa)
-    return fly_twin(rig, twin, force, frames, pressures, np.zeros((frames, 7)))
-
-
-def plain() -> tuple[Rig, Twin]:
-    """Return a rigid bench, q̄ = 0: mass, spring and damper, and no preload."""
-    rig = POOL["bench-rigid"]
-    twin = nominal_twin(rig)
-    twin.set(breakout=0.0, host_breakout=0.0)
-    return rig, twin
-
-
-def stepped(seconds: float, size_N: float = STEP_N) -> Floats:
-    nodes = np.full(round(seconds * 120) * NODES + 1, size_N)
-    nodes[0] = 0.0
-    return nodes
+ALL_EFFECTS = (*EFFECTS, *REVISION_2)
 
 
 def test_a_step_answers_as_mass_spring_and_damper_do() -> None:
@@ -184,9 +168,8 @@ def test_drawn_rigs_can_be_flown_and_written() -> None:
 
 
 def test_every_effect_of_the_library_has_its_twin() -> None:
-    kinds = {kind.name: kind for kind in EFFECTS}
+    kinds = {kind.name: kind for kind in ALL_EFFECTS}
     assert set(BY_NAME) <= set(kinds)
-    assert not set(kinds) & {kind.name for kind in OUTSIDERS}
     for name, effect in BY_NAME.items():
         assert kinds[name].stage == effect.stage
     stages = [kind.stage for kind in OUTSIDERS]
@@ -194,11 +177,12 @@ def test_every_effect_of_the_library_has_its_twin() -> None:
         assert stages.count(stage) >= 2
 
 
-@pytest.mark.parametrize("kind", [*EFFECTS, *OUTSIDERS], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", [*ALL_EFFECTS, *OUTSIDERS], ids=lambda kind: kind.name)
 def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     name = "c172p-compensated" if kind.flown else "bench-compensated"
     rig = POOL[name]
-    begun = fly_clean(_short(rig))
+    setting = _short(rig)
+    begun = fly_clean(with_other(np.random.default_rng(3), setting) if kind.other else setting)
     assert begun is not None
     setting, clean = begun
     size = (kind.least * kind.most) ** 0.5 if kind.least < kind.most else kind.most
@@ -207,7 +191,7 @@ def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     record, [values] = flown.record, flown.parameters
     assert any(np.any(record[c] != clean.record[c]) for c in record.channels)
     assert all(np.isfinite(v) for v in values.values())
-    if kind.name in BY_NAME:
+    if kind.name in BY_NAME and kind in ALL_EFFECTS:
         wanted = {p.name.format(d="m") for p in BY_NAME[kind.name].free}
         assert wanted - set(values) <= {"stribeck_m_per_s"}  # fitted too, in no key
     assert np.all(np.isfinite(record.data))
@@ -225,7 +209,7 @@ def test_a_clean_record_tells_its_own_measures() -> None:
     rig = POOL["bench-rigid"]
     t = np.arange(1200) / 120
     data = np.column_stack((t, 3.0 * t))
-    clean = Clean(rig, Record(("time_s", "column_computed_m"), data), 1e-6)
+    clean = Clean(rig, Record(("time_s", "column_computed_m"), data), STIFF)
     assert clean.seconds == pytest.approx(10.0)
     assert clean.speed("column_computed_m") == pytest.approx(3.0)
     assert clean.spread("column_computed_m") == pytest.approx(0.96 * 30.0, rel=0.01)

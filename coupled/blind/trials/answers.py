@@ -69,15 +69,21 @@ class Answer:
         Where another effect is the same law on this record, naming just these two is exact.
         """
         if self.verdict == "effect":
-            return frozenset(self.found) == self.truth.names
+            return self.names_right
         alike = frozenset(self.truth.alike)
         return bool(alike) and self.contains and self.possible == self.truth.names | alike
+
+    @property
+    def names_right(self) -> bool:
+        """Whether it names what is there, and beyond that only what the rig has besides."""
+        names = self.truth.names
+        return names <= frozenset(self.found) <= names | frozenset(self.truth.also)
 
     @property
     def contains(self) -> bool:
         """Whether it is exact, or names no more than it holds possible, the truth among them."""
         if self.verdict == "effect":
-            return frozenset(self.found) == self.truth.names
+            return self.names_right
         ambiguous = self.verdict == "ambiguous" and self.truth.names <= self.possible
         return ambiguous and len(self.found) == len(self.truth.names)
 

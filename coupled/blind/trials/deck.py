@@ -12,16 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from coupled.blind.twin.conditions import PLAIN, Realism
 from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
+from coupled.blind.twin.revision2 import REVISION_2
 from coupled.errors import InputError, nearest
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 VERSIONS = Path(__file__).parent / "versions"
-KNOWN = (1,)
+KNOWN = (1, 2)
 DEFAULT = 1  # the version that scores are of
 
 
@@ -33,6 +35,7 @@ class Deck:
     effects: tuple[Kind, ...]
     outsiders: tuple[Kind, ...]
     rigs: Mapping[str, Rig]
+    realism: Realism = PLAIN
 
     def kinds(self, category: str) -> tuple[Kind, ...]:
         """Return what a trial of a category may have."""
@@ -51,12 +54,28 @@ def read_deck(version: int) -> Deck:
     folder = VERSIONS / f"v{version}"
     path = folder / "deck.toml"
     table = load_toml(path)
-    rigs = {str(name): read_rig(folder / "rigs" / f"{name}.toml") for name in table["rigs"]}
+    homes = VERSIONS / str(table.get("rigs_of", folder.name)) / "rigs"
+    rigs = {str(name): read_rig(homes / f"{name}.toml") for name in table["rigs"]}
     return Deck(
         version,
-        _chosen(path, "effects", table, EFFECTS),
+        _chosen(path, "effects", table, (*EFFECTS, *REVISION_2)),
         _chosen(path, "outsiders", table, OUTSIDERS),
         rigs,
+        _realism(table.get("realism")),
+    )
+
+
+def _realism(table: Mapping[str, Any] | None) -> Realism:
+    if table is None:
+        return PLAIN
+    least, most = table["presliding_m"]
+    low, high = table["corner_Hz"]
+    return Realism(
+        presliding_m=(least, most),
+        coloured_noise=table["coloured_noise"],
+        corner_Hz=(low, high),
+        skewed_clock=table["skewed_clock"],
+        wheels=table["wheels"],
     )
 
 

@@ -91,6 +91,8 @@ def score(answers: Sequence[Answer]) -> Score:
 
 
 def _alarm(answer: Answer) -> bool:
+    if answer.verdict == "effect" and answer.found:
+        return not answer.names_right
     return answer.verdict not in ("no_gap", MISSING, "refused")
 
 

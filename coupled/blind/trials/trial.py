@@ -12,8 +12,15 @@ from coupled.blind.trials.deck import Deck
 from coupled.blind.trials.measure import alike, stage_gaps
 from coupled.blind.trials.rigs import DRAWN
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
+from coupled.blind.twin.conditions import Realism
 from coupled.blind.twin.kinds import Clean, Draw, Kind
-from coupled.blind.twin.setting import Installed, Setting, draw_setting, fly_clean
+from coupled.blind.twin.setting import (
+    Installed,
+    Setting,
+    draw_setting,
+    fly_clean,
+    with_other,
+)
 from coupled.blind.twin.twin import LostError
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -101,13 +108,21 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
             known = deck.kinds(plan.category)
             kinds = [known[i] for i in rng.choice(len(known), len(kinds), replace=False)]
         rig = _choose_rig(rng, kinds, pool)
-        begun = fly_clean(draw_setting(rng, rig)) if rig else None
+        begun = fly_clean(_set(rng, rig, kinds, deck.realism)) if rig else None
         if begun is None:
             continue
         trial = _flown(rng, plan, kinds, *begun)
         if trial is not None:
             return trial
     raise AssertionError(f"no rig of the pool can be flown with {plan}")
+
+
+def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], realism: Realism) -> Setting:
+    """Return a setting; with a wheel where a kind needs one, and in a share of the others."""
+    setting = draw_setting(rng, rig, realism)
+    if any(kind.other for kind in kinds) or (realism.wheels and rng.uniform() < realism.wheels):
+        return with_other(rng, setting)
+    return setting
 
 
 def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig | None:
@@ -126,7 +141,7 @@ def _flown(
     """Return the trial in its setting, or None where its kinds cannot be made as wide as wanted."""
     if plan.category == "none":
         return _without(rng, setting)
-    bare = stage_gaps(clean.rig, clean.record, any(k.stage == "airframe" for k in kinds))
+    bare = stage_gaps(clean.rig, clean.record, any(k.widens == "airframe" for k in kinds))
     parts = []
     for kind in kinds:
         part = _part(rng, plan, kind, setting, clean, bare)
@@ -138,9 +153,9 @@ def _flown(
     except LostError:
         return None
     sizes = Sizes(
-        clean_gap={kind.stage: bare[kind.stage] for kind in kinds},
+        clean_gap={kind.widens: bare[kind.widens] for kind in kinds},
         alone=tuple(part.gap for part in parts),
-        ratio=min(part.gap / bare[part.put.kind.stage] for part in parts),
+        ratio=min(part.gap / bare[part.put.kind.widens] for part in parts),
     )
     truth = Truth(
         plan.category,
@@ -152,6 +167,7 @@ def _flown(
         stages=tuple(sorted({kind.stage for kind in kinds})),
         gap=stage_gaps(setting.rig, flown.record),
         sizes=sizes,
+        also=_also(setting),
         conditions=setting.conditions,
     )
     if plan.category == "single":
@@ -165,14 +181,14 @@ def _part(
     rng: Rng, plan: Plan, kind: Kind, setting: Setting, clean: Clean, bare: Mapping[str, float]
 ) -> _Sized | None:
     """Return a kind at a size that makes it as wide as its category wants, or None."""
-    if kind.stage not in bare:  # a gradient that never changes shows nothing of its schedule
+    if kind.widens not in bare:  # a gradient that never changes shows nothing of its schedule
         return None
     clear = plan.category in ("pair", "outsider")
     low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
     wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     shares = (float(rng.uniform()), float(rng.uniform()), float(rng.uniform()))
     draw = Draw(float(rng.choice([-1.0, 1.0])), shares, int(rng.integers(2**31)))
-    sized = _sized(setting, clean, kind, draw, wanted, bare[kind.stage])
+    sized = _sized(setting, clean, kind, draw, wanted, bare[kind.widens])
     if sized is None or (clear and not CLEAR <= sized.gap <= CLEAREST):
         return None
     return sized
@@ -193,9 +209,16 @@ def _without(rng: Rng, setting: Setting) -> Trial | None:
         setting.rig.name,
         gap=stage_gaps(setting.rig, record),
         tolerance=tolerance,
+        also=_also(setting),
         conditions=setting.conditions,
     )
     return Trial(setting.rig, record, truth)
+
+
+def _also(setting: Setting) -> tuple[str, ...]:
+    """Return what the rig has beside its category: friction that yields, in the later versions."""
+    dry = setting.rig.controls["column"].loader.friction > 0.0
+    return ("presliding_friction",) if dry and setting.conditions.presliding_m else ()
 
 
 def _lacking(rng: Rng, trial: Trial) -> Trial:
@@ -222,7 +245,7 @@ def _sized(
         except LostError:
             size = max(kind.least, 0.4 * size)
             continue
-        gap = stage_gaps(setting.rig, record, kind.stage == "airframe")[kind.stage]
+        gap = stage_gaps(setting.rig, record, kind.widens == "airframe")[kind.widens]
         excess = math.sqrt(max(gap**2 - bare**2, 0.01))
         off = abs(math.log(wanted / excess))
         if off < miss:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from coupled.blind.twin.setting import Conditions
+from coupled.blind.twin.conditions import Conditions
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class Truth:
     gap         each stage's residual over its floor under the nominal rig
     missing     channels that were taken out
     alike       effects that are the same law on this record; of a single
+    also        what the rig has besides and the nominal one lacks; naming it is not wrong
     tolerance   factors on numbers that are off within their setting, which is no effect
     sizes       None where the rig has nothing
     conditions  what the record was made with
@@ -67,6 +68,7 @@ class Truth:
     gap: Mapping[str, float] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     alike: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = field(default_factory=dict)
     sizes: Sizes | None = None
     conditions: Conditions | None = None
@@ -95,6 +97,8 @@ class Truth:
         }
         if self.category == "single":
             table["alike"] = list(self.alike)
+        if self.also:
+            table["also"] = list(self.also)
         if self.category == "none":
             table["tolerance"] = dict(self.tolerance)
         if self.sizes is not None:
@@ -126,6 +130,7 @@ def truth_from(table: Mapping[str, Any]) -> Truth:
         gap=dict(table["gap"]),
         missing=tuple(map(str, table["missing"])),
         alike=tuple(map(str, table.get("alike", ()))),
+        also=tuple(map(str, table.get("also", ()))),
         tolerance=dict(table.get("tolerance", {})),
         sizes=sizes,
         conditions=conditions,

@@ -39,7 +39,7 @@ def _added(field: str, name: str, signed: bool = False) -> Install:
 
 def _coulomb(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     running = clean.loader.friction + size
-    set_friction(twin, running, clean.loader.breakaway, clean.loader.stribeck_rate, clean.bristle_J)
+    set_friction(twin, running, clean.loader.breakaway, clean.loader.stribeck_rate, clean.bristles)
     return {"friction_N": size}
 
 
@@ -47,7 +47,7 @@ def _stribeck(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     more = size * (0.3 + 0.5 * draw.u[0])
     running = clean.loader.friction + more
     breakaway = running + size * (0.6 + 1.4 * draw.u[1])
-    set_friction(twin, running, breakaway, 0.001 * 6.0 ** draw.u[2], clean.bristle_J)
+    set_friction(twin, running, breakaway, 0.001 * 6.0 ** draw.u[2], clean.bristles)
     return {"friction_N": more, "breakaway_N": breakaway}
 
 

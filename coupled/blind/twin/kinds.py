@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupled.blind.twin.twin import Twin
+from coupled.blind.twin.twin import Bristles, Twin
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
 from coupled.rig.parameters import Loader
@@ -29,7 +29,7 @@ class Clean:
 
     rig: Rig
     record: Record
-    bristle_J: float
+    bristles: Bristles
 
     @property
     def loader(self) -> Loader:
@@ -70,6 +70,8 @@ class Kind:
     """An effect or an outsider: its stage, its sizes, and how it enters the twin.
 
     `least` and `most` bound the size, which the residual grows with; equal for a switch.
+    `shows` is the stage whose residual it widens, where that is not its own; `other` says that it
+    needs another control's force.
     """
 
     name: str
@@ -78,6 +80,13 @@ class Kind:
     most: float
     install: Install
     flown: bool = False
+    shows: str = ""
+    other: bool = False
+
+    @property
+    def widens(self) -> str:
+        """The stage whose residual it widens."""
+        return self.shows or self.stage
 
     def suits(self, rig: Rig) -> bool:
         """Tell whether the rig can have it."""

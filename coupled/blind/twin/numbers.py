@@ -35,6 +35,15 @@ class TwinParameters(Protocol):
     estimate_bend: float  # K̂ in δ̂; 0 without deflection compensation
     digital: int
     deflection_scale: float
+    scale_drift: float  # of δc as read, share a second
+    tone: float  # of δc as read, m
+    tone_rate: float  # rad/s
+    tone_phase: float
+    force_scale: float  # of F as read
+    force_zero: float  # N
+    force_late: float  # F as recorded, s
+    missed_share: float  # of the host's frames
+    missed_seed: float
     gauge_loop: float  # outsider: N of hysteresis in the gauge
     loop_yield: float  # N over which a hysteresis saturates
     # loader
@@ -48,13 +57,20 @@ class TwinParameters(Protocol):
     stribeck_rate: float
     bristle: float  # stiffness σ₀, N/m
     bristle_damping: float  # σ₁, N·s/m
+    elastic_share: float  # of the bristles' length, bent before any of it slips; 0 for LuGre's
+    pull_friction: float  # N more in motion aft, and forward
+    push_friction: float
+    relaxing: float  # stiffness of a spring in series with a damper, N/m
+    relaxing_s: float
+    force_limit: float  # of the modification, N
+    crosstalk: float  # share of another control's force that reaches the loader
     bob_weight: float
     offset: float
     delay: float
     modifying_lag: float  # s, of F_mod on its way to the loader
     travel: float
-    load_friction: float  # outsider: N of friction per N of force
-    cog_force: float  # outsider: periodic in δc
+    load_friction: float  # N of friction per N of force
+    cog_force: float  # periodic in δc, N
     cog_pitch: float
     quadratic_damping: float  # outsider: N·s²/m²
     second_mass: float  # outsider: a mass on a spring on the loader
@@ -71,6 +87,13 @@ class TwinParameters(Protocol):
     bend: float
     bend_limit: float
     arc: float
+    mode_rate: float  # of the structure that bends, rad/s; 0 without mass
+    mode_ratio: float
+    bend_share: float  # of the bend, through a play of the force
+    bend_width: float  # of that play, full, N
+    contact: float  # stiffness of the contact in the play, N/m; 0 for a hard one
+    contact_s: float  # its damping over its stiffness
+    deflection_zero: float  # m
     bend_loop: float  # outsider: m of hysteresis
     bend_uneven: float  # outsider: m/N more for a pull, less for a push
     read_square: float  # outsider: 1/m
@@ -98,6 +121,14 @@ class TwinState(Protocol):
     x: float
     v: float
     z: float  # the bristles
+    relaxed: float  # the relaxing spring's force
+    bent: float  # the structure's mode
+    bent_v: float
+    carried: float  # the force behind the bend's play
+    touch: float  # grip against servo, in a contact that yields
+    random: float  # of missed frames, in 0 to 1
+    last_gradient: float  # what the host holds over a missed frame
+    last_estimate: float
     second_x: float
     second_v: float
     servo: float

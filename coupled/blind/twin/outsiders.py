@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from coupled.blind.twin.kinds import ALPHA, RATE, SPEED, Clean, Draw, Install, Kind
-from coupled.blind.twin.twin import Twin
+from coupled.blind.twin.twin import Twin, set_bristles
 
 Found = dict[str, float]
 
@@ -23,9 +23,8 @@ def _plain(field: str, name: str) -> Install:
 
 def _load_friction(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     level = size * clean.peak("column_force_N") + clean.loader.friction
-    bristle = level**2 / clean.bristle_J
-    twin.set(load_friction=size, bristle=bristle)
-    twin.set(bristle_damping=0.3 * math.sqrt(bristle * twin.get("mass")))
+    twin.set(load_friction=size)
+    set_bristles(twin, level, clean.bristles)
     return {"share": size}
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
+from coupled.blind.twin.conditions import PLAIN, Conditions, Realism
 from coupled.blind.twin.excitation import bench_pressure, pilot_force, pilot_shape
+from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.twin import RIG_CHANNELS, LostError, fly_twin, nominal_twin
 from coupled.record.channels import LONGITUDINAL
@@ -17,6 +19,8 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
+
+OTHER_FORCE = "wheel_force_N"
 
 # Standard deviation of each channel's white noise on a rig of middling care, and the digits
 # after the point that its logger writes.
@@ -35,35 +39,13 @@ NOISE = {
     "pitch_rad": (2e-4, 6),
     "true_airspeed_m_per_s": (0.05, 4),
     "altitude_m": (0.2, 3),
+    OTHER_FORCE: (0.15, 3),
 }
 GENTLER = 0.6  # factor on the pilot's force after an aircraft is lost
 TRIES = 8
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """What a record was made with, as its key says it.
-
-    level_N    of the pilot's force
-    noise      standard deviation of each channel's noise, SI
-    bristle_J  friction times the bristles' length: what a reversal gives back
-    """
-
-    duration_s: float
-    excitation: tuple[str, ...]
-    level_N: float
-    noise: Mapping[str, float]
-    bristle_J: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the conditions as the key has them."""
-        return {
-            "duration_s": self.duration_s,
-            "excitation": list(self.excitation),
-            "level_N": self.level_N,
-            "noise": dict(self.noise),
-            "bristle_J": self.bristle_J,
-        }
+SKEW_s = 5e-4  # the most by which a clock is skewed: settings, no effect
 
 
 @dataclass(frozen=True)
@@ -84,12 +66,21 @@ class Flown:
 
 
 @dataclass(frozen=True)
+class Other:
+    """The force on the wheel, N: on the pilot's nodes, and its noise, shape (frames,)."""
+
+    nodes: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True)
 class Setting:
     """All of a trial but what is wrong with its rig.
 
     shape      of the pilot's force, in ±1, shape (frames·NODES + 1,)
     pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
     noise      shape (frames, channels without time), SI
+    other      the force on another control, where the record holds it
     """
 
     rig: Rig
@@ -98,6 +89,7 @@ class Setting:
     pressures: Floats | None
     noise: Floats
     conditions: Conditions
+    other: Other | None = None
 
     def gentler(self) -> Setting:
         """Return the setting with less force."""
@@ -116,7 +108,10 @@ class Setting:
         are factors on the twin's own numbers within their setting, which is no effect. Raises
         LostError where the aircraft leaves the envelope.
         """
-        twin = nominal_twin(self.rig, self.conditions.bristle_J)
+        twin = nominal_twin(self.rig, self.conditions.bristles)
+        twin.set(force_late=self.conditions.force_skew_s)
+        twin.air.late_s = self.conditions.motion_skew_s
+        twin.others = None if self.other is None else self.other.nodes
         for name, factor in (tolerance or {}).items():
             twin.set(**{name: twin.get(name) * factor})
         found = []
@@ -125,10 +120,22 @@ class Setting:
             found.append(put.kind.install(twin, clean, put.size, put.draw))
         nodes = pilot_force(self.rig, self.shape, self.conditions.level_N)
         record = fly_twin(self.rig, twin, nodes, self.frames, self.pressures, self.noise)
+        if self.other is not None:
+            force = self.other.nodes[: self.frames * NODES : NODES] + self.other.noise
+            data = np.column_stack((record.data, force))
+            record = Record((*record.channels, OTHER_FORCE), data)
         return Flown(_logged(record), tuple(found))
 
 
-def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
+def with_other(rng: np.random.Generator, setting: Setting) -> Setting:
+    """Return the setting with a wheel beside the column: pushes at its rim, and their noise."""
+    shape, _ = pilot_shape(rng, setting.frames, setting.rig.frame_rate)
+    level_N = _log_uniform(rng, 10.0, 60.0)
+    noise = NOISE[OTHER_FORCE][0] * rng.standard_normal(setting.frames)
+    return replace(setting, other=Other(level_N * shape, noise))
+
+
+def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -> Setting:
     """Return a setting drawn for a rig: 20 to 60 s of a pilot's work, and noise."""
     frames = round(rng.uniform(20.0, 60.0) * rig.frame_rate)
     shape, shapes = pilot_shape(rng, frames, rig.frame_rate)
@@ -146,15 +153,52 @@ def draw_setting(rng: np.random.Generator, rig: Rig) -> Setting:
     factors = factors * np.ones(len(names))
     sigma = np.array([NOISE[name][0] for name in names]) * factors
     noise = rng.standard_normal((frames, len(names))) * sigma
-    bristle = float(np.exp(rng.uniform(np.log(3e-7), np.log(1.5e-6))))
     conditions = Conditions(
         duration_s=frames / rig.frame_rate,
         excitation=tuple(shapes),
         level_N=level,
         noise={n: float(s) for n, s in zip(names, sigma, strict=True) if s > 0.0},
-        bristle_J=bristle,
     )
+    if realism.presliding_m is None:
+        energy_J = _log_uniform(rng, 3e-7, 1.5e-6)
+        conditions = replace(conditions, bristle_J=energy_J)
+        return Setting(rig, shape, frames, pressures, noise, conditions)
+    conditions = replace(
+        conditions,
+        presliding_m=_log_uniform(rng, *realism.presliding_m),
+        elastic_share=float(rng.uniform(0.05, 0.8)),
+    )
+    if rng.uniform() < realism.coloured_noise:
+        corners = {n: _log_uniform(rng, *realism.corner_Hz) for n in names if rng.uniform() < 0.5}
+        for i, name in enumerate(names):
+            if name in corners:
+                noise[:, i] = coloured(noise[:, i], corners[name], rig.frame_rate)
+        conditions = replace(conditions, corner_Hz=corners)
+    if rng.uniform() < realism.skewed_clock:
+        late = float(rng.uniform(0.0, SKEW_s))
+        of_force = rig.flight is None or rng.uniform() < 0.5
+        conditions = replace(
+            conditions,
+            force_skew_s=late if of_force else 0.0,
+            motion_skew_s=0.0 if of_force else late,
+        )
     return Setting(rig, shape, frames, pressures, noise, conditions)
+
+
+def coloured(white: Floats, corner_Hz: float, frame_rate_Hz: float) -> Floats:
+    """Return noise of the same standard deviation, its spectrum falling beyond a corner.
+
+    A first-order lag, x[k] = a·x[k − 1] + √(1 − a²)·white[k], a = e^(−2π·corner/rate), begun in
+    its steady state; so neighbours correlate by a.
+    """
+    a = float(np.exp(-2.0 * np.pi * corner_Hz / frame_rate_Hz))
+    gain = np.sqrt(1.0 - a * a)
+    start = [(1.0 - gain) * white[0]] if len(white) else [0.0]
+    return np.asarray(lfilter([gain], [1.0, -a], white, zi=start)[0])
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def channels(rig: Rig) -> tuple[str, ...]:
@@ -170,7 +214,7 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
         except LostError:
             setting = setting.gentler()
             continue
-        return setting, Clean(setting.rig, record, setting.conditions.bristle_J)
+        return setting, Clean(setting.rig, record, setting.conditions.bristles)
     return None
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from coupled.blind.twin.kernel import twin_frame
 from coupled.blind.twin.numbers import KNOTS, TWIN_PARAMETERS, TWIN_STATE
@@ -41,26 +42,52 @@ RIG_CHANNELS = (
 )
 
 
+@dataclass(frozen=True)
+class Bristles:
+    """How friction yields before it slips: by a length, or by what a reversal gives back.
+
+    travel_m       the bristles' length, m; where it is None,
+    energy_J       friction times that length
+    elastic_share  of the length that bends before any of it slips; 0 for LuGre's
+    """
+
+    travel_m: float | None = None
+    energy_J: float = 1e-6
+    elastic_share: float = 0.0
+
+    def stiffness(self, level_N: float) -> float:
+        """Return the bristles' stiffness for a friction, N/m."""
+        if self.travel_m is None:
+            return level_N**2 / self.energy_J
+        return level_N / self.travel_m
+
+
 @dataclass
 class Air:
     """What the air and the airframe do beyond the model.
 
     `gust` is the air's upward speed, m/s a frame; `moment` makes a command, added at the
     airframe but not seen at the surface, from time in s and the change of motion since trim.
+    `late_s` is how late the motion is stamped against all other channels.
     """
 
     effectiveness: float = 1.0
     damping: float = 1.0
     gust: Floats | None = None
     moment: Callable[[float, Sequence[float]], float] | None = None
+    late_s: float = 0.0
 
 
 @dataclass
 class Twin:
-    """A real rig: the kernel's numbers, shape (1,), and its air."""
+    """A real rig: the kernel's numbers, shape (1,), its air, and the force on another control.
+
+    `others` is that force on the nodes of the pilot's, N; None where the rig has no other control.
+    """
 
     numbers: NDArray[np.void]
     air: Air = field(default_factory=Air)
+    others: Floats | None = None
 
     def set(self, **values: float) -> None:
         """Set numbers by their names."""
@@ -77,11 +104,11 @@ def first_order(lag_s: float, step_s: float) -> float:
     return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0
 
 
-def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
-    """Return a twin of the rig's column without any effect; the host's K̂, G_B and F_BO as filed.
+STIFF = Bristles()
 
-    `bristle_J` is friction times the bristles' length: what a reversal gives back, J.
-    """
+
+def nominal_twin(rig: Rig, bristles: Bristles = STIFF) -> Twin:
+    """Return a twin of the rig's column without any effect; the host's K̂, G_B and F_BO as filed."""
     column = rig.controls["column"]
     loader, table, host = column.loader, column.schedule, column.compensation
     frame_s = 1.0 / rig.frame_rate
@@ -105,11 +132,12 @@ def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
         digital=loader.multiplier == "digital",
         deflection_scale=column.sensing.deflection_scale,
         loop_yield=1.0,
+        force_scale=1.0,
     )
     twin.set(mass=loader.mass, damping=loader.damping, basic_gradient=loader.basic_gradient)
     twin.set(cubic=loader.cubic, breakout=loader.breakout, bob_weight=loader.bob_weight)
     twin.set(offset=loader.offset, delay=loader.delay, travel=column.travel, cog_pitch=1.0)
-    set_friction(twin, loader.friction, loader.breakaway, loader.stribeck_rate, bristle_J)
+    set_friction(twin, loader.friction, loader.breakaway, loader.stribeck_rate, bristles)
     twin.set(modifying_lag=loader.modifying_lag)
     twin.set(servo_rate=2.0 * math.pi * loader.servo_frequency, play=loader.play)
     twin.set(servo_ratio=loader.servo_damping_ratio, servo_limit=loader.servo_rate_limit)
@@ -123,12 +151,18 @@ def nominal_twin(rig: Rig, bristle_J: float = 1e-6) -> Twin:
 
 
 def set_friction(
-    twin: Twin, running_N: float, breakaway_N: float, rate_m_per_s: float, bristle_J: float
+    twin: Twin, running_N: float, breakaway_N: float, rate_m_per_s: float, bristles: Bristles
 ) -> None:
-    """Set the twin's friction, and bristles short enough to give back `bristle_J` a reversal."""
+    """Set the twin's friction, and the bristles that it has."""
     level = max(running_N, breakaway_N)
-    stiffness = level**2 / bristle_J
-    twin.set(running=running_N, breakaway=level, stribeck_rate=rate_m_per_s, bristle=stiffness)
+    twin.set(running=running_N, breakaway=level, stribeck_rate=rate_m_per_s)
+    set_bristles(twin, level, bristles)
+
+
+def set_bristles(twin: Twin, level_N: float, bristles: Bristles) -> None:
+    """Set the stiffness and damping of bristles that carry a friction of `level_N`."""
+    stiffness = bristles.stiffness(level_N)
+    twin.set(bristle=stiffness, elastic_share=bristles.elastic_share)
     twin.set(bristle_damping=0.3 * math.sqrt(stiffness * twin.get("mass")))
 
 
@@ -150,17 +184,31 @@ def fly_twin(
     rows = noise[:, :7].copy()
     state = np.zeros(1, TWIN_STATE)
     time = np.arange(frames) / rig.frame_rate
-    kernel = bound(twin_frame, twin.numbers, state, nodes, rows[0], 0, 1.0, 1.0)
+    others = np.zeros_like(nodes) if twin.others is None else twin.others
+    kernel = bound(twin_frame, twin.numbers, state, nodes, others, rows[0], 0, 1.0, 1.0)
     if pressures is not None:
         for k in range(frames):
-            kernel(twin.numbers, state, nodes, rows[k], k, float(pressures[k]), 1.0)
+            kernel(twin.numbers, state, nodes, others, rows[k], k, float(pressures[k]), 1.0)
         return Record(("time_s", *RIG_CHANNELS), np.column_stack((time, rows)))
     assert rig.flight is not None
-    motions = _fly(rig, twin, nodes, rows, kernel, state)
+    motions = _stamped(
+        _fly(rig, twin, (nodes, others), rows, kernel, state), twin.air.late_s * rig.frame_rate
+    )
     motions[:, 1:] += noise[:, 7:]
     data = np.column_stack((time, rows, motions[:, 1:]))
     assert BENCH_MOTION[0] == RIG_CHANNELS[-1]
     return Record(("time_s", *RIG_CHANNELS, *LONGITUDINAL[1:]), data)
+
+
+def _stamped(motions: Floats, late: float) -> Floats:
+    """Return the motion as recorded, stamped so many frames late; surface and q̄ are in time."""
+    if late == 0.0:
+        return motions
+    at = np.arange(len(motions), dtype=float)
+    moved = CubicSpline(at, motions)(np.maximum(at - late, 0.0))
+    kept = [LONGITUDINAL.index(name) for name in (BENCH_MOTION[0], "elevator_rad")]
+    moved[:, kept] = motions[:, kept]
+    return np.asarray(moved)
 
 
 def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
@@ -171,7 +219,7 @@ def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
 def _fly(
     rig: Rig,
     twin: Twin,
-    nodes: Floats,
+    forces: tuple[Floats, Floats],
     rows: Floats,
     kernel: Callable[..., float],
     state: NDArray[np.void],
@@ -196,7 +244,7 @@ def _fly(
         if abs(motion[ALPHA] - start[ALPHA]) > 0.22 or motion[SPEED] < 0.7 * start[SPEED]:
             raise LostError
         motions.append(motion)
-        command = kernel(twin.numbers, state, nodes, rows[k], k, motion[PRESSURE], motion[LOAD])
+        command = kernel(twin.numbers, state, *forces, rows[k], k, motion[PRESSURE], motion[LOAD])
         commands[k] = command
         if moment is not None:
             change = [now - then for now, then in zip(motion, start, strict=True)]

@@ -1,0 +1,81 @@
+"""What the records of a version are made with, and what one record was: the key says it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from coupled.blind.twin.twin import Bristles
+
+
+@dataclass(frozen=True)
+class Realism:
+    """What the rigs and loggers of a version have that the nominal rig does not say.
+
+    presliding_m    least and most of the length over which friction yields before it slips,
+                    drawn log-uniform; None for bristles of 0.3 to 1.5 μJ
+    coloured_noise  share of the records in which half of the channels have noise with a corner
+    corner_Hz       least and most of that corner, drawn log-uniform
+    skewed_clock    share of the records in which force or motion is stamped late
+    wheels          share of the records that hold the force on a wheel, too
+    """
+
+    presliding_m: tuple[float, float] | None = None
+    coloured_noise: float = 0.0
+    corner_Hz: tuple[float, float] = (8.0, 40.0)
+    skewed_clock: float = 0.0
+    wheels: float = 0.0
+
+
+PLAIN = Realism()
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a record was made with, as its key says it.
+
+    level_N        of the pilot's force
+    noise          standard deviation of each channel's noise, SI
+    bristle_J      friction times the bristles' length, what a reversal gives back; of version 1
+    presliding_m   the bristles' length, where it is drawn by itself
+    elastic_share  of that length which bends before any of it slips
+    corner_Hz      of the channels whose noise is a first-order lag's and not white
+    force_skew_s, motion_skew_s  how late force and motion are stamped
+    """
+
+    duration_s: float
+    excitation: tuple[str, ...]
+    level_N: float
+    noise: Mapping[str, float]
+    bristle_J: float | None = None
+    presliding_m: float | None = None
+    elastic_share: float = 0.0
+    corner_Hz: Mapping[str, float] = field(default_factory=dict)
+    force_skew_s: float = 0.0
+    motion_skew_s: float = 0.0
+
+    @property
+    def bristles(self) -> Bristles:
+        """The bristles of the rig's friction."""
+        if self.bristle_J is not None:
+            return Bristles(energy_J=self.bristle_J)
+        return Bristles(self.presliding_m, elastic_share=self.elastic_share)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the conditions as the key has them."""
+        table: dict[str, Any] = {
+            "duration_s": self.duration_s,
+            "excitation": list(self.excitation),
+            "level_N": self.level_N,
+            "noise": dict(self.noise),
+        }
+        if self.bristle_J is not None:
+            return table | {"bristle_J": self.bristle_J}
+        return table | {
+            "presliding_m": self.presliding_m,
+            "elastic_share": self.elastic_share,
+            "corner_Hz": dict(self.corner_Hz),
+            "force_skew_s": self.force_skew_s,
+            "motion_skew_s": self.motion_skew_s,
+        }

@@ -1,0 +1,157 @@
+"""The effects of the contract's second revision as the twin has them.
+
+Friction is in newtons above the nominal one, as `coulomb_friction` has it, here too; a bend is the
+real one, whole.
+"""
+
+from __future__ import annotations
+
+import math
+
+from coupled.blind.twin.kinds import Clean, Draw, Kind
+from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
+
+Found = dict[str, float]
+CONTACT_s = 2e-3  # damping over stiffness of a contact in the play
+STIFF_BEND_m_per_N = 1e-4  # what a rig that is filed as rigid bends, times the size
+
+
+def _presliding(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Add friction that yields over 50 to 500 μm."""
+    travel = 5e-5 * 10.0 ** draw.u[0]
+    bristles = Bristles(travel, elastic_share=clean.bristles.elastic_share or 0.3)
+    loader = clean.loader
+    running = loader.friction + size
+    set_friction(twin, running, loader.breakaway, loader.stribeck_rate, bristles)
+    return {"friction_N": size, "stiffness_N_per_m": twin.get("bristle")}
+
+
+def _asymmetric(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Add friction to one direction of motion, and up to six tenths of it to the other."""
+    less = 0.6 * draw.u[0] * size
+    pull, push = (size, less) if draw.side > 0.0 else (less, size)
+    twin.set(pull_friction=pull, push_friction=push)
+    set_bristles(twin, clean.loader.friction + 0.5 * (pull + push), clean.bristles)
+    return {"pull_N": pull, "push_N": push}
+
+
+def _load_friction(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(load_friction=size)
+    level = clean.loader.friction + size * clean.peak("column_force_N")
+    set_bristles(twin, level, clean.bristles)
+    return {"factor": size}
+
+
+def _ripple(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    period = clean.peak("column_computed_m") * (0.15 + 0.35 * draw.u[0])
+    twin.set(cog_force=size, cog_pitch=period)
+    return {"ripple_N": size, "period_m": period}
+
+
+def _relaxation(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    stiffness = size * clean.mean("column_gradient_N_per_m")
+    time = 0.1 * 30.0 ** draw.u[0]
+    twin.set(relaxing=stiffness, relaxing_s=time)
+    return {"stiffness_N_per_m": stiffness, "time_s": time}
+
+
+def _force_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    limit = max(clean.peak("column_modifying_force_N"), 0.1) * math.exp(0.3 - size)
+    twin.set(force_limit=limit)
+    return {"limit_N": limit}
+
+
+def _crosstalk(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(crosstalk=draw.side * size)
+    return {"factor": draw.side * size}
+
+
+def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Give what bends a mass: a lightly damped mode of 2/size hertz."""
+    bend = clean.loader.bend or STIFF_BEND_m_per_N * size
+    bend *= 1.0 + 0.2 * (draw.u[0] - 0.5)
+    frequency = 2.0 / size
+    twin.set(bend=bend, mode_rate=2.0 * math.pi * frequency, mode_ratio=0.03 + 0.05 * draw.u[1])
+    return {"bend_m_per_N": bend, "frequency_Hz": frequency}
+
+
+def _bend_hysteresis(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    bend = clean.loader.bend or STIFF_BEND_m_per_N * size
+    width = clean.peak("column_force_N") * (0.1 + 0.3 * draw.u[0])
+    twin.set(bend=bend, bend_share=size, bend_width=width)
+    return {"bend_m_per_N": bend, "share": size, "width_N": width}
+
+
+def _soft_backlash(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Hold the grip in its play by a contact that yields by 0.2 to 1 play at full force."""
+    stiffness = clean.peak("column_force_N") / (size * (0.2 + 0.8 * draw.u[0]))
+    twin.set(play=size, contact=stiffness, contact_s=CONTACT_s)
+    return {"play_m": size, "stiffness_N_per_m": stiffness}
+
+
+def _force_scale(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    factor = math.exp(draw.side * size)
+    twin.set(force_scale=factor)
+    return {"factor": factor}
+
+
+def _force_zero(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(force_zero=draw.side * size)
+    return {"offset_N": draw.side * size}
+
+
+def _deflection_zero(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(deflection_zero=draw.side * size)
+    return {"offset_m": draw.side * size}
+
+
+def _scale_drift(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    rate = draw.side * size / clean.seconds
+    twin.set(scale_drift=rate)
+    return {"per_s": rate}
+
+
+def _force_skew(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    late = twin.get("force_late") + size
+    twin.set(force_late=late)
+    return {"delay_s": late}
+
+
+def _motion_skew(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.air.late_s += size
+    return {"delay_s": twin.air.late_s}
+
+
+def _hum(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Lay a tone near 50 Hz, or in one of three near 60 Hz, on δc as read."""
+    mains = 50.0 if draw.u[0] < 2.0 / 3.0 else 60.0
+    frequency = mains + 0.4 * (draw.u[1] - 0.5)
+    twin.set(tone=size, tone_rate=2.0 * math.pi * frequency, tone_phase=2.0 * math.pi * draw.u[2])
+    return {"amplitude_m": size, "frequency_Hz": frequency}
+
+
+def _dropped(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(missed_share=size, missed_seed=float(draw.seed % 1000) + 0.5)
+    return {"share": size}
+
+
+REVISION_2 = (
+    Kind("presliding_friction", "loader", 0.03, 15.0, _presliding),
+    Kind("asymmetric_friction", "loader", 0.03, 15.0, _asymmetric),
+    Kind("load_friction", "loader", 1e-3, 0.3, _load_friction),
+    Kind("friction_ripple", "loader", 0.05, 15.0, _ripple),
+    Kind("relaxation", "loader", 0.002, 1.0, _relaxation),
+    Kind("force_limit", "loader", 0.05, 2.5, _force_limit),
+    Kind("crosstalk", "loader", 5e-4, 0.5, _crosstalk, other=True),
+    Kind("structural_mode", "linkage", 0.03, 0.7, _mode),
+    Kind("bend_hysteresis", "linkage", 0.01, 0.8, _bend_hysteresis),
+    Kind("soft_backlash", "linkage", 2e-5, 4e-3, _soft_backlash),
+    Kind("force_scale", "sensing", 0.0005, 0.15, _force_scale),
+    Kind("force_zero", "sensing", 0.02, 20.0, _force_zero),
+    Kind("deflection_zero", "sensing", 2e-5, 8e-3, _deflection_zero),
+    Kind("scale_drift", "sensing", 0.0005, 0.3, _scale_drift),
+    Kind("force_skew", "sensing", 0.001, 0.15, _force_skew),
+    Kind("motion_skew", "sensing", 0.001, 0.3, _motion_skew, flown=True, shows="airframe"),
+    Kind("mains_hum", "sensing", 1e-5, 3e-3, _hum),
+    Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped, shows="schedule"),
+)
