@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coupled.cli import main
+from tests.support.commands import coupled
 from tests.support.mutations import cases, mutated, write_inputs
 
 SEED = 11
@@ -51,6 +52,16 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("NO_COLOR", "1")
     return tmp_path
+
+
+def test_the_unchanged_files_are_valid(here: Path) -> None:
+    write_inputs(here)
+    for words in dict.fromkeys(words for words, _ in cases()):
+        done = coupled(here, *words)
+        if words[0] == "diagnose":  # no record is there, lest a diagnosis be made
+            assert "there is no r1.csv or .parquet" in done.stderr
+        else:
+            assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=NAMES)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from coupled.calibration.readings import Readings, readings_of
 from coupled.errors import InputError, nearest
 from coupled.files import read_text, write_text
-from coupled.schema import LARGEST
+from coupled.schema import LARGEST, SMALLEST
 from coupled.units import POUND_N, DEGREE_rad, INCH_m
 
 Floats = NDArray[np.float64]
@@ -188,6 +188,8 @@ def _number(path: Path, row: int, column: str, cell: str) -> float:
     number = float(cell)
     if not math.isfinite(number) or abs(number) > LARGEST:
         raise InputError(path, place, f"{cell[:40]!r} is no finite number")
+    if 0.0 < abs(number) < SMALLEST:
+        raise InputError(path, place, f"{cell[:40]!r} is smaller than any real one; give 0")
     return number
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,7 @@ HOSTILE = [
     (CSV.replace("force_lb", "force_N"), "row 1: mixes units: deflection_in with force_N"),
     (CSV.replace("remark", "deflection_m"), "row 1: mixes units: deflection_in and deflection_m"),
     (CSV.replace("remark", "v1_V"), "row 1: v1_V: duplicate column"),
+    (re.sub(r"\n([^,]*),[^,]*,", r"\n\1,1e-320,", CSV, count=1), "smaller than any real one"),
     (CSV.replace("deflection_in", "deflection_deg"), "a column is read in deflection_m"),
     (CSV.replace(",", ";"), "columns are parted by commas"),
     (CSV.replace(",", "\t"), "columns are parted by commas"),

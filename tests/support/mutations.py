@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import re
@@ -28,7 +29,7 @@ file = "force.csv"
 
 [[expect]]
 channel = "column_force_N"
-statistic = "greatest"
+take = "greatest"
 most = 100.0
 """
 SWEEP = """name = "s"
@@ -40,6 +41,9 @@ keep = ["loss"]
 key = "rig.controls.column.loader.bend_m_per_N"
 values = [1e-6]
 """
+TRUTH: dict[str, object] = {
+    **{"class": "none", "rig": "t37", "effects": [], "stages": [], "gap": {}, "missing": []}
+}
 # Words that a file's author, or his enemy, puts where a number or a name belongs.
 WORDS: tuple[bytes, ...] = (
     *(
@@ -100,7 +104,8 @@ def _inputs() -> dict[str, bytes]:
     log = pl.read_csv(GOOD.encode())
     log.write_parquet(log_parquet)
     scipy_io.savemat(mat, {name: log[name].to_numpy() for name in log.columns}, do_compression=True)
-    key = {"format": "coupled blind key 1", "salt": "s", "seed": 1, "records": {"r001": {}}}
+    key = {"format": "coupled blind key 1", "salt": "s", "seed": 1, "records": {"r001": TRUTH}}
+    sealed = json.dumps(key).encode()
     return {
         "rig.toml": (ROOT / "aircraft/T37/report-column.toml").read_bytes(),
         "run.toml": RUN.encode(),
@@ -114,8 +119,8 @@ def _inputs() -> dict[str, bytes]:
         "log.parquet": log_parquet.getvalue(),
         "log.mat": mat.getvalue(),
         "map.toml": MAP.encode(),
-        "key.json": json.dumps(key).encode(),
-        "seal.toml": b'key_sha256 = "00"\n',
+        "key.json": sealed,
+        "seal.toml": f'key_sha256 = "{hashlib.sha256(sealed).hexdigest()}"\n'.encode(),
         "answers/r001.json": b'{"verdict": "no_gap", "effects": [], "stages": {}, "shrink": {}}',
         "many/records.toml": b'r1 = "t37"\nr2 = "b747"\n',
     }
