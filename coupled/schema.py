@@ -73,9 +73,9 @@ def file_keys(section: type[Section], d: str) -> dict[str, str]:
     keys = {}
     for name, info in section.model_fields.items():
         extra = info.json_schema_extra
-        told = extra if isinstance(extra, dict) else {}
-        unit = str(told.get("unit", "")).format(d=d)
-        key = str(told.get("key", name))
+        marks = extra if isinstance(extra, dict) else {}
+        unit = str(marks.get("unit", "")).format(d=d)
+        key = str(marks.get("key", name))
         keys[f"{key}_{unit}" if unit else key] = name
     return keys
 

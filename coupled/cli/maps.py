@@ -50,8 +50,8 @@ def draw_map(
     for given in record or []:
         check_suffix(given)
     records = [read_record(given) for given in record or []]
-    for given, told in zip(record or [], records, strict=True):
-        if "dynamic_pressure_Pa" not in told:
+    for given, flight in zip(record or [], records, strict=True):
+        if "dynamic_pressure_Pa" not in flight:
             raise InputError(given, "dynamic_pressure_Pa", "no such column")
     say_stale(data)
     with progress() as advance:
@@ -62,7 +62,7 @@ def draw_map(
     flown = {name: envelope(records, name) for name in data.controls}
     with Outputs() as outputs:
         save(draw_losses(data.name, maps, flown), outputs.at(written[0]))
-        losses = (told for of_control in maps.values() for told in of_control)
+        losses = (loss_map for of_control in maps.values() for loss_map in of_control)
         write_losses(losses, outputs.at(written[1]))
         if felt is not None:
             save(draw_feel(data.name, felt), outputs.at(written[2]))

@@ -36,13 +36,13 @@ def make_aircraft(
     a trim that was moved.
     """
 
-    def spare(names: Sequence[str]) -> Aircraft:
+    def plain_aircraft(names: Sequence[str]) -> Aircraft:
         return JSBSimAirframe(flight, frame_s, ("column",), models, file, names)
 
     wrappers = (
         *conditions,
         gusts or Gusts(flight, frame_s),
-        Alterations(flight, spare),
+        Alterations(flight, plain_aircraft),
         Loading(flight),
     )
     return JSBSimAirframe(flight, frame_s, controls, models, file, record, run_file, wrappers)

@@ -73,12 +73,12 @@ UNALTERED = {a.part.name: 1.0 for a in ALTERATIONS} | {"gust_rms_m_per_s": 0.0}
 class Alterations(Wrapper):
     """The factors of a rig that are not 1.
 
-    `spare` makes an aircraft like this one, plain, with the properties that it is asked to read:
-    where the trim is moved in flight, its surface tells where the trim alone puts it.
+    `make_plain` makes an aircraft like this one, plain, which reads the properties it is asked
+    for: where the trim is moved in flight, its surface tells where the trim alone puts it.
     """
 
-    def __init__(self, flight: Flight, spare: Callable[[Sequence[str]], Aircraft]) -> None:
-        self._flight, self._spare = flight, spare
+    def __init__(self, flight: Flight, make_plain: Callable[[Sequence[str]], Aircraft]) -> None:
+        self._flight, self._make_plain = flight, make_plain
         self._made = [a for a in ALTERATIONS if a.factor(flight) != 1.0]
 
     @property
@@ -132,9 +132,9 @@ class Alterations(Wrapper):
 
     def _moved(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return the quantities where the elevator is moved by each of _TRIMS, (trims, names)."""
-        spare = self._spare(names)
+        other = self._make_plain(names)
         values = []
         for command in _TRIMS.tolist():
-            spare.step((command, 0.0, 0.0))
-            values.append(spare.extra())
+            other.step((command, 0.0, 0.0))
+            values.append(other.extra())
         return np.array(values)

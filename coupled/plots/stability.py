@@ -21,13 +21,13 @@ _FASTEST = 100.0  # 1/s, the ends of the colours
 _LINEAR = 3.0  # 1/s, within which they are even
 _ARM_N_per_d = 500.0  # the stiffness of a pilot's arm unless a run says otherwise
 _LABELS: dict[Kind, str] = {
-    "belief": "host's K̂ over real K",
+    "assumed": "host's K̂ over real K",
     "frame": "frame time T, ms",
     "hand": "hand's stiffness, K·k",
     "servo": "servo's frequency, Hz",
 }
 _TITLES: dict[Kind, str] = {
-    "belief": "free hand, eq. (12)",
+    "assumed": "free hand, eq. (12)",
     "frame": "free hand, digital product",
     "hand": "in a hand that holds",
     "servo": "held fast",
@@ -78,7 +78,7 @@ def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
         markersize=3.6,
         label="limit found in simulation",
     )
-    if plane.kind != "belief":
+    if plane.kind != "assumed":
         axes.set_yscale("log")
     axes.set_ylabel(_LABELS[plane.kind])
     return mesh
@@ -89,7 +89,7 @@ def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
     control = rig.controls[plane.control]
     bend = control.loader.bend
     own = {
-        "belief": control.compensation.bend / bend,
+        "assumed": control.compensation.bend / bend,
         "frame": 1.0 / rig.frame_rate / MILLISECOND_s,
         "hand": _ARM_N_per_d * bend,
         "servo": control.loader.servo_frequency,

@@ -1,7 +1,7 @@
 """The names of controls, and of a record's channels; each channel ends in its unit.
 
 Those of a control come from the rig, those of the motion from the airframe. A bench
-record has of the motion only the dynamic pressure that the host was told.
+record has of the motion only the dynamic pressure that the host was given.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Each plane asks one question of a control as its rig file has it, with friction, breakout, play and
 limits taken out, which only ever hold or bound a motion:
 
-    belief   K̂/K, a free hand: the commanded spring G_T/(1 − K̂·G_T), eq. (12)
+    assumed  K̂/K, a free hand: the commanded spring G_T/(1 − K̂·G_T), eq. (12)
     frame    T, a free hand: the digital product ΔG·δc that stands still over a frame
     hand     K·k_h, hybrid: a hand of that stiffness, on the structure's 1/K
     servo    its frequency, hybrid: the grip held fast
@@ -31,8 +31,8 @@ from coupled.rig.rig import Rig
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
-Kind = Literal["belief", "frame", "hand", "servo"]
-KINDS: tuple[Kind, ...] = ("belief", "frame", "hand", "servo")
+Kind = Literal["assumed", "frame", "hand", "servo"]
+KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo")
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
 
 _SIMULATED_s = 4.0
@@ -40,7 +40,7 @@ _COARSE, _FINE = (31, 25), (91, 73)  # cells of the simulation, points of the th
 _LEFT, _RIGHT = 0.02, 1.2  # of K·G_T
 _HALVINGS = 9
 _VALUES: dict[Kind, tuple[float, float]] = {
-    "belief": (0.02, 2.0),
+    "assumed": (0.02, 2.0),
     "frame": (0.002, 0.2),
     "hand": (0.01, 100.0),
     "servo": (2.0, 200.0),
@@ -141,7 +141,7 @@ def posed(
 ) -> tuple[Rig, Hand]:
     """Return the linear rig and hand of a plane's question at one gradient and value."""
     bend, hand = rig.controls[name].loader.bend, Hand()
-    if kind == "belief":
+    if kind == "assumed":
         question = Question(host_bend=value * bend, host_gradient=True)
     elif kind == "frame":
         question = Question("digital", frame_s=value)
@@ -155,7 +155,7 @@ def posed(
 def axis(kind: Kind, points: int) -> Floats:
     """Return values of a plane's second quantity: K̂/K evenly, the others by their logarithm."""
     low, high = _VALUES[kind]
-    if kind == "belief":
+    if kind == "assumed":
         return np.linspace(low, high, points)
     return np.geomspace(low, high, points)
 

@@ -135,7 +135,7 @@ class Score:
             "probabilities": {
                 "brier": stated.brier,
                 "effects": stated.effects,
-                "bins": [{"told": row.stated, **asdict(row.true)} for row in stated.bins],
+                "bins": [{"stated": row.stated, **asdict(row.true)} for row in stated.bins],
             },
             "power": [
                 {"from": row.least, "ratio": row.ratio, "wrong": row.wrong, **asdict(row.named)}

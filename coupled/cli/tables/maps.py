@@ -16,16 +16,16 @@ def write_losses(maps: Iterable[LossMap], path: Path) -> None:
     """Write the loss maps, a row a point; a deflection is in the unit beside it."""
     rows = [
         {
-            "control": told.control,
-            "configuration": told.configuration,
+            "control": loss_map.control,
+            "configuration": loss_map.configuration,
             "dynamic_pressure_Pa": float(q),
             "deflection": float(d),
-            "deflection_unit": unit_of(told.control),
-            "loss": float(told.loss[i, j]),
+            "deflection_unit": unit_of(loss_map.control),
+            "loss": float(loss_map.loss[i, j]),
         }
-        for told in maps
-        for i, q in enumerate(told.pressure_Pa)
-        for j, d in enumerate(told.deflection)
+        for loss_map in maps
+        for i, q in enumerate(loss_map.pressure_Pa)
+        for j, d in enumerate(loss_map.deflection)
     ]
     write_table(pl.DataFrame(rows).fill_nan(None), path)
 

@@ -18,13 +18,13 @@ from coupled.rig.rig import Rig
 from coupled.units import MILLISECOND_s
 
 _QUANTITIES: dict[Kind, str] = {
-    "belief": "believed_over_real_bend",
+    "assumed": "assumed_over_real_bend",
     "frame": "frame_s",
     "hand": "hand_stiffness_times_bend",
     "servo": "servo_frequency_Hz",
 }
 _WORDS: dict[Kind, tuple[str, float]] = {
-    "belief": ("K̂/K, free hand", 1.0),
+    "assumed": ("K̂/K, free hand", 1.0),
     "frame": ("frame of a digital product, ms", 1.0 / MILLISECOND_s),
     "hand": ("hand's stiffness, K·k", 1.0),
     "servo": ("servo with the grip held fast, Hz", 1.0),

@@ -228,12 +228,12 @@ def test_every_shipped_control_has_its_limits_where_theory_has_them(name: str) -
         for limit in limits.values():
             if limit.simulated is not None:
                 assert limit.simulated == pytest.approx(limit.theory, rel=0.01)
-        belief = limits["belief"]
+        assumed = limits["assumed"]
         if found.share > 0.5:
-            assert belief.simulated == pytest.approx(1.0 / found.share, rel=1e-3)
-            assert belief.stable == "below"
+            assert assumed.simulated == pytest.approx(1.0 / found.share, rel=1e-3)
+            assert assumed.stable == "below"
         else:
-            assert belief.stable == "everywhere"
+            assert assumed.stable == "everywhere"
         assert limits["frame"].stable in ("below", "everywhere")
 
 
