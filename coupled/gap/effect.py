@@ -16,7 +16,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.schema import Section, file_keys
+from coupled.schema import SMALLEST, Section, file_keys
 
 Mode = Literal["value", "factor", "added", "switch"]
 Drawing = Literal["law", "loop", "time"]
@@ -170,6 +170,7 @@ def apply(
     for effect in effects:
         for p in effect.parameters:
             value = values.get(effect.value_key(p), 0.0)
+            value = value if abs(value) >= SMALLEST else 0.0
             changes[p.key] = p.entered(p.nominal(rig, control), value)
     changes |= _no_less_than_running(rig, control, changes)
     data = rig.controls[control]

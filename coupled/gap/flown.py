@@ -21,6 +21,7 @@ from coupled.gap.thresholds import PROFILE_EVERY
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+from coupled.schema import SMALLEST
 
 Floats = NDArray[np.float64]
 COMPARED = ("deflection", "computed")  # of the control, and of the motion:
@@ -76,7 +77,7 @@ def fly_force(
     frames = len(next(iter(forces_N.values())))
     times = np.arange(frames) / rig.frame_rate
     pilots: dict[ControlName, Pilot] = {
-        control: Recorded(times=times.tolist(), forces=force.tolist())
+        control: Recorded(times=times.tolist(), forces=_felt(force).tolist())
         for control, force in forces_N.items()
     }
     bench = None
@@ -116,6 +117,11 @@ def closed_loop(
         return None
     seconds = (before.seconds, after.seconds) if before.seconds != after.seconds else (None, None)
     return tuple(ChannelAgain(name, before.rms[name], after.rms[name], *seconds) for name in names)
+
+
+def _felt(force: Floats) -> Floats:
+    """Return a force without what is too small for a rig's data, which take it for a slip."""
+    return np.where(np.abs(force) < SMALLEST, 0.0, force)
 
 
 @dataclass(frozen=True)
