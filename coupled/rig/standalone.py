@@ -79,7 +79,8 @@ def under_supply(
     hand on it (v₃ = 0): appendix B.
     """
     packed = pack(rig.only(control))
-    packed["parameters"]["loader"]["digital"] = 1  # F_mod is what is held, not a product
+    for field in ("digital", "held"):  # F_mod is what the supply makes, not a product
+        packed["parameters"]["loader"][field] = 1
     h = 1.0 / (rig.frame_rate * rig.substeps)
     up, on = _turned(rise_s, rest_s, h)
 
