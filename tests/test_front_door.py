@@ -233,3 +233,15 @@ def test_a_record_is_diagnosed_from_a_file_as_from_memory(tmp_path: Path) -> Non
     bend = found.improved.controls["column"].loader.bend
     assert bend == pytest.approx(4e-4, rel=0.02)
     assert coupled.diagnose("t37", {"worn": record}).improved == found.improved
+
+
+def test_a_flight_of_eight_seconds_tells_of_its_play() -> None:
+    """From a rig's name to a diagnosis, without a file: the way in that the package promises."""
+    rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
+    flight = coupled.fly(rig, column=coupled.Step(force_N=50), duration_s=8)
+    found = coupled.diagnose("t37", flight.record)
+    assert found.verdict == "effect"
+    assert [effect.name for effect in found.effects] == ["backlash"]
+    assert found.effects[0].value == pytest.approx(1e-3, rel=0.02)
+    assert found.improved.controls["column"].loader.play == pytest.approx(1e-3, rel=0.02)
+    assert found.as_dict()["verdict"] == found.verdict

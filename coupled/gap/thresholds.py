@@ -12,7 +12,7 @@ OTHER_RIG = 2.0  # chosen: factor on the gradient from which a rig file is anoth
 OTHER_SPEED = 0.03  # chosen: relative error of the trimmed airspeed, likewise
 OTHER_RATE = 1e-3  # chosen: relative error of the frame rate, likewise
 STAMP_JITTER = 0.01  # chosen: of a frame, by which a row's time may be off
-SHORTEST_RECORD_s = 10.0  # four stretches of 2.5 s: two to fit, two to hold out
+SHORTEST_RECORD_s = 5.0  # two stretches of 2.5 s: one to fit, one to hold out
 
 # Noise and rounding of a channel (`output`).
 ECHO_FRAMES = 12  # chosen: a tenth of a second at 120 Hz, over which noise may echo
