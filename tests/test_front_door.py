@@ -245,3 +245,13 @@ def test_a_flight_of_eight_seconds_tells_of_its_play() -> None:
     assert found.effects[0].value == pytest.approx(1e-3, rel=0.02)
     assert found.improved.controls["column"].loader.play == pytest.approx(1e-3, rel=0.02)
     assert found.as_dict()["verdict"] == found.verdict
+
+
+def test_a_plot_leaves_out_what_rests() -> None:
+    """A column's pull on a rig of three controls: no panels of zeros, and the figure says so."""
+    flight = coupled.fly("t37", column=coupled.Step(force_N=20, start_s=0.1), duration_s=0.5)
+    figure = flight.record.plot()
+    labels = [axes.get_ylabel() for axes in figure.axes if axes.get_visible()]
+    assert "column force, N" in labels
+    assert not [label for label in labels if label.startswith(("wheel", "pedals"))]
+    assert figure.get_supxlabel() == "at rest, not drawn: wheel, pedals"

@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
-from coupled.record.channels import CONTROL_NAMES, RATE, control_channels, unit_of
+from coupled.record.channels import CONTROL_NAMES, RATE, channel, control_channels, unit_of
 from coupled.units import DEGREE_rad
 
 __all__ = ["Figure", "Histories", "draw_channels", "draw_record", "plain"]
 
+STILL = 1e-3  # of the widest line in a panel: what moves less is not drawn
 Line = tuple[str, str, float]  # a channel, its name in the legend, and the factor to its unit
 
 
@@ -59,10 +60,15 @@ def draw_channels(record: Histories, channels: Sequence[str], title: str = "") -
 
 
 def draw_record(record: Histories, title: str = "") -> Figure:
-    """Draw a record: each control's force and deflections, its surface, and the motion."""
+    """Draw a record: the force and deflections of each control that moves, surfaces, motion.
+
+    What stays at rest beside something that moves is named and not drawn.
+    """
     panels: list[tuple[str, list[Line]]] = []
-    for control in CONTROL_NAMES:
-        if control_channels(control)[0] in record.channels:
+    controls = [name for name in CONTROL_NAMES if control_channels(name)[0] in record.channels]
+    resting = [name for name in controls if not _moves(record, name)]
+    for control in controls:
+        if control not in resting or resting == controls:
             panels += _control_panels(control)
     rates = [(name, name.split("_")[0], _DEGREES) for name in RATE.values()]
     panels += [
@@ -73,18 +79,30 @@ def draw_record(record: Histories, title: str = "") -> Figure:
             [(f"{a}_rad", a, _DEGREES) for a in ("pitch", "alpha", "roll", "sideslip")],
         ),
         ("load factor", [("load_factor", "load factor", 1.0)]),
-        ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "q̄", 1e-3)]),
+        ("dynamic pressure, kPa", [("dynamic_pressure_Pa", "dynamic pressure", 1e-3)]),
         ("true airspeed, m/s", [("true_airspeed_m_per_s", "speed", 1.0)]),
     ]
     shown = []
     for label, lines in panels:
         present = [line for line in lines if line[0] in record.channels]
+        spans = [float(np.ptp(record[name])) for name, _, _ in present]
+        least = STILL * max(spans, default=0.0)
+        present = [line for line, span in zip(present, spans, strict=True) if span >= least]
         if present:
             shown.append((label, present))
     if not shown:
         problem = f"has no channel of a record; it has {record.channels[:5]}"
         raise InputError(title or "record", "", problem)
-    return _drawn(record, shown, title, 2)
+    figure = _drawn(record, shown, title, 2)
+    if resting and resting != controls:
+        figure.supxlabel("at rest, not drawn: " + ", ".join(resting), fontsize=8)
+    return figure
+
+
+def _moves(record: Histories, control: str) -> bool:
+    """Tell whether a control has a force or a deflection at any time."""
+    names = [control_channels(control)[0], channel(control, "deflection")]
+    return any(np.any(record[name]) for name in names if name in record.channels)
 
 
 def _control_panels(control: str) -> list[tuple[str, list[Line]]]:
@@ -108,7 +126,7 @@ def _drawn(
             axes.plot(record.time_s, scale * record[name], linewidth=1.1, label=short)
         axes.set_ylabel(label, fontsize=9)
         axes.grid(alpha=0.25)
-        if len(lines) > 1:
+        if len(lines) > 1 or lines[0][1] not in label:
             axes.legend(fontsize=7, loc="best", ncols=len(lines))
     for axes in list(grid.T.flat)[len(panels) :]:
         axes.set_visible(False)
