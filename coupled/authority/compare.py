@@ -3,7 +3,8 @@
 One manoeuvre is flown in the five configurations; an `Outcome` holds the figures of one
 flight. Loss and feel are read while the control stands still, held at half or more of its
 greatest deflection, beside the closed form of the rig's statics there (which leaves friction
-out). Breakout and bob weight are taken off the force before it is compared.
+out). The force is the hand's own, whatever the strain gauge says of it; breakout and bob weight
+are taken off before it is compared.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Outcome:
     loss_closed_form: float  # the same by the rig's statics
     felt_ratio: float  # force felt over force specified, breakout taken off
     felt_ratio_closed_form: float
-    force_N: float  # greatest force of the pilot
+    force_N: float  # greatest force of the pilot's hand
     force_step_N: float  # greatest jump of the modifying force from frame to frame
     peak_rate_rad_per_s: float | None  # of pitch, roll or yaw, to the pilot's side
     peak_load_factor: float | None
@@ -185,7 +186,7 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
         return Outcome(manoeuvre.label, configuration, control, *(nan,) * 8, None, None, None, why)
     deflection = record[channel(control, "deflection")]
-    force = record[channel(control, "force")]
+    force = record[channel(control, "hand_force")]
     held = _where_held(record.time_s, deflection)
     side = float(np.sign(np.mean(deflection[held])))
     asked, reached = _asked_and_reached(rig, control, record, held)
@@ -261,7 +262,7 @@ def _felt_and_specified(
     flown = rig.flight is not None
     weight = loader.bob_weight * (record["load_factor"][held] - 1.0) if flown else 0.0
     specified = specified_force(rig, control, pressure, deflection)
-    felt = record[channel(control, "force")][held]
+    felt = record[channel(control, "hand_force")][held]
     return float(np.mean(felt - preload - weight)), float(np.mean(specified - preload))
 
 

@@ -34,10 +34,10 @@ def assumed_scales(control: Control) -> Scales:
 
 
 def real_scales(control: Control) -> Scales:
-    """Return the scales that the hardware really has."""
+    """Return the scales that the hardware really has; S₁ as the host gets v₁."""
     assumed, factor = assumed_scales(control), control.sensing
     return Scales(
-        assumed.s1 * factor.deflection_scale,
+        assumed.s1 * factor.read_scale,
         assumed.s2 * factor.modifying_scale,
         assumed.s3 * factor.force_scale,
     )

@@ -63,7 +63,7 @@ class CalibrationBench:
 def take_readings(bench: CalibrationBench, seed: int) -> Readings:
     """Return the readings of one bench session; the same seed gives the same ones."""
     rng = np.random.default_rng(seed)
-    rig, control = _meters_rig(bench.rig, bench.control), bench.control
+    rig, control = _without_converters(bench.rig, bench.control), bench.control
     pressures = np.array([station.pressure_Pa for station in bench.stations])
     forces = np.array([station.force for station in bench.stations])
     scales = real_scales(bench.rig.controls[control])
@@ -86,11 +86,9 @@ def take_readings(bench: CalibrationBench, seed: int) -> Readings:
     return readings_of(range(2, count + 2), labels, columns, null_rows, null)
 
 
-def _meters_rig(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig as a voltmeter meets it: no converters, δc and F as they truly are."""
-    sensing = {"word_length_bits": 0, "deflection_scale": 1.0, "force_scale": 1.0}
-    place = f"controls.{control}.sensing"
-    return rig.changed({f"{place}.{key}": value for key, value in sensing.items()})
+def _without_converters(rig: Rig, control: ControlName) -> Rig:
+    """Return the rig as a voltmeter meets it: v₁ and v₃ without converters."""
+    return rig.changed({f"controls.{control}.sensing.word_length_bits": 0})
 
 
 def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
@@ -134,8 +132,9 @@ def _hold(
     response = run_control(rig, bench.control, nodes, np.repeat(pressures, each))
     first = np.arange(len(forces)) * each + math.ceil((2.0 * pull_s + settle) * rate)
     looks = [first + round(i * GLANCE_s * rate) for i in range(6)]
-    deflection, force = response.deflection, response.force
-    seen = (deflection, force, response.computed, force, force, deflection)
+    deflection, force = response.deflection, response.hand_force
+    computed = response.computed / rig.controls[bench.control].sensing.read_scale
+    seen = (deflection, force, computed, force, force, deflection)
     return np.stack([signal[at] for signal, at in zip(seen, looks, strict=True)])
 
 

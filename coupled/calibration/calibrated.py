@@ -2,6 +2,9 @@
 
 A calibration changes what the host assumes, not the hardware: S₁, S₂, S₃ and K̂ become what
 was found, and each scale's factor of real over assumed is kept true of the same hardware.
+v₁ is read where the host gets it: an S₁ that is off in the electronics is put right for reading
+and analog product alike. One that is off in the host's reading alone (`deflection_scale`) stays
+what it is: the S₁ found has it, the reading is right, and the analog product wrong by its inverse.
 """
 
 from __future__ import annotations
@@ -30,11 +33,13 @@ def with_calibration(
     data, d = rig.controls[control], unit_of(control)
     real, place = real_scales(data), f"controls.{control}"
     s1, s2, s3, bend = found.line.s1, found.s2_chosen, found.s3, found.line.bend
+    reading = data.sensing.deflection_scale
     used = max(bend.value, 0.0)  # no structure bends against its force
     changes: dict[str, Any] = {
         f"sensing.s1_V_per_{d}": s1.value,
         "sensing.s3_V_per_N": s3.value,
-        "sensing.deflection_scale": 1.0 if hardware else real.s1 / s1.value,
+        "sensing.computed_scale": 1.0 if hardware else real.s1 / (reading * s1.value),
+        "sensing.deflection_scale": 1.0 if hardware else reading,
         "sensing.force_scale": 1.0 if hardware else real.s3 / s3.value,
         f"compensation.bend_{d}_per_N": used,
         "calibration.readings": found.count,

@@ -78,7 +78,7 @@ def legs(response: History) -> tuple[SweepLeg, ...]:
     found = []
     for i, part in enumerate(parts):
         order = slice(None, None, 1 if i % 2 == 0 else -1)
-        columns = (deflection[part], response.force[part], response.surface[part])
+        columns = (deflection[part], response.hand_force[part], response.surface[part])
         found.append(SweepLeg(*(column[order] for column in columns)))
     return tuple(found)
 

@@ -8,7 +8,7 @@ under it is the rig's own business.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ def feel_pressures(rig: Rig, control: ControlName) -> list[float]:
 
 
 def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
-    """Return a slow sweep to both stops at a dynamic pressure; its force is the hand's own."""
+    """Return a slow sweep to both stops at a dynamic pressure."""
     data = rig.controls[control]
     frames = round(SWEEP_s * rig.frame_rate)
     ends = np.arange(frames + 1) / rig.frame_rate
@@ -66,8 +66,7 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     side = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
     force = force + side * max(data.loader.friction, data.loader.breakaway)
     nodes = np.interp(nodes_of(rig, frames), ends, force)
-    response = run_control(rig, control, nodes, np.full(frames, pressure_Pa))
-    return replace(response, force=nodes[: -1 : rig.substeps])
+    return run_control(rig, control, nodes, np.full(frames, pressure_Pa))
 
 
 def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> Release:

@@ -2,11 +2,12 @@
 
 Pilot forces are judged by how long they last: the greatest against the short-term limit, and
 what is held for longer than a short term against the long-term one; whichever comes nearer to
-its limit is the figure. Part 60: the force of a held control against the specified one (2.a,
-and 2.d.8 and 2.e.1 in flight), and the peak rate after a small pitch input (2.b.4), for which
-the rigid structure stands for the aircraft. 2.b.4 is for approach and landing, whose choice
-is the run's, and for rates of 0.5 to 2 °/s: a larger one is not judged by it, and "rate
-against rigid" has the same tolerances for any rate.
+its limit is the figure. All forces are the hand's own, not what the strain gauge says. Part 60:
+the force of a held control against the specified one (2.a, and 2.d.8 and 2.e.1 in flight), and
+the peak rate after a small pitch input (2.b.4), for which the rigid structure stands for the
+aircraft. 2.b.4 is for approach and landing, whose choice is the run's, and for rates of 0.5 to
+2 °/s: a larger one is not judged by it, and "rate against rigid" has the same tolerances for any
+rate.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def judge_standard(
 
 
 def _pilot_force(standard: Standard, control: ControlName, flight: Flight) -> StandardFigure:
-    force = flight.record[channel(control, "force")]
+    force = flight.record[channel(control, "hand_force")]
     time_s = flight.record.time_s
     frame_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else SHORT_TERM_s
     sustained = sustained_force(force, frame_s)

@@ -188,7 +188,7 @@ class Reader:
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
             def predict(rig: Rig) -> Floats:
-                scale = rig.controls[self.control].sensing.deflection_scale
+                scale = rig.controls[self.control].sensing.read_scale
                 restart = (every, seen / scale, rate / scale)
                 driven_by = (nodes, gradient, misread, load, second, restart)
                 return scale * drive_loader(rig, self.control, *driven_by)[0]
@@ -229,7 +229,7 @@ class Reader:
         def predict(rig: Rig, seen: Floats = smooth) -> Floats:
             data = rig.controls[self.control]
             digital = data.loader.multiplier == "digital"
-            read = computed if digital else seen / data.sensing.deflection_scale
+            read = computed if digital else seen / data.sensing.read_scale
             return np.where(unsure, product, made(rig, read))
 
         def noisy(rig: Rig, k: int) -> Floats:
@@ -251,7 +251,7 @@ class Reader:
             nodes = on_nodes(self.rig, c)
 
             def predict(rig: Rig) -> Floats:
-                scale = rig.controls[self.control].sensing.deflection_scale
+                scale = rig.controls[self.control].sensing.read_scale
                 return drive_linkage(rig, self.control, nodes / scale, f)
 
             return predict

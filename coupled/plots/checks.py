@@ -33,9 +33,8 @@ def draw_static_checks(found: Documentation) -> Figure:
                 x, f - allowed, f + allowed, color="0.85", linewidth=0, label=name or None
             )
         response = condition.felt
-        axes.plot(
-            factor * response.deflection, response.force, color=BLUE, linewidth=1.2, label="rig"
-        )
+        x = factor * response.deflection
+        axes.plot(x, response.hand_force, color=BLUE, linewidth=1.2, label="rig")
         for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
             x = factor * leg.deflection
             axes.plot(x, leg.force, "k:", linewidth=1.0, label=name or None)

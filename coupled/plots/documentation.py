@@ -59,7 +59,7 @@ def draw_forces(found: Documentation) -> Figure:
         )
         for name, response, color, width in sweeps:
             x = factor * response.deflection
-            axes.plot(x, response.force, color=color, linewidth=width, label=name)
+            axes.plot(x, response.hand_force, color=color, linewidth=width, label=name)
         for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
             x, style = factor * leg.deflection, {"color": GRAY, "linewidth": 4.5, "zorder": 1}
             axes.plot(x, leg.force, label=name or None, **style)

@@ -152,7 +152,7 @@ def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
     scale, unit = (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
     for flight in case:
         deflection = flight.record[channel(control, "deflection")]
-        force = flight.record[channel(control, "force")]
+        force = flight.record[channel(control, "hand_force")]
         axes.plot(scale * deflection, force, **_line(flight.configuration))
     record = case[0].record
     deflection = record[channel(control, "deflection")]

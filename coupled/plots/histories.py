@@ -109,7 +109,8 @@ def _control_panels(control: str) -> list[tuple[str, list[Line]]]:
     """Return the panels of a control: force in N, deflection in cm or degrees."""
     d = unit_of(control)
     scale, unit = (100.0, "cm") if d == "m" else (_DEGREES, "°")
-    forces = [(f"{control}_{n}_N", n.split("_")[0], 1.0) for n in ("force", "modifying_force")]
+    named = {"hand_force": "hand", "force": "as read", "modifying_force": "modifying"}
+    forces = [(f"{control}_{name}_N", short, 1.0) for name, short in named.items()]
     names = ("deflection", "estimate", "computed")
     deflections = [(f"{control}_{n}_{d}", n, scale) for n in names]
     return [(f"{control} force, N", forces), (f"{control} deflection, {unit}", deflections)]

@@ -102,7 +102,7 @@ def _computed(scene: Scene, rig: Rig | None) -> Floats:
         seen = scene.seen("computed", rig)
     except KeyError:
         seen = scene.smooth("computed")
-    return seen / scene.base.controls[scene.reader.control].sensing.deflection_scale
+    return seen / scene.base.controls[scene.reader.control].sensing.read_scale
 
 
 def _missing(scene: Scene, rig: Rig | None) -> Floats:

@@ -1,7 +1,8 @@
 """The names of controls, and of a record's channels; each channel ends in its unit.
 
 Those of a control come from the rig, those of the motion from the airframe. A bench
-record has of the motion only the dynamic pressure that the host was given.
+record has of the motion only the dynamic pressure that the host was given. Channels of
+sensors hold what is read; `hand_force` is what the pilot feels, whatever the gauge reads.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ _CONTROL = (
     "force_step_N",  # the jump of F_mod at this frame, which the hand feels
     "surface_norm",  # command about trim over the frame to come, JSBSim's sign
     "stop",  # the stop met over the frame before: −1, 0 or +1
+    "hand_force_N",  # F as the hand holds it; `force` is what the strain gauge says of it
 )
 _NOISY = (0, 1, 2, 5)
 

@@ -53,7 +53,7 @@ class Record:
     >>> import coupled
     >>> record = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=2).record
     >>> record
-    Record(240 rows, 2 s at 120 Hz; 43 channels: time_s, column_force_N, column_computed_m, …)
+    Record(240 rows, 2 s at 120 Hz; 46 channels: time_s, column_force_N, column_computed_m, …)
     >>> len(record.between(0.5, 1.0)), record["pitch_rad"].shape
     (60, (240,))
     >>> record.to_polars().columns[:2]

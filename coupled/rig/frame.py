@@ -23,7 +23,7 @@ from coupled.rig.surface import command_surface
 Floats = NDArray[np.float64]
 
 # What the kernel records of each control, in this order; `record` names the channels.
-CHANNELS_PER_CONTROL = 9
+CHANNELS_PER_CONTROL = 10
 
 
 @stage
@@ -33,7 +33,8 @@ def set_product(
     """Set F_mod for the frame, through the host's converter, and return it at t_k in N.
 
     A digital host sends the product of δc as it reads it, to be held; a hybrid one sends ΔG,
-    and the multiplier takes δc as it is (figure 5).
+    and the multiplier takes v₁ as the electronics make it of δc, whose scale `set_gradients`
+    has in ΔG (figure 5).
     """
     if p.modification.digital:
         product = modifying_force(m, computed_read)
@@ -57,8 +58,8 @@ def host_frame(
     """Do what host and recorder do at t_k; return the surface command over the frame.
 
     `out` are the channels of one control: F, δc, δ, δ̂, G_T, F_mod, the step that F_mod makes
-    here, the surface command, and the stop met since the last frame. It comes holding the
-    noise of each.
+    here, the surface command, the stop met since the last frame, and the hand's own force. It
+    comes holding the noise of each: the first F is what the strain gauge reads.
     """
     computed = s.loader.computed
     m = s.modification
@@ -81,6 +82,7 @@ def host_frame(
     out[6] = product - ended
     out[7] = command
     out[8] = s.loader.stop
+    out[9] = force
     return command
 
 
@@ -128,7 +130,7 @@ def step_frame(
 
     controls  shape (n,), n ≤ 3
     script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
-    record    shape (frames, channels): t, 9 a control, the motion; comes holding the noise
+    record    shape (frames, channels): t, 10 a control, the motion; comes holding the noise
               that is added to what is read
     motion    of the airframe at t_k, q̄ in Pa first
     The commands are in ±1, one a control, 0 for a control that is absent.

@@ -25,6 +25,13 @@ Below that force the loader stands at neutral and the grip moves by the bend alo
 whatever is specified: no F_mod(δc) can give it.
 
 The host asks for ΔF in volts, v₂ = S₂·ΔF: a scale S₂ that is off makes another force of it.
+With the analog multiplier (figures 3 and 5) the host sends ΔG, scaled by Ŝ₂/Ŝ₁, and the product
+is made of v₁ = S₁·δc, eq. (2). So a wrong S₁ of the loader's electronics is felt,
+
+    ΔF = ΔG·δc·(S₁/Ŝ₁)·(Ŝ₂/S₂),
+
+and the break lies where v₁ says that δc is δc₁. A digital product is made of δc as the host
+reads it, to the same effect.
 """
 
 from __future__ import annotations
@@ -33,7 +40,7 @@ from typing import Protocol
 
 from coupled.rig import equations
 from coupled.rig.compiled import layout, stage
-from coupled.rig.declaration import Declaration
+from coupled.rig.declaration import Declaration, Given
 
 computed_deflection = stage(equations.computed_deflection)  # eq. (1)
 total_to_computed = stage(equations.total_to_computed)  # eq. (12), without its − G_B
@@ -50,6 +57,7 @@ class ModificationParameters(Protocol):
     exact: int  # with the breakout's term, or as printed
     digital: int  # the product ΔG·δc is made by the host and held over a frame
     made: float  # ΔF as made over ΔF as asked for: S₂ assumed over real
+    multiplied: float  # δc as the analog multiplier has it over δc: S₁ real over assumed
 
 
 class ModificationState(Protocol):
@@ -60,6 +68,12 @@ class ModificationState(Protocol):
     break_computed: float  # δc₁, d; 0 for one segment
     breakout: float  # F_extra, N
     held: float  # the digital product, N
+
+
+def _multiplied(given: Given) -> float:
+    """Return S₁/Ŝ₁ of the analog multiplier; a digital product has it in the δc that is read."""
+    control = given.control
+    return control.sensing.computed_scale if control.loader.multiplier == "hybrid" else 1.0
 
 
 MODIFICATION = Declaration(
@@ -73,6 +87,7 @@ MODIFICATION = Declaration(
         "exact": lambda g: g.control.compensation.breakout_term == "exact",
         "digital": lambda g: g.control.loader.multiplier == "digital",
         "made": lambda g: 1.0 / g.control.sensing.modifying_scale,
+        "multiplied": _multiplied,
     },
     state=layout(ModificationState),
     fixed=("first", "second", "break_computed", "breakout"),
@@ -104,8 +119,10 @@ def set_gradients(
         s.breakout = p.made * (
             total_to_computed(first, bend) * bend * preload + (preload - p.breakout)
         )
-    s.first = p.made * (total_to_computed(first, bend) - p.basic_gradient)
-    s.second = p.made * (total_to_computed(second, bend) - p.basic_gradient)
+    made = p.made * p.multiplied
+    s.first = made * (total_to_computed(first, bend) - p.basic_gradient)
+    s.second = made * (total_to_computed(second, bend) - p.basic_gradient)
+    s.break_computed /= p.multiplied
 
 
 @stage

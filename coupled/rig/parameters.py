@@ -67,8 +67,13 @@ class Compensation(Section):
 
 
 class Sensing(Section):
-    """Scales and converters between loader and host (figure 3); 0 bits is no converter."""
+    """Scales and converters between loader and host (figure 3); 0 bits is no converter.
 
+    Each scale is real over assumed. S₁ is in two parts: the electronics' own (`computed_scale`),
+    in v₁ for host and analog multiplier alike, and that of the host's reading of v₁ alone.
+    """
+
+    computed_scale: float = quantity("", 1.0, gt=0)
     deflection_scale: float = quantity("", 1.0, gt=0)
     modifying_scale: float = quantity("", 1.0, gt=0)
     force_scale: float = quantity("", 1.0, gt=0)
@@ -77,6 +82,11 @@ class Sensing(Section):
     s1: float = quantity("V_per_{d}", 0.0, ge=0)
     s2: float = quantity("V_per_N", 0.0, ge=0)
     s3: float = quantity("V_per_N", 0.0, ge=0)
+
+    @property
+    def read_scale(self) -> float:
+        """δc as the host reads it over δc as it is."""
+        return self.computed_scale * self.deflection_scale
 
 
 class Rigging(Section):

@@ -161,7 +161,7 @@ def _loader(
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
-        read = p.sensing.deflection_scale * s.loader.computed + misread[k]
+        read = p.sensing.read_scale * s.loader.computed + misread[k]
         out[1, k] = set_product(p, m, s.loader.computed, read)
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])

@@ -195,14 +195,15 @@ def _check_converters(control: Control, file: object, path: str, d: str) -> None
     for name, scale in scales.items():
         if scale <= 0.0:
             raise InputError(file, f"{key}.{name}", "must be given where word_length_bits is")
-    travel = control.travel * sensing.deflection_scale  # as the transducer's scale has it read
+    travel = control.travel * sensing.read_scale  # as it is read
     if sensing.s1 * travel > sensing.full_scale:
-        off = f" at deflection_scale = {sensing.deflection_scale:g}"
+        factors = {key: getattr(sensing, key) for key in ("computed_scale", "deflection_scale")}
+        off = [f"{key} = {factor:g}" for key, factor in factors.items() if factor != 1.0]
         raise InputError(
             file,
             f"{key}.s1_V_per_{d}",
             f"full travel reads {sensing.s1 * travel:.4g} V"
-            f"{off if sensing.deflection_scale != 1.0 else ''}, beyond the converter's"
+            f"{' at ' + ' and '.join(off) if off else ''}, beyond the converter's"
             f" {sensing.full_scale:g} V; give at most {sensing.full_scale / travel:.4g}",
         )
 

@@ -2,7 +2,12 @@
 
 Volts stand for metres and newtons: v₁ = S₁·δc, v₂ = S₂·ΔF, v₃ = S₃·F, eq. (2). A
 converter of a given word length rounds them to its step and holds them at its full
-scale. A scale S₁ or S₃ that is off makes the δc or F read that factor too large.
+scale. A scale S₁ or S₃ that is off makes the δc or F read that factor too large. An S₁ that
+is off in the loader's electronics is in the v₁ of the analog multiplier, too; one of the host's
+reading (transducer to host) is not.
+
+Steps and ranges are those of what is made: a ΔF, or ΔG, sent by assumed scales is made by the
+real ones.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from coupled.rig.parameters import Sensing
 class SensingParameters(Protocol):
     """Scales and converter steps, already divided into the quantity's own unit."""
 
-    deflection_scale: float  # S₁ real over assumed
+    read_scale: float  # S₁ real over assumed, as the host reads v₁
     force_scale: float  # S₃ real over assumed
     computed_step: float  # converter step of δc, d; 0 for none
     computed_range: float  # converter range of δc, d
@@ -34,8 +39,9 @@ class SensingParameters(Protocol):
 _SCALES: dict[str, Callable[[Sensing], float]] = {  # full scale of each, in its own unit
     "computed": lambda s: s.full_scale / s.s1,
     "force": lambda s: s.full_scale / s.s3,
-    "product": lambda s: s.full_scale / s.s2,
-    "gradient": lambda s: s.s1 / s.s2,  # the multiplier's other input: v₂ = v₁ at full scale
+    "product": lambda s: s.full_scale / (s.s2 * s.modifying_scale),
+    # The multiplier's other input: v₂ = v₁ at full scale, by the electronics' own S₁ and S₂.
+    "gradient": lambda s: s.s1 * s.computed_scale / (s.s2 * s.modifying_scale),
 }
 
 
@@ -51,7 +57,8 @@ def _step(of: str) -> Callable[[Given], float]:
 SENSING = Declaration(
     layout(SensingParameters),
     section="control.sensing",
-    derived={f"{of}_range": _range(of) for of in _SCALES}
+    derived={"read_scale": lambda g: g.control.sensing.read_scale}
+    | {f"{of}_range": _range(of) for of in _SCALES}
     | {f"{of}_step": _step(of) for of in _SCALES},
 )
 
@@ -68,7 +75,7 @@ def converted(value: float, step: float, full_scale: float) -> float:
 @stage
 def read_computed(p: SensingParameters, computed: float, noise: float) -> float:
     """Return δc as the host reads it, d: v₁ of eq. (2), by the scale that it assumes."""
-    return converted(p.deflection_scale * computed + noise, p.computed_step, p.computed_range)
+    return converted(p.read_scale * computed + noise, p.computed_step, p.computed_range)
 
 
 @stage

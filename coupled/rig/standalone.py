@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.record.channels import channel, control_channels
 from coupled.rig.compiled import entry
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.loader import move_loader, set_external, start_delay
@@ -23,12 +24,17 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 
 
+_HISTORY = ["force", "computed", "deflection", "estimate", "gradient", "modifying_force"]
+_HISTORY += ["surface_norm", "hand_force"]
+
+
 @dataclass(frozen=True)
 class History:
     """A control's time history, one value a frame, in SI; d is m, or rad for a wheel.
 
-    `force` F and `modifying` F_mod in N, `computed` δc and `deflection` δ as read, `estimate`
-    δ̂ in d, `gradient` G_T in N/d, `surface` the command about trim in ±1.
+    `force` F as the host reads it, `hand_force` F as it is and `modifying` F_mod in N, `computed`
+    δc and `deflection` δ as read, `estimate` δ̂ in d, `gradient` G_T in N/d, `surface` the
+    command about trim in ±1.
     """
 
     time_s: Floats
@@ -39,6 +45,7 @@ class History:
     gradient: Floats
     modifying: Floats
     surface: Floats
+    hand_force: Floats
 
 
 def nodes_of(rig: Rig, frames: int) -> Floats:
@@ -58,9 +65,10 @@ def run_control(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) ->
     script[0, 0] = nodes_N
     record = np.zeros((len(pressure_Pa), 2 + CHANNELS_PER_CONTROL))
     _frames(controls, script, record, pressure_Pa)
-    force, computed, deflection, estimate, gradient, modifying, _, surface = record[:, 1:9].T
     time_s = np.arange(len(pressure_Pa)) / rig.frame_rate
-    return History(time_s, force, computed, deflection, estimate, gradient, modifying, surface)
+    columns = dict(zip(control_channels(control), record[:, 1:].T, strict=False))
+    read = [columns[channel(control, quantity)] for quantity in _HISTORY]
+    return History(time_s, *read)
 
 
 def smooth(share: Floats) -> Floats:

@@ -54,7 +54,7 @@ def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) ->
         + added
     )
     deflection = computed + np.array([bend(p["linkage"], f) for f in force])
-    read = p["sensing"]["deflection_scale"] * computed
+    read = p["sensing"]["read_scale"] * computed
     force_read = p["sensing"]["force_scale"] * force
     estimates = np.array(
         [estimate(p["compensation"], x, f) for x, f in zip(read, force_read, strict=True)]

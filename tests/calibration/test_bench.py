@@ -12,7 +12,7 @@ import pytest
 from coupled.authority.compare import Outcome, compare
 from coupled.calibration.accuracy import deflection_off, felt_off
 from coupled.calibration.assumed import Scales, real_scales
-from coupled.calibration.bench import CalibrationBench, _meters_rig, _null, take_readings
+from coupled.calibration.bench import CalibrationBench, _null, _without_converters, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.coverage import measure_coverage
@@ -143,7 +143,7 @@ def test_the_mean_of_both_sides_is_s2_where_one_side_is_not(
     rig = read_rig(shipped_rigs()[name])
     tools = replace(perfect_instruments(), hand=0.003)
     made = CalibrationBench(rig, control, [], tools, 50)
-    null = _null(_meters_rig(rig, control), made, np.random.default_rng(1))
+    null = _null(_without_converters(rig, control), made, np.random.default_rng(1))
     true = real_scales(rig.controls[control])
     ratio = null[1] / null[2] * true.s3 / true.s2 - 1.0
     out, back = ratio[null[3] > 0.0].mean(), ratio[null[3] < 0.0].mean()

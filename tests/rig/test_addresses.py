@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coupled.resources import shipped_rigs
-from coupled.rig.frame import addresses, step_frame, step_frame_at
+from coupled.rig.frame import CHANNELS_PER_CONTROL, addresses, step_frame, step_frame_at
 from coupled.rig.packing import pack
 from coupled.rig.rigfile import read_rig
 
@@ -17,7 +17,7 @@ MOTION = (3000.0, 1.2, *np.linspace(-1.0, 1.0, 13).tolist())
 @pytest.mark.parametrize("rig_name", ["737", "bench"])
 def test_by_address_as_by_array(rig_name: str) -> None:
     rig = read_rig(shipped_rigs()[rig_name])
-    width = 1 + 9 * len(rig.controls) + len(MOTION)
+    width = 1 + CHANNELS_PER_CONTROL * len(rig.controls) + len(MOTION)
     rng = np.random.default_rng(5)
     noise = 1e-3 * rng.standard_normal((FRAMES, width))
     script = rng.standard_normal((len(rig.controls), 2, FRAMES * rig.substeps + 1)).cumsum(axis=2)

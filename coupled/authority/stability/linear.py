@@ -40,12 +40,18 @@ _COMPUTED, _RATE, _POSITION, _SPEED = range(4)
 
 
 def added_gradient(control: Control) -> float:
-    """Return ΔG as it is made, N/d, at the first gradient of the schedule: eq. (12)."""
+    """Return ΔG as it acts on δc, N/d, at the first gradient of the schedule: eq. (12).
+
+    By the scales of ΔF and of the δc that is multiplied: v₁, or what the host reads of it.
+    """
     host = control.compensation
     bend = host.bend if host.gradient else 0.0
     total = control.schedule.total_gradient[0]
     asked = modifying_gradient(total, bend, control.assumed_basic_gradient)
-    return asked / control.sensing.modifying_scale
+    sensing = control.sensing
+    hybrid = control.loader.multiplier == "hybrid"
+    multiplied = sensing.computed_scale if hybrid else sensing.read_scale
+    return asked * multiplied / sensing.modifying_scale
 
 
 def poles_growth(matrices: Floats) -> Floats:
@@ -124,8 +130,7 @@ def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:
     n = len(matrix)
     grown = np.zeros((n + 1, n + 1))
     grown[:n, :n] = matrix
-    grown[_RATE, n] = -added_gradient(control) * control.sensing.deflection_scale
-    grown[_RATE, n] /= control.loader.mass
+    grown[_RATE, n] = -added_gradient(control) / control.loader.mass
     over = expm(grown * frame_s)
     found = over[:n, :n].copy()
     found[:, _COMPUTED] += over[:n, n]
