@@ -1,11 +1,16 @@
 """Break a module in small ways, one at a time, and see whether its tests notice.
 
     python -m tests.mutation coupled/campaign/standards.py tests/campaign/test_check.py
+    python -m tests.mutation coupled/rig/linkage.py tests/rig/test_chain.py --plain --sample 25
 
-Each mutant changes one operator, comparison, number or condition of the module, in a copy of the
-clone that is thrown away. It is killed if a test fails, or hangs. One that survives is printed with
-its line: no test holds what it changed. `--sample 40` takes that many of the mutants at random; it
-is for kernels, where each mutant is compiled anew.
+Each mutant changes one operator, comparison, number or condition of the module. It is killed if
+a test fails, or hangs; one that survives is printed with its line: no test holds what it changed.
+`--sample 25` takes that many of the mutants at random, and `--change OLD NEW` is one of your own.
+
+The tests run once without a mutant; then each mutant has a fork of that process, which imports
+the changed module, and what depends on it, anew. No file is changed, so a test that starts
+another process does not see the mutant. Kernels are compiled for each mutant of a stage;
+`--plain` runs the rig's as plain Python instead, a hundred times slower and without that minute.
 """
 
 from __future__ import annotations
@@ -13,19 +18,28 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import importlib.abc
+import importlib.machinery
+import importlib.util
 import os
 import random
-import shutil
-import subprocess
+import select
+import signal
 import sys
-import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import CodeType, ModuleType
+from typing import NoReturn
+
+import pytest
+
+from coupled.rig import compiled
+from tests.support.interpreted import interpret
 
 ROOT = Path(__file__).parents[1]
-COPIED = ("coupled", "aircraft", "runs", "tests", "docs", "README.md", "pyproject.toml")
+ALWAYS = ("-x", "-q", "-n", "0", "-p", "no:cacheprovider")
 OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -69,14 +83,16 @@ def mutants(source: bytes) -> list[Mutant]:
             assert node.end_lineno is not None and node.end_col_offset is not None
             start = starts[node.lineno - 1] + node.col_offset
             end = starts[node.end_lineno - 1] + node.end_col_offset
-            new = f"({ast.unparse(other)})"
+            new = ast.unparse(other)
+            if isinstance(other, ast.expr):
+                new = f"({new})"
             found.append(Mutant(node.lineno, start, end, source[start:end].decode(), new))
     return sorted(found, key=lambda mutant: (mutant.start, mutant.end, mutant.new))
 
 
-def _physics(node: ast.AST) -> Iterator[ast.expr]:
+def _physics(node: ast.AST) -> Iterator[ast.expr | ast.AugAssign]:
     """Yield the expressions that are evaluated: no annotation, no decorator, no message."""
-    if isinstance(node, ast.expr):
+    if isinstance(node, ast.expr | ast.AugAssign):
         yield node
     for name, field in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "bases", "format_spec"):
@@ -88,13 +104,18 @@ def _physics(node: ast.AST) -> Iterator[ast.expr]:
                 yield from _physics(child)
 
 
-def _broken(node: ast.expr) -> Iterator[ast.expr]:
+def _broken(node: ast.expr | ast.AugAssign) -> Iterator[ast.expr | ast.AugAssign]:
     """Yield what a node is changed to."""
     other = copy.deepcopy(node)
     match other:
-        case ast.BinOp() if type(other.op) in OPERATORS:
+        case ast.BinOp() | ast.AugAssign() if type(other.op) in OPERATORS:
             other.op = OPERATORS[type(other.op)]()
             yield other
+        case ast.Call(func=ast.Name(id="min" | "max" as which)):
+            other.func = ast.Name("max" if which == "min" else "min")
+            yield other
+        case ast.Call(func=ast.Name(id="abs")):
+            yield other.args[0]
         case ast.Compare() if type(other.ops[0]) in COMPARISONS:
             other.ops[0] = COMPARISONS[type(other.ops[0])]()
             yield other
@@ -114,54 +135,169 @@ def _broken(node: ast.expr) -> Iterator[ast.expr]:
                 yield ast.Constant(1.1 * number)
 
 
-def killed(clone: Path, tests: list[str], limit_s: float) -> bool:
-    """Return whether a test fails in the clone as it is now, or does not end in time."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider"]
-    environment = {**os.environ, "PYTHONPATH": str(clone), "PYTHONDONTWRITEBYTECODE": "1"}
+class _Changed(importlib.machinery.SourceFileLoader):
+    """Loads a module from its file's place, and from another source."""
+
+    def __init__(self, name: str, source: bytes) -> None:
+        place = ROOT / (name.replace(".", "/") + ".py")
+        super().__init__(name, str(place))
+        self.source = source
+
+    def get_code(self, fullname: str) -> CodeType:
+        return compile(self.source, self.path, "exec")
+
+
+@dataclass(frozen=True)
+class _Finder(importlib.abc.MetaPathFinder):
+    """Finds the changed module before its file is looked at."""
+
+    loader: _Changed
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        if name != self.loader.name:
+            return None
+        return importlib.util.spec_from_file_location(name, self.loader.path, loader=self.loader)
+
+
+class _Watch:
+    """A plug-in that remembers the first test that failed; examples are the same each time."""
+
+    name = ""
+
+    def pytest_sessionstart(self) -> None:
+        from hypothesis import settings  # after pytest, which rewrites what it imports
+
+        settings.register_profile("mutation", deadline=None, derandomize=True, database=None)
+        settings.load_profile("mutation")
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed and not self.name:
+            self.name = report.nodeid
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.failed and not self.name:
+            self.name = f"{report.nodeid} (collecting)"
+
+
+def _imported(module: ModuleType) -> set[str]:
+    """Return the names that a module imports anywhere, and from which modules."""
+    found = set()
+    for node in ast.walk(ast.parse(Path(str(module.__file__)).read_bytes())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def dependants(name: str) -> set[str]:
+    """Return the loaded modules of package and tests that depend on one, and that one."""
+    ours = {
+        each: _imported(module)
+        for each, module in sys.modules.items()
+        if each.split(".")[0] in ("coupled", "tests") and getattr(module, "__file__", None)
+    }
+    found, before = {name}, 0
+    while len(found) > before:
+        before = len(found)
+        found |= {each for each, needs in ours.items() if needs & found}
+    return found
+
+
+def forget(names: set[str]) -> None:
+    """Let modules be imported anew."""
+    for name in names & set(sys.modules):
+        del sys.modules[name]
+        package, _, inner = name.rpartition(".")
+        vars(sys.modules.get(package, sys)).pop(inner, None)
+
+
+def _tried(name: str, source: bytes, stale: set[str], tests: list[str], answer: int) -> NoReturn:
+    """Run the tests with the module changed, in a process of its own; answer the first failure."""
+    os.setsid()
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(nowhere, stream)
+    if name.startswith("coupled.rig."):
+        # What is kept on disk was compiled from the file as it is.
+        vars(compiled)["entry"] = compiled.stage
+    failure = _Watch()
+    status = 1
     try:
-        done = subprocess.run(
-            [*command, *tests],
-            cwd=clone,
-            env=environment,
-            check=False,
-            timeout=limit_s,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-    except subprocess.TimeoutExpired:
-        return True
-    return done.returncode != 0
+        forget(stale)
+        sys.meta_path.insert(0, _Finder(_Changed(name, source)))
+        status = int(pytest.main([*ALWAYS, *tests], plugins=[failure]))
+    finally:
+        said = failure.name if status else ""
+        os.write(answer, (said or "*" * bool(status)).encode())
+        os._exit(0)
+
+
+def killer(name: str, source: bytes, stale: set[str], tests: list[str], limit_s: float) -> str:
+    """Return the first test that fails with the module changed; empty where none does."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _tried(name, source, stale, tests, writing)
+    os.close(writing)
+    try:
+        if not select.select([reading], [], [], limit_s)[0]:
+            os.killpg(child, signal.SIGKILL)
+            return f"no end within {limit_s:.0f} s"
+        return os.read(reading, 4096).decode()
+    finally:
+        os.close(reading)
+        os.waitpid(child, 0)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.mutation",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("module")
     parser.add_argument("tests", nargs="+")
-    parser.add_argument("--sample", type=int, default=0)
+    parser.add_argument("--sample", type=int, default=0, help="so many mutants, at random")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--plain", action="store_true", help="the rig's kernels as plain Python")
+    parser.add_argument("--change", nargs=2, metavar=("OLD", "NEW"), help="one change by hand")
+    parser.add_argument("--deselect", action="append", default=[], help="a test not to be run")
+    parser.add_argument("--verbose", action="store_true", help="name each mutant's killer")
     given = parser.parse_args()
     source = (ROOT / given.module).read_bytes()
     chosen = mutants(source)
-    if given.sample and given.sample < len(chosen):
+    if given.change:
+        old, new = given.change
+        if source.count(old.encode()) != 1:
+            sys.exit(f"{given.module}: {old!r} is to stand there once")
+        start = source.index(old.encode())
+        line = source.count(b"\n", 0, start) + 1
+        chosen = [Mutant(line, start, start + len(old.encode()), old, new)]
+    elif given.sample and given.sample < len(chosen):
         chosen = sorted(
             random.Random(given.seed).sample(chosen, given.sample), key=lambda m: m.start
         )
-    with tempfile.TemporaryDirectory() as name:
-        clone = Path(name)
-        for each in COPIED:
-            copying = shutil.copytree if (ROOT / each).is_dir() else shutil.copy2
-            copying(ROOT / each, clone / each)
-        start = time.perf_counter()
-        if killed(clone, given.tests, 600.0):
-            sys.exit("the tests fail without a mutant")
-        limit_s = 30.0 + 10.0 * (time.perf_counter() - start)
-        start, survived = time.perf_counter(), 0
-        for mutant in chosen:
-            (clone / given.module).write_bytes(mutant.applied(source))
-            if not killed(clone, given.tests, limit_s):
-                survived += 1
-                print(f"{given.module}:{mutant.line}: {mutant.old} → {mutant.new}", flush=True)
-        taken = time.perf_counter() - start
+    if given.plain:
+        forget(dependants("coupled.rig.compiled") - {"coupled.rig.compiled", __name__})
+        interpret()
+    tests = [*given.tests, *(f"--deselect={each}" for each in given.deselect)]
+    start_s = time.perf_counter()
+    if pytest.main([*ALWAYS, *tests], plugins=[_Watch()]):
+        sys.exit("the tests fail without a mutant")
+    limit_s = 60.0 + 5.0 * (time.perf_counter() - start_s)
+    name = given.module.removesuffix(".py").replace("/", ".")
+    stale = dependants(name) - {"__main__", "tests.mutation"}
+    start_s, survived = time.perf_counter(), 0
+    for mutant in chosen:
+        test = killer(name, mutant.applied(source), stale, tests, limit_s)
+        survived += not test
+        if given.verbose or not test:
+            place = f"{given.module}:{mutant.line}: {mutant.old} → {mutant.new}"
+            print(f"{test or 'SURVIVED'}: {place}", flush=True)
+    taken = time.perf_counter() - start_s
     dead = len(chosen) - survived
     print(f"{dead} of {len(chosen)} mutants killed, {taken:.0f} s")
 
