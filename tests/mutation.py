@@ -31,7 +31,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
@@ -167,8 +167,8 @@ class _Watch:
     name = ""
 
     def pytest_sessionstart(self) -> None:
-        from hypothesis import settings  # after pytest, which rewrites what it imports
-
+        # After pytest, which rewrites what it imports.
+        settings: Any = importlib.import_module("hypothesis").settings
         settings.register_profile("mutation", deadline=None, derandomize=True, database=None)
         settings.load_profile("mutation")
 
