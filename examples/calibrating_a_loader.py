@@ -15,7 +15,7 @@ from coupled.calibration.plan import precision, stations
 
 rig = coupled.load_rig("report-column").changed(
     {
-        "controls.column.sensing.deflection_scale": 0.96,  # S1 is 4 % less than the host assumes
+        "controls.column.sensing.computed_scale": 0.96,  # S1 is 4 % less than the host assumes
         "controls.column.compensation.bend_m_per_N": 0.0,  # and the host knows of no bend
     }
 )

@@ -12,7 +12,7 @@ from coupled.authority.compare import AS_THE_RIG, Comparison, Flight, fly_and_ju
 from coupled.authority.compare import compare as compare_manoeuvres
 from coupled.errors import InputError, nearest
 from coupled.flight.conditions import Conditions, build_conditions
-from coupled.flight.manoeuvre import CONFIGURATIONS, Configuration, Manoeuvre, PressureProfile
+from coupled.flight.manoeuvre import EVERY_CONFIGURATION, Configuration, Manoeuvre, PressureProfile
 from coupled.flight.pilot import Pilot
 from coupled.flight.runfile import read_run
 from coupled.record.channels import ControlName
@@ -66,8 +66,8 @@ def fly(
     `what` is a rig, its file, the name of a shipped one, or a manoeuvre, which says all the
     rest itself. A pilot is `Step`, `Ramp`, `Doublet`, `ThreeTwoOneOne`, `FrequencySweep`,
     `ForceTable`, `Clamp`, `Attitude` or `Track`. A pull, right wheel and right pedal are
-    positive. `configuration` is one of the five (`rigid`, `uncompensated`, `deflection only`,
-    `gradient only`, `compensated`); without it the rig flies as it is. `progress` is called
+    positive. `configuration` is `rigid`, `uncompensated`, `deflection only`, `gradient only`,
+    `compensated` or `calibrated low`; without it the rig flies as it is. `progress` is called
     with frames done and frames in all.
 
     Further keywords: `seed` (0); `dynamic_pressure_Pa`, a number or a `PressureProfile`, for a
@@ -106,7 +106,7 @@ def compare(
     """Fly a rig rigid, uncompensated, with each correction and with both; return the flights.
 
     Takes what `fly` takes, and the cases of a run (`load_run`). `configurations` are some of
-    the five, all unless given. `progress` is called with what is flown, frames done and frames
+    those that `fly` takes, the first five unless given. `progress` is called with what is flown, frames done and frames
     in all.
 
     The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the
@@ -198,6 +198,6 @@ def _alone(
 
 
 def _known(configuration: str, manoeuvre: Manoeuvre) -> None:
-    if configuration not in CONFIGURATIONS:
-        hint = nearest(configuration, CONFIGURATIONS)
+    if configuration not in EVERY_CONFIGURATION:
+        hint = nearest(configuration, EVERY_CONFIGURATION)
         raise InputError(manoeuvre.file, "configuration", f"no {configuration!r}; {hint}")

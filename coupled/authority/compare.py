@@ -1,6 +1,6 @@
 """Authority: what the bend takes away in flight terms, and what each correction gives back.
 
-One manoeuvre is flown in the five configurations; an `Outcome` holds the figures of one
+One manoeuvre is flown in several configurations; an `Outcome` holds the figures of one
 flight. Loss and feel are read while the control stands still, held at half or more of its
 greatest deflection, beside the closed form of the rig's statics there (which leaves friction
 out). The force is the hand's own, whatever the strain gauge says of it; breakout and bob weight
@@ -31,7 +31,7 @@ from coupled.rig.statics import static_point
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-AS_THE_RIG = "as the rig file says"  # a flight in none of the five configurations
+AS_THE_RIG = "as the rig file says"  # a flight in none of the configurations
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Outcome:
 class Flight:
     """One flight: what was flown, its record, and the figures of its outcome.
 
-    `configuration` is one of the five, or says that the rig was flown as it is.
+    `configuration` is one of the manoeuvre's, or says that the rig was flown as it is.
     """
 
     manoeuvre: Manoeuvre

@@ -3,9 +3,11 @@
 Compensated with Ŝ₁, Ŝ₂, Ŝ₃ and K̂, at rest without breakout and at a gradient G:
 
     δ̂/δ = (S₁/Ŝ₁)·(1 − K·G) + K̂·G·S₃/Ŝ₃                      (the surface follows δ̂)
-    felt/specified = (G_L/(1 + K·G_L))/G,   G_L = G_B + (G/(1 − K̂·G) − G_B)·Ŝ₂/S₂
+    felt/specified = (G_L/(1 + K·G_L))/G,
+    G_L = G_B + (G/(1 − K̂·G) − G_B)·(S₁/Ŝ₁)·(Ŝ₂/S₂)       (figure 5: v₂ is made of ΔG and v₁)
 
 Errors of S₁ and K come together from a fit, and mostly cancel in δ̂: it knows best what was read.
+An S₂ that was made from S₁ by the gain S₁/S₂ errs with it, and both drop out of what is felt.
 """
 
 from __future__ import annotations
@@ -49,21 +51,27 @@ def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g
     return seen + bend_loss(bend, g) * true.s3 / found.s3 - 1.0
 
 
-def felt_off(
-    s2_ratio: float, bend: float, true_bend: float, gradients: tuple[float, float]
-) -> float:
+def made_of_asked(found: Scales, true: Scales) -> float:
+    """Return ΔF as made over ΔF as asked for, by scales assumed and true: figures 3 and 5."""
+    return true.s1 / found.s1 * found.s2 / true.s2
+
+
+def felt_off(made: float, bend: float, true_bend: float, gradients: tuple[float, float]) -> float:
     """Return felt over specified gradient less 1.
 
-    `s2_ratio` is S₂ assumed over true, `gradients` (G, G_B) in N/d.
+    `made` is ΔF as made over ΔF as asked for (`made_of_asked`), `gradients` (G, G_B) in N/d.
     """
     g, basic = gradients
-    held = basic + modifying_gradient(g, bend, basic) * s2_ratio
+    held = basic + modifying_gradient(g, bend, basic) * made
     return felt_gradient(held, true_bend) / g - 1.0
 
 
-def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Accuracy | None:
+def expected(
+    fit: JointFit, s2: Estimate | None, control: Control, tied: bool = False
+) -> Accuracy | None:
     """Return how far off deflection and feel may be at the gradient where that is most.
 
+    `tied`: S₂ was made from this fit's S₁ by the gain S₁/S₂.
     None where the structure is no stiffer than the gradient, which no compensation can give.
     """
     table = control.schedule.total_gradient
@@ -71,17 +79,20 @@ def expected(fit: JointFit, s2: Estimate | None, control: Control) -> Accuracy |
     tried = np.linspace(min(table), max(table), 9)
     if bend_loss(bend, max(table)) >= 1.0:
         return None
-    found = [_at(fit, s2, float(g), control.loader.basic_gradient) for g in tried if g > 0.0]
+    basic = control.loader.basic_gradient
+    found = [_at(fit, s2, tied, float(g), basic) for g in tried if g > 0.0]
     return max(found, key=lambda one: one.deflection.half_width, default=None)
 
 
-def _at(fit: JointFit, s2: Estimate | None, g: float, basic: float) -> Accuracy:
+def _at(fit: JointFit, s2: Estimate | None, tied: bool, g: float, basic: float) -> Accuracy:
     s1, bend, s3 = fit.line.s1.value, fit.line.bend.value, fit.s3.value
     lost = bend_loss(bend, g)
     off = fit.estimate(0.0, -(1.0 - lost) / s1, g, -lost / s3)
     if s2 is None:
         return Accuracy(g, off, None)
-    by_bend = fit.estimate(0.0, 0.0, g, 0.0)
-    by_s2 = (1.0 - lost) * (1.0 - basic / g * (1.0 - lost)) / s2.value
-    scaled = Estimate(0.0, abs(by_s2) * s2.error, s2.freedom)
-    return Accuracy(g, off, total(by_bend, scaled))
+    if tied:
+        return Accuracy(g, off, fit.estimate(0.0, 0.0, g, 0.0))
+    by_made = (1.0 - lost) * (1.0 - basic / g * (1.0 - lost))
+    by_fit = fit.estimate(0.0, -by_made / s1, g, 0.0)
+    scaled = Estimate(0.0, abs(by_made) / s2.value * s2.error, s2.freedom)
+    return Accuracy(g, off, total(by_fit, scaled))

@@ -120,7 +120,7 @@ def calibrate_control(
         scales.s3_by_ratios(f[there], used.v3[there]),
         s2,
         one_sided,
-        expected(fit, next(reversed(s2.values()), None), control),
+        expected(fit, next(reversed(s2.values()), None), control, list(s2)[-1:] == [scales.BY_S1]),
         tuple(suspects),
         used,
         level,

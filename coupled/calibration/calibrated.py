@@ -12,9 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 from coupled.calibration.assumed import GAINS, real_scales
+from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
+
+_ROUNDING = 1e-15  # of a figure: a smaller error is that of a computer alone
 
 
 def with_calibration(
@@ -45,11 +48,11 @@ def with_calibration(
         "calibration.readings": found.count,
         "calibration.date": date,
         f"calibration.s1_V_per_{d}": s1.value,
-        f"calibration.s1_error_V_per_{d}": s1.error,
+        f"calibration.s1_error_V_per_{d}": _error(s1),
         "calibration.s3_V_per_N": s3.value,
-        "calibration.s3_error_V_per_N": s3.error,
+        "calibration.s3_error_V_per_N": _error(s3),
         f"calibration.bend_{d}_per_N": bend.value,
-        f"calibration.bend_error_{d}_per_N": bend.error,
+        f"calibration.bend_error_{d}_per_N": _error(bend),
         "calibration.length_m": data.length,
     }
     for name, unit in GAINS.items():
@@ -59,7 +62,11 @@ def with_calibration(
         changes["sensing.s2_V_per_N"] = s2.value
         changes["sensing.modifying_scale"] = 1.0 if hardware else real.s2 / s2.value
         changes["calibration.s2_V_per_N"] = s2.value
-        changes["calibration.s2_error_V_per_N"] = s2.error
+        changes["calibration.s2_error_V_per_N"] = _error(s2)
     if hardware:
         changes[f"loader.bend_{d}_per_N"] = used
     return rig.changed({f"{place}.{key}": value for key, value in changes.items()})
+
+
+def _error(figure: Estimate) -> float:
+    return figure.error if figure.error > _ROUNDING * abs(figure.value) else 0.0

@@ -14,6 +14,7 @@ from coupled.calibration.accuracy import (
     FELT_WITHIN,
     deflection_off,
     felt_off,
+    made_of_asked,
 )
 from coupled.calibration.assumed import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
@@ -151,8 +152,8 @@ def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
     assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)
     table, basic = data.schedule.total_gradient, data.loader.basic_gradient
     gradients = [float(g) for g in np.linspace(min(table), max(table), 3)]
-    ratio = assumed.s2 / true.s2
+    made = made_of_asked(assumed, true)
     return (
         max(abs(deflection_off(assumed, k, true, bend, g)) for g in gradients),
-        max(abs(felt_off(ratio, k, bend, (g, basic))) for g in gradients),
+        max(abs(felt_off(made, k, bend, (g, basic))) for g in gradients),
     )

@@ -9,6 +9,7 @@ from coupled.calibration.estimate import Estimate, mean_of, product
 from coupled.rig.parameters import Gains
 
 Floats = NDArray[np.float64]
+BY_S1 = "S1 and the gain S1/S2"
 
 
 def s3_by_ratios(force: Floats, v3: Floats) -> Estimate:
@@ -20,7 +21,7 @@ def s2_from_gains(s1: Estimate, s3: Estimate, gains: Gains) -> dict[str, Estimat
     """Return S₂ in V/N from each internal gain that is known: S₁/(S₁/S₂) and S₃/(S₃/S₂)."""
     found = {}
     if gains.s1_over_s2 > 0.0:
-        found["S1 and the gain S1/S2"] = s1.scaled(1.0 / gains.s1_over_s2)
+        found[BY_S1] = s1.scaled(1.0 / gains.s1_over_s2)
     if gains.s3_over_s2 > 0.0:
         found["S3 and the gain S3/S2"] = s3.scaled(1.0 / gains.s3_over_s2)
     return found

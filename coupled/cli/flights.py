@@ -94,7 +94,7 @@ def fly(
     from coupled.authority.compare import AS_THE_RIG, fly_and_judge
     from coupled.errors import nearest
     from coupled.flight.loop import input_files
-    from coupled.flight.manoeuvre import CONFIGURATIONS
+    from coupled.flight.manoeuvre import EVERY_CONFIGURATION
     from coupled.flight.runfile import read_run
     from coupled.record.record import check_suffix, manifest_path, write_record
 
@@ -102,11 +102,11 @@ def fly(
     if case and case not in cases:
         raise InputError(run, "--case", f"no case {case!r}; {nearest(case, cases)}")
     manoeuvre = cases[case] if case else next(iter(cases.values()))
-    for known in CONFIGURATIONS:
+    for known in EVERY_CONFIGURATION:
         if configuration == known:
             manoeuvre = manoeuvre.configured(known)
-    if configuration and configuration not in CONFIGURATIONS:
-        hint = nearest(configuration, CONFIGURATIONS)
+    if configuration and configuration not in EVERY_CONFIGURATION:
+        hint = nearest(configuration, EVERY_CONFIGURATION)
         raise InputError(run, "--configuration", f"no {configuration!r}; {hint}")
     path = output or Path("out") / f"{manoeuvre.name}.csv"
     check_suffix(path)

@@ -18,11 +18,15 @@ from coupled.flight.expectation import Expect
 from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import Values
 from coupled.record.channels import ControlName, record_channels, unit_of
-from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.equations import bend_loss, felt_gradient
+from coupled.rig.parameters import PLAIN_NAME, Control
 from coupled.rig.rig import Rig
 from coupled.schema import Given, Section, build, quantity
 
-Configuration = Literal["rigid", "uncompensated", "deflection only", "gradient only", "compensated"]
+Configuration = Literal[
+    "rigid", "uncompensated", "deflection only", "gradient only", "compensated", "calibrated low"
+]
+# What a comparison flies unless asked for others.
 CONFIGURATIONS: tuple[Configuration, ...] = (
     "rigid",
     "uncompensated",
@@ -30,6 +34,7 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
     "gradient only",
     "compensated",
 )
+EVERY_CONFIGURATION: tuple[Configuration, ...] = (*CONFIGURATIONS, "calibrated low")
 
 
 class PressureProfile(Given):
@@ -97,7 +102,7 @@ class Manoeuvre:
     conditions          wind, gust, turbulence and events; only with an aircraft
     bench               q̄ over time; only, and always, on a rig without aircraft
     record_properties   JSBSim properties that become channels of the record
-    configurations      those that a comparison flies, of the five
+    configurations      those that a comparison flies, of `EVERY_CONFIGURATION`
     measure             what a comparison looks at
     expect              what a check holds the flights against
     name, label         of the run, and of its case
@@ -172,7 +177,7 @@ class Manoeuvre:
         return (*own, *self.record_properties)
 
     def configured(self, configuration: Configuration) -> Manoeuvre:
-        """Return this manoeuvre with the rig in one of the five configurations."""
+        """Return this manoeuvre with the rig in one of the configurations."""
         return replace(self, rig=configure(self.rig, configuration))
 
     def _check_kind(self) -> None:
@@ -216,14 +221,33 @@ class Manoeuvre:
 def configure(rig: Rig, configuration: Configuration) -> Rig:
     """Return the rig with its structure rigid, or bending with the named corrections on.
 
-    Rigid: K = 0 and the host's K̂ = 0. Otherwise the rig's own K and K̂.
+    Rigid: K = 0 and the host's K̂ = 0. Otherwise the rig's own K and K̂. "calibrated low" is the
+    uncompensated rig whose host found S₁ at a low gradient, eq. (7a).
     """
     changes: dict[str, Any] = {}
-    for name in rig.controls:
+    for name, control in rig.controls.items():
         loader, host = f"controls.{name}.loader", f"controls.{name}.compensation"
         if configuration == "rigid":
             d = unit_of(name)
             changes |= {f"{loader}.bend_{d}_per_N": 0.0, f"{host}.bend_{d}_per_N": 0.0}
         changes[f"{host}.deflection"] = configuration in ("deflection only", "compensated")
         changes[f"{host}.gradient"] = configuration in ("gradient only", "compensated")
+        if configuration == "calibrated low":
+            low = _calibrated_low(control, unit_of(name))
+            changes |= {f"controls.{name}.sensing.{key}": value for key, value in low.items()}
     return rig.changed(changes)
+
+
+def _calibrated_low(control: Control, d: str) -> dict[str, float]:
+    """Return the scales of a host that takes v₁/δ, read at a low gradient, for S₁: eq. (7a).
+
+    While it is read the loader holds F = G₀·δc, so that G₀/(1 + K·G₀) is felt and v₁/δ is
+    S₁/(1 + K·G₀). That Ŝ₁ is in the analog product too (figure 5), as in the host's reading.
+    """
+    sensing, bend = control.sensing, control.loader.bend
+    low = control.gains.low_gradient or min(control.schedule.total_gradient)
+    kept = 1.0 - bend_loss(bend, felt_gradient(low, bend))
+    return {
+        f"s1_V_per_{d}": kept * sensing.read_scale * sensing.s1,
+        "computed_scale": 1.0 / (kept * sensing.deflection_scale),
+    }

@@ -26,8 +26,9 @@ _STYLE = {
     "deflection only": ("#0072b2", "dashed", 1.6),
     "gradient only": ("#cc79a7", "dashed", 1.6),
     "compensated": ("#009e73", "solid", 1.6),
+    "calibrated low": ("#e69f00", "dashdot", 1.6),
 }
-_SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.")
+_SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
 def draw_comparison(flights: Sequence[Flight]) -> Figure:

@@ -95,6 +95,17 @@ def bend_loss(bend: float, gradient: N) -> N:
     return bend * gradient
 
 
+def low_calibration_loss(bend: float, gradient: N, low: float) -> N:
+    """Return the share lost by a host whose S₁ was found at a low gradient: eq. (7a) as flown.
+
+    Where `low` G₀ is felt, v₁ = S₁·(1 − K·G₀)·δ; taken for the scale of δ, that has the bend at
+    G₀ in it. Where `gradient` G_T is felt, K·(G_T − G₀)/(1 − K·G₀) of δ is lost: nothing at G₀,
+    and below it the surface goes further than asked (a negative loss). Without unit, for K in
+    d/N and felt gradients in N/d; G₀ = 0 is `bend_loss`.
+    """
+    return bend_loss(bend, gradient - low) / (1.0 - bend_loss(bend, low))
+
+
 def uncompensated_loss(bend: float, gradient: N) -> N:
     """Return the share lost when the loader holds F = G_T·δc: K·G_T/(1 + K·G_T)."""
     return bend * felt_gradient(gradient, bend)

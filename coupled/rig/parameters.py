@@ -100,11 +100,16 @@ class Rigging(Section):
 
 
 class Gains(Section):
-    """What is fixed before any readings are taken; 0 for a ratio that is not known (figure 3)."""
+    """What is fixed before any readings are taken; 0 for a ratio that is not known (figure 3).
+
+    `low_gradient` is the one set while S₁ is calibrated at a low gradient, eq. (7a); 0 for the
+    schedule's lowest.
+    """
 
     mechanical_advantage: float = quantity("", 1.0, gt=0)
     s1_over_s2: float = quantity("N_per_{d}", 0.0, ge=0)
     s3_over_s2: float = quantity("", 0.0, ge=0)
+    low_gradient: float = quantity("N_per_{d}", 0.0, ge=0)
 
 
 class Calibration(Section):

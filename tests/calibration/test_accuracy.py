@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.calibration.accuracy import deflection_off, expected, felt_off
+from coupled.calibration.accuracy import deflection_off, expected, felt_off, made_of_asked
 from coupled.calibration.assumed import Scales
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import Estimate, usual_instruments
@@ -17,19 +17,24 @@ from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
 def test_closed_forms_are_the_rigs_statics() -> None:
-    """A host that assumes 1.1·K, with S₁ real 0.93, S₂ 1.05 and S₃ 1.04 of what it assumes."""
+    """A host that assumes 1.1·K, with S₁ real 0.93, S₂ 1.05 and S₃ 1.04 of what it assumes.
+
+    By the analog multiplier; `test_multiplied` has the digital product.
+    """
     changes = {
-        "sensing.deflection_scale": 0.93,
+        "sensing.computed_scale": 0.93,
         "sensing.modifying_scale": 1.05,
         "sensing.force_scale": 1.04,
         "compensation.bend_m_per_N": 1.1 * K_REPORT,
     }
     rig = bench({f"controls.column.{key}": value for key, value in changes.items()})
     line = static_line(rig, "column", 3000.0, np.array([0.03]))
-    felt = felt_off(1.0 / 1.05, 1.1 * K_REPORT, K_REPORT, (G_STIFF, 560.0))
+    true, assumed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
+    made = made_of_asked(assumed, true)
+    assert made == pytest.approx(0.93 / 1.05)
+    felt = felt_off(made, 1.1 * K_REPORT, K_REPORT, (G_STIFF, 560.0))
     assert line.force[0] / line.deflection[0] / G_STIFF - 1.0 == pytest.approx(felt, rel=1e-9)
     # δ̂ at the gradient that is felt, which is not quite the one asked for
-    true, assumed = Scales(0.93, 1.05, 1.04), Scales(1.0, 1.0, 1.0)
     gradient = line.force[0] / line.deflection[0]
     off = deflection_off(assumed, 1.1 * K_REPORT, true, K_REPORT, float(gradient))
     assert line.estimate[0] / line.deflection[0] - 1.0 == pytest.approx(off, rel=1e-9)
@@ -47,7 +52,8 @@ def test_what_is_promised_is_the_scatter_that_comes() -> None:
         g, bend = found.gradient, fit.line.bend.value
         assumed = Scales(fit.line.s1.value, s2.value, fit.s3.value)
         offs.append(deflection_off(assumed, bend, true, K, g))
-        felts.append(felt_off(s2.value / S2, bend, K, (g, control.loader.basic_gradient)))
+        made = made_of_asked(assumed, true)
+        felts.append(felt_off(made, bend, K, (g, control.loader.basic_gradient)))
         errors.append((found.deflection.error, found.felt.error))
     promised = np.sqrt(np.mean(np.square(errors), axis=0))
     assert promised[0] == pytest.approx(np.std(offs), rel=0.12)
