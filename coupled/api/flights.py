@@ -106,8 +106,8 @@ def compare(
     """Fly a rig rigid, uncompensated, with each correction and with both; return the flights.
 
     Takes what `fly` takes, and the cases of a run (`load_run`). `configurations` are some of
-    those that `fly` takes, the first five unless given. `progress` is called with what is flown, frames done and frames
-    in all.
+    those that `fly` takes, the first five unless given. `progress` is called with what is flown,
+    frames done and frames in all.
 
     The `Comparison` is a sequence of `Flight`; `.loss("uncompensated")` is the share of the
     surface command lost, `.felt_ratio(…)` force felt over force specified, `.flight(…)` the

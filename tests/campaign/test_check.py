@@ -42,8 +42,8 @@ def flight(values: Any, ended: bool = False) -> Flight:
     x = np.asarray(values, dtype=float)
     manifest = {"ended_early": {"reason": "test", "time_s": 0.1 * len(x)} if ended else None}
     record = Record(
-        ("time_s", "x", "column_force_N"),
-        np.column_stack((0.1 * np.arange(len(x)), x, 10.0 * x)),
+        ("time_s", "x", "column_force_N", "column_hand_force_N"),
+        np.column_stack((0.1 * np.arange(len(x)), x, 11.0 * x, 10.0 * x)),  # S₃ is 10 % off
         manifest,
     )
     figures: dict[str, Any] = dict.fromkeys((f.name for f in fields(Outcome)), 0.25)
@@ -132,7 +132,9 @@ def held(lbf: float, seconds: float, control: str = "column", least_s: float = 3
     time = 0.1 * np.arange(rows)
     force = np.where(time < seconds - 1e-9, lbf * LBF, 0.0)
     record = Record(
-        ("time_s", f"{control}_force_N"), np.column_stack((time, force)), {"ended_early": None}
+        ("time_s", f"{control}_hand_force_N"),
+        np.column_stack((time, force)),
+        {"ended_early": None},
     )
     return replace(base, record=record)
 

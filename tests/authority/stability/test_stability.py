@@ -148,6 +148,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
     integral=st.sampled_from([0.0, 2000.0]),
     multiplier=st.sampled_from(["hybrid", "digital"]),
     scale=st.floats(0.9, 1.1),
+    electronics=st.floats(0.9, 1.1),
     delay_s=st.sampled_from([0.0, 0.01]),
 )
 def test_any_rig_and_hand_grow_as_linear_theory_says(
@@ -162,6 +163,7 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
     integral: float,
     multiplier: Literal["hybrid", "digital"],
     scale: float,
+    electronics: float,
     delay_s: float,
 ) -> None:
     gradient = share / K_REPORT
@@ -171,6 +173,7 @@ def test_any_rig_and_hand_grow_as_linear_theory_says(
         "damping_N_s_per_m": 2.0 * ratio * math.sqrt(spring * mass),
         "servo_frequency_Hz": servo_Hz,
         "delay_s": delay_s,
+        "controls.column.sensing.computed_scale": electronics,
         "controls.column.sensing.deflection_scale": scale,
         "controls.column.sensing.modifying_scale": scale**2,
     }
