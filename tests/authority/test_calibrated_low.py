@@ -73,7 +73,7 @@ def lost(record: Record) -> tuple[float, float]:
 
 
 def test_the_equation_is_the_ratio_of_two_calibrations() -> None:
-    """(1 − K·G)/(1 − K·G₀): S₁·(1 − K·G₀) is what v₁/δ is at G₀, and nothing is lost there."""
+    """Eq. (7a), as (1 − K·G)/(1 − K·G₀): v₁/δ is S₁·(1 − K·G₀) at G₀; nothing is lost there."""
     for gradient in (LOW, 0.5 * (LOW + STIFF), STIFF):
         seen = computed_deflection(1.0, gradient, K) / computed_deflection(1.0, LOW, K)
         assert low_calibration_loss(K, gradient, LOW) == pytest.approx(1.0 - seen, abs=1e-15)
@@ -85,7 +85,7 @@ def test_the_equation_is_the_ratio_of_two_calibrations() -> None:
 @pytest.mark.parametrize("multiplier", ["hybrid", "digital"])
 @pytest.mark.parametrize("corrected", [False, True], ids=["uncorrected", "gradient corrected"])
 def test_the_reports_worst_case_flown(multiplier: str, corrected: bool) -> None:
-    """2 in at 12.5 lb/in felt: 25 lb, 0.31 in lost of 2, where a known S₁ would lose 0.4.
+    """Eq. (7a) at 2 in and 12.5 lb/in felt: 0.31 in lost, where a known S₁ would lose 0.4.
 
     ΔG is multiplied by a v₁ that stands for 1/(1 − K·G₀) of δc: the G_T asked for is the one
     that is felt as 12.5 lb/in with that.

@@ -56,7 +56,7 @@ def pulled(rig: Rig, force_N: float = 60.0, seconds: float = 8.0) -> Record:
 def test_what_is_felt_and_read_is_the_closed_form(
     multiplier: Multiplier, s1: float, s2: float
 ) -> None:
-    """F = (G_B + ΔG·(S₁/Ŝ₁)·(Ŝ₂/S₂))·δc, and δ̂ = (S₁/Ŝ₁)·δc + K̂·F, flown and at rest."""
+    """Eqs. (2), (11): F = (G_B + ΔG·(S₁/Ŝ₁)·(Ŝ₂/S₂))·δc and δ̂ = (S₁/Ŝ₁)·δc + K̂·F, at rest."""
     rig = off(multiplier, computed_scale=s1, modifying_scale=s2)
     held = BASIC + ADDED * s1 / s2
     record = pulled(rig)
