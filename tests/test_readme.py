@@ -10,10 +10,12 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import textwrap
 from pathlib import Path
 
 import pytest
 
+from tests.support.benchmarks import SENTENCES
 from tests.support.commands import ROOT, coupled
 
 README = ROOT / "README.md"
@@ -79,6 +81,26 @@ def test_the_pictures_and_pages_that_the_readme_shows_are_there() -> None:
         assert (ROOT / target).exists(), target
 
 
+MEASURED = r"(<!-- {name} -->\n)(.*?)(\n<!-- end -->)"
+
+
+@pytest.mark.parametrize("name", list(SENTENCES))
+def test_the_measured_figures_are_those_that_a_benchmark_kept(name: str) -> None:
+    found = re.search(MEASURED.format(name=name), README.read_text(encoding="utf-8"), re.S)
+    assert found is not None
+    assert " ".join(found.group(2).split()) == SENTENCES[name]()
+
+
+def with_measured(text: str) -> str:
+    """Return the README with the benchmarks' sentences anew."""
+    for name, sentence in SENTENCES.items():
+        lines = "\n".join(textwrap.wrap(sentence(), 110, break_on_hyphens=False))
+        head, end = f"<!-- {name} -->\n", "\n<!-- end -->"
+        before, _, after = text.partition(head)
+        text = before + head + lines + end + after.partition(end)[2]
+    return text
+
+
 def refresh() -> None:
     """Write the README's outputs anew."""
     with tempfile.TemporaryDirectory() as name:
@@ -97,6 +119,7 @@ def refresh() -> None:
 
         text = BLOCK.sub(block, README.read_text(encoding="utf-8"))
         text = PYTHON.sub(example, text)
+        text = with_measured(text)
         README.write_text(text, encoding="utf-8")
 
 

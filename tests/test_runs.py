@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -119,3 +122,32 @@ def test_the_spring_tabs_loss_is_the_aircrafts_and_the_bends_comes_on_top() -> N
         assert lost["spring tab", configuration] == lost["direct drive", configuration]
     for case in ("direct drive", "spring tab"):
         assert moved[case, "gradient only"] / moved[case, "rigid"] == pytest.approx(0.8, abs=2e-3)
+
+
+ORIGINS = ("source: ", "closed form: ", "purpose: ", "regression: ")
+
+
+@pytest.mark.parametrize("name", sorted(shipped_runs()))
+def test_every_bound_says_where_it_is_from(name: str) -> None:
+    """As specified or as rigid (1, or 0) and a limit of the standards speak for themselves."""
+    for expect in tomllib.loads(shipped_runs()[name].read_text(encoding="utf-8"))["expect"]:
+        plain = "standard" in expect or expect.get("is") in (0.0, 1.0)
+        assert plain or expect.get("why", "").startswith(ORIGINS), expect
+
+
+def closed_form(configuration: str) -> float:
+    """Return the wheel's loss at its clamp: K·F/δ with the force right, eqs. (7) and (12)."""
+    loader = read_run("roll-authority")[0].rig.controls["wheel"].loader
+    held = math.pi / 3.0
+    rest = loader.breakout + loader.friction
+    stretch = loader.bend * (loader.basic_gradient * held + rest)
+    if configuration == "gradient only":
+        return stretch / held
+    return stretch / held / (1.0 + loader.bend * loader.basic_gradient)
+
+
+@pytest.mark.parametrize("configuration", ["uncompensated", "gradient only"])
+def test_the_wheels_loss_that_is_expected_is_its_closed_form(configuration: str) -> None:
+    run = read_run("roll-authority")[0]
+    [expect] = [e for e in run.expect if e.measure == "loss" and e.configuration == configuration]
+    assert expect.equal == pytest.approx(closed_form(configuration), abs=2e-4)

@@ -1,7 +1,8 @@
 """What a run file expects of its flights: `[[expect]]`, read and checked before anything flies.
 
 An expectation looks at a channel, at a figure that a comparison measures, or at a limit of
-the standards. Which rows of which flight, and within which bounds, its other keys say.
+the standards. Which rows of which flight, and within which bounds, its other keys say. `why` names
+where the bounds are from, above all whether they only pin what the model did before.
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ class Expect(Section):
     most: float | None = None
     equal: float | None = named("is", None)
     within: float | None = quantity("", None, ge=0)
+    why: str | None = None
 
     @property
     def bounds(self) -> tuple[float | None, float | None]:

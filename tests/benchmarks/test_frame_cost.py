@@ -5,6 +5,7 @@ Run alone, with its figures printed:  pytest -m bench -s
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ import pytest
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
+from tests.support.benchmarks import keep, kept_figures
 from tests.support.runs import shortened
 
 pytestmark = pytest.mark.bench
@@ -42,6 +44,7 @@ def bare_s(scenario: Manoeuvre) -> float:
 @pytest.mark.parametrize(("controls", "most"), [(1, 1.5), (3, 2.0)])
 @pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
 def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, most: float) -> None:
+    load = os.getloadavg()[0]
     long, short = shortened(run, controls, FRAMES), shortened(run, controls, 1)
     flown_s(short)
     bare, flown, start = [], [], []
@@ -56,6 +59,8 @@ def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, m
         # machine that does other work all along is given more rounds to show a quiet one.
         ratio = (min(flown) - min(start)) / min(bare)
     print(f"\n{run}, {controls} control(s): {ratio:.2f} times run(), bound {most}")
+    name = f"frame cost, {controls} control(s)"
+    keep(name, {**kept_figures(name), run: ratio}, load)
     assert ratio <= most
 
 

@@ -1,0 +1,110 @@
+"""What benchmarks measured, kept in docs/benchmarks.json, and the README's sentences from it.
+
+    COUPLED_BENCHMARKS=keep pytest -m bench -s
+
+writes each benchmark's figures into the file with machine, date, versions, and the load that the
+machine had meanwhile; without the variable nothing is written. The README says only what is there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from coupled import __version__
+from tests.support.commands import ROOT
+
+FILE = ROOT / "docs" / "benchmarks.json"
+FRAME = "A coupled frame, with the loader at 2 kHz and the record on,"
+HELD = "A benchmark holds two workers to 1.8 times the flights a second of one, in flat memory"
+LIBRARIES = ("jsbsim", "numba", "numpy", "polars")
+Figures = Mapping[str, float]
+
+
+def processor() -> str:
+    """Return the processor's name, as far as the system gives one."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def everything() -> dict[str, Any]:
+    """Return the whole file, by benchmark."""
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))) if FILE.exists() else {}
+
+
+def keep(name: str, figures: Figures, load_before: float) -> None:
+    """Write a benchmark's figures, where the environment asks for it.
+
+    `load_before` is the machine's load (mean of a minute) when the benchmark began: that of others.
+    """
+    if os.environ.get("COUPLED_BENCHMARKS") != "keep":
+        return
+    entry = {
+        "figures": {key: float(f"{value:.4g}") for key, value in figures.items()},
+        "date": datetime.now(UTC).date().isoformat(),
+        "load_before": round(load_before, 1),
+        "machine": {
+            "processor": processor(),
+            "cores": len(os.sched_getaffinity(0)),
+            "system": f"{platform.system()} {platform.machine()}",
+        },
+        "versions": {
+            "coupled": __version__,
+            "python": platform.python_version(),
+            **{library: version(library) for library in LIBRARIES},
+        },
+    }
+    kept = dict(sorted({**everything(), name: entry}.items()))
+    text = json.dumps(kept, indent=2, ensure_ascii=False)
+    FILE.write_text(text + "\n", encoding="utf-8")
+
+
+def kept_figures(name: str) -> dict[str, float]:
+    """Return the figures of a benchmark that are in the file; none if it was never kept."""
+    return dict(everything().get(name, {"figures": {}})["figures"])
+
+
+def under(name: str) -> str:
+    """Return what a benchmark was measured on, and what else the machine did."""
+    entry = everything()[name]
+    return f"{entry['machine']['cores']} cores that bore a load of {entry['load_before']:g} of other work"
+
+
+def frame_cost() -> str:
+    """Return what the README says of a frame's cost; no figure without a measurement."""
+    names = {n: f"frame cost, {n} control(s)" for n in (1, 3)}
+    each = [list(kept_figures(name).values()) for name in names.values()]
+    if not all(each):
+        return f"{FRAME} may cost 1.5 times JSBSim's own `run()`, with three controls 2 times."
+    one, three = (f"{min(x):.2f} to {max(x):.2f} times" for x in each)
+    return (
+        f"{FRAME} costs {one} JSBSim's own `run()`, with three controls {three}, measured side by"
+        f" side on {under(names[3])} ([docs/benchmarks.json](docs/benchmarks.json)); the benchmarks"
+        " bound it by 1.5 and 2."
+    )
+
+
+def sweep_rate() -> str:
+    """Return what the README says of a sweep's rate; no figure without a measurement."""
+    kept = kept_figures("sweep")
+    if not kept:
+        return f"{HELD} (`pytest -m bench tests/benchmarks/test_campaign.py -s`)."
+    return (
+        f"{kept['flights']:,.0f} flights of {kept['seconds']:g} s take {kept['taken_s']:.0f} s"
+        f" with two workers, {kept['two_of_one']:.2f} times as many a second as with one and"
+        f" {kept['of_bare']:.2f} of what bare JSBSim flies, in flat memory, measured on"
+        f" {under('sweep')} ([docs/benchmarks.json](docs/benchmarks.json))."
+    )
+
+
+SENTENCES = {"frame cost": frame_cost, "sweep rate": sweep_rate}
