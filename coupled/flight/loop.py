@@ -151,7 +151,7 @@ def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Acti
         gradient = float(specified_gradient(rig.controls[name].schedule, pressure_Pa))
         start = Start(gradient, manoeuvre.seed, manoeuvre.file, manoeuvre.rig_file)
         action = pilot.act(rig, name, start)
-        hand = replace(action.hand, reach=pilot.reach(name), gradient=gradient)
+        hand = replace(action.hand, reach=pilot.reach(name))
         found[name] = replace(action, hand=hand)
     return found
 

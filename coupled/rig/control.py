@@ -19,6 +19,7 @@ from coupled.rig import (
     linkage,
     loader,
     modification,
+    reach,
     schedule,
     sensing,
     surface,
@@ -45,6 +46,7 @@ class ControlParameters(Protocol):
 
     clock: Annotated[Clock, CLOCK]
     hand: Annotated[hand.HandParameters, hand.HAND]
+    reach: Annotated[reach.ReachParameters, reach.REACH]
     schedule: Annotated[schedule.ScheduleParameters, schedule.SCHEDULE]
     modification: Annotated[modification.ModificationParameters, modification.MODIFICATION]
     loader: Annotated[loader.LoaderParameters, loader.LOADER]
@@ -59,6 +61,7 @@ class ControlState(Protocol):
     """State of every stage that has one."""
 
     hand: hand.HandState
+    reach: reach.ReachState
     schedule: schedule.ScheduleState
     modification: modification.ModificationState
     loader: loader.LoaderState

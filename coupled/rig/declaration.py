@@ -18,14 +18,17 @@ from numpy.typing import ArrayLike
 
 from coupled.rig.parameters import Control
 
+Ends = tuple[float, float]  # where a control stops, at its travel or sooner: least and greatest, d
+
 
 @dataclass(frozen=True)
 class Hand:
     """The impedance of a hand on one control; all zero is a hand that only pushes.
 
     stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s.
+    `mass`, kg (N per d/s²), is the arm's at the grip.
     `strongest` (0: no limit) and `lasting`, N, can be held for `endurance_s` and for any time.
-    `reach`, d (0: none), is how far it goes; `gradient`, N/d, what it then holds against.
+    `reach`, d (0: none), is how far it goes.
     """
 
     stiffness: float = 0.0
@@ -36,7 +39,7 @@ class Hand:
     lasting: float = 0.0
     endurance_s: float = 0.0
     reach: float = 0.0
-    gradient: float = 0.0
+    mass: float = 0.0
 
 
 @dataclass(frozen=True)

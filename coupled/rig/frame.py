@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
-from coupled.rig.hand import grip_force, move_muscle, only_scripted
+from coupled.rig.hand import ask, hold, move_muscle, only_scripted
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import ModificationState, modifying_force, set_gradients
+from coupled.rig.reach import bounds, free, seated, set_reach, stop_linkage, within_reach
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
 from coupled.rig.surface import command_surface
@@ -87,6 +88,22 @@ def host_frame(
 
 
 @stage
+def set_hand(
+    p: ControlParameters, s: ControlState, script: float, held: float, held_rate: float
+) -> None:
+    """Set the hand's force at a node for a script in N, and a held deflection in d and its rate."""
+    h = p.clock.substep
+    striving = ask(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
+    force = s.hand.asked
+    if p.reach.reach > 0.0:
+        computed = s.loader.computed
+        force = within_reach(p.reach, s.reach, p.linkage, s.linkage, computed, force)
+        if force != s.hand.asked:
+            striving = 0.0  # at its stop a hand does not strive for ever more
+    hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
+
+
+@stage
 def run_frame(
     p: ControlParameters,
     s: ControlState,
@@ -102,19 +119,30 @@ def run_frame(
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
     h = p.clock.substep
-    scripted = only_scripted(p.hand)  # asked once a frame, not at every node
+    # Asked once a frame, not at every node.
+    stopped = p.reach.reach > 0.0
+    scripted = only_scripted(p.hand) and not stopped
+    if stopped:
+        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
     for node in range(first_node + 1, first_node + p.clock.substeps + 1):
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
-        ahead = s.hand.force + force[node] - force[node - 1]
         before = s.loader.computed
-        move_loader(p.loader, p.friction, s.modification, s.loader, ahead, h)
+        acting = s.hand.force
+        if stopped and seated(s.reach, p.linkage, before) != 0:
+            acting = s.hand.asked  # of which the stop takes what it must
+        ahead = acting + force[node] - force[node - 1]
+        ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
+        move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
+        position, grip = s.linkage.position, s.linkage.grip
         move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
         if scripted:
             s.hand.force = force[node] + s.hand.muscle
             continue
+        if stopped:
+            stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
         rate = (held[node] - held[node - 1]) / h
-        grip_force(p.hand, s.hand, p.linkage, s.linkage, force[node], held[node], rate, h)
+        set_hand(p, s, force[node], held[node], rate)
 
 
 @entry
@@ -146,9 +174,8 @@ def step_frame(
         force, held = script[i, 0], script[i, 1]
         node = k * p.clock.substeps
         if k == 0:
-            grip_force(
-                p.hand, s.hand, p.linkage, s.linkage, force[0], held[0], 0.0, p.clock.substep
-            )
+            free(s.reach)
+            set_hand(p, s, force[0], held[0], 0.0)
             start_delay(p.loader, s.loader, s.hand.force)
         first = 1 + CHANNELS_PER_CONTROL * i
         out = row[first : first + CHANNELS_PER_CONTROL]

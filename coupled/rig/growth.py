@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import CONTROL, STAGES, ControlArray, ControlState
-from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame
-from coupled.rig.hand import grip_force
+from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame, set_hand
 from coupled.rig.loader import start_delay
 from coupled.rig.packing import Hand, pack
 from coupled.rig.rig import Rig
@@ -80,7 +79,8 @@ def _grow(
     out = np.zeros(CHANNELS_PER_CONTROL)
     s.loader.computed, s.loader.rate = 1.0, 0.7 * rate
     s.linkage.position = s.linkage.grip = 0.8
-    grip_force(p.hand, s.hand, p.linkage, s.linkage, 0.0, 0.0, 0.0, p.clock.substep)
+    s.hand.at = s.linkage.grip
+    set_hand(p, s, 0.0, 0.0, 0.0)
     start_delay(p.loader, s.loader, s.hand.force)
     grown = 0.0
     for k in range(len(logs)):

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.compiled import TINY, layout, stage
-from coupled.rig.declaration import Declaration, Given, first_order_gain
+from coupled.rig.declaration import Declaration, Ends, Given, first_order_gain
 from coupled.rig.friction import FrictionParameters, running_friction
 from coupled.rig.modification import ModificationState, modifying_force, slope, smooth_force
 from coupled.rig.parameters import DELAY_SLOTS
@@ -144,18 +144,18 @@ def _crossing(x0: float, v0: float, acceleration: float, target: float, span: fl
 
 @stage
 def _release(
-    p: LoaderParameters, s: LoaderState, hold: float, start: float, end: float
+    p: LoaderParameters, s: LoaderState, hold: float, start: float, end: float, ends: Ends
 ) -> tuple[float, float]:
     """Return when a control at rest begins to slide, as a share of the way, and to which side.
 
     `start` and `end` are the net force on it at either end, N, which runs straight between;
     `hold` is what friction, and at neutral the breakout, can hold. Side 0: it stays.
     """
-    if s.computed >= p.travel and start >= 0.0 and end >= 0.0:
-        s.stop = 1 if end > hold else s.stop
+    if s.computed >= ends[1] and start >= 0.0 and end >= 0.0:
+        s.stop = 1 if end > hold and s.computed >= p.travel else s.stop
         return 0.0, 0.0
-    if s.computed <= -p.travel and start <= 0.0 and end <= 0.0:
-        s.stop = -1 if end < -hold else s.stop
+    if s.computed <= ends[0] and start <= 0.0 and end <= 0.0:
+        s.stop = -1 if end < -hold and s.computed <= -p.travel else s.stop
         return 0.0, 0.0
     if abs(start) > hold:
         return 0.0, _sign(start)
@@ -193,7 +193,7 @@ def _midpoint(
 
 @stage
 def _first_event(
-    p: LoaderParameters, s: LoaderState, dry: bool, breakout: float, halfway: float, span: float
+    s: LoaderState, dry: bool, breakout: float, halfway: float, span: float, ends: Ends
 ) -> tuple[float, int]:
     """Return when a step of `span` seconds first meets an event, and which."""
     x, v = s.computed, s.rate
@@ -202,8 +202,8 @@ def _first_event(
     if dry and v != 0.0 and v * (v + span * acceleration) < 0.0:
         span, event = -v / acceleration, REST
         end = x + 0.5 * span * v
-    if abs(end) > p.travel:
-        end = p.travel if end > 0.0 else -p.travel
+    if end > ends[1] or end < ends[0]:
+        end = ends[1] if end > ends[1] else ends[0]
         span, event = _crossing(x, v, acceleration, end, span), STOP
     if breakout > 0.0 and x * end < 0.0:
         span, event = _crossing(x, v, acceleration, 0.0, span), NEUTRAL
@@ -226,6 +226,7 @@ def _move(
     m: ModificationState,
     s: LoaderState,
     force: float,
+    ends: Ends,
     h: float,
 ) -> None:
     """Advance δc over a substep of h seconds with a held F_mod as it is felt."""
@@ -242,7 +243,7 @@ def _move(
             hold = friction.breakaway + (breakout if x == 0.0 else 0.0)
             balance = s.external - breakout * _sign(x) - _elastic(p, m, s, x)
             start = before + (after - before) * done / h + balance
-            share, direction = _release(p, s, hold, start, after + balance)
+            share, direction = _release(p, s, hold, start, after + balance, ends)
             if direction == 0.0:
                 return
             done += share * (h - done)
@@ -254,7 +255,7 @@ def _move(
         if x == 0.0:
             net -= breakout * direction
         halfway = _midpoint(p, friction, m, s, net, direction, left)
-        span, event = _first_event(p, s, dry, breakout, halfway, left)
+        span, event = _first_event(s, dry, breakout, halfway, left, ends)
         acceleration = 2.0 * (halfway - v) / left
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
@@ -266,8 +267,10 @@ def _move(
         if event == REST:
             s.rate = 0.0
         elif event == STOP:
-            s.stop = 1 if s.computed > 0.0 else -1
-            s.computed, s.rate = s.stop * p.travel, 0.0
+            above = s.computed - ends[0] > ends[1] - s.computed
+            s.computed, s.rate = ends[1] if above else ends[0], 0.0
+            if abs(s.computed) == p.travel:
+                s.stop = 1 if above else -1
         else:  # the preload stops a control too slow to leave neutral within the substep
             s.computed = 0.0
             surplus = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
@@ -283,11 +286,12 @@ def move_loader(
     m: ModificationState,
     s: LoaderState,
     force: float,
+    ends: Ends,
     h: float,
 ) -> None:
-    """Advance δc over a substep of h seconds to a node where the pilot's force is `force` N."""
+    """Advance δc, between its `ends`, over h seconds to where the pilot's force is `force` N."""
     if p.held:
         _feel(p, m, s)
-    _move(p, friction, m, s, force, h)
+    _move(p, friction, m, s, force, ends, h)
     if p.lag_gain > 0.0:
         _feel(p, m, s)

@@ -155,6 +155,7 @@ def _loader(
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
     start_delay(p.loader, s.loader, force[0])
+    ends = (-p.loader.travel, p.loader.travel)
     frames = len(misread)
     for k in range(frames):
         m = s.modification
@@ -167,7 +168,7 @@ def _loader(
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
-                move_loader(p.loader, p.friction, m, s.loader, force[node], h)
+                move_loader(p.loader, p.friction, m, s.loader, force[node], ends, h)
 
 
 @entry

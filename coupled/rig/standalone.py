@@ -118,7 +118,8 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 def _supplied(parameters: Any, states: Any, supply_N: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
     start_delay(p.loader, s.loader, 0.0)
+    ends = (-p.loader.travel, p.loader.travel)
     set_external(p.loader, s.loader, 1.0)
     for node in range(len(supply_N)):
         s.modification.held = -supply_N[node]
-        move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, h)
+        move_loader(p.loader, p.friction, s.modification, s.loader, 0.0, ends, h)

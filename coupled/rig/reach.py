@@ -1,0 +1,185 @@
+"""The reach of a hand: a stop at the grip, where the limb is straight or the column meets the cab.
+
+The grip at δ = ±r stops the whole chain behind it, inelastically: loader and servo go no
+further than the place x at which the grip, under the force that moves it there slowly, stands at
+the reach,
+
+    x + bend(F_x) = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
+
+and are located there as at the loader's own stops. What stops their masses is an impulse,
+which is not in the force of a node. The stop takes what a hand asks for beyond the force that
+bends the structure to the reach; of a rigid structure, beyond F_x once δc is at x:
+
+    grip + bend(F) ≤ r
+
+Where x moves inward, as the gradient rises with q̄, the stop takes more by the same rule, and the
+loader follows by its own motion. So δ does not pass r by more than rounding, whatever is asked
+for, on any structure. On a loader with a transport delay or a servo the stop acts at once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration
+from coupled.rig.friction import FrictionParameters
+from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
+from coupled.rig.loader import LoaderParameters, LoaderState
+from coupled.rig.modification import ModificationState, slope, smooth_force
+
+_ITERATIONS = 40
+_SEAT = 1e-12  # of a deflection: rounding
+_NO_FORCE = 1e30  # N: no force brings the grip to its reach
+
+
+class ReachParameters(Protocol):
+    """How far a hand goes."""
+
+    reach: float  # r on both sides, d; 0 for a hand that goes as far as the control
+
+
+class ReachState(Protocol):
+    """Where the grip stands at its reach, on either side, over a frame."""
+
+    top: float  # x on the positive side, d, before the bend
+    bottom: float  # on the negative side
+    top_force: float  # F_x, N
+    bottom_force: float
+
+
+REACH = Declaration(
+    layout(ReachParameters),
+    section="hand",
+    state=layout(ReachState),
+    fixed=("top", "bottom", "top_force", "bottom_force"),
+)
+
+
+@stage
+def unbent(p: LinkageParameters, by: float) -> float:
+    """Return the force in N that bends the structure by so much, d: `bend` solved for F, K > 0."""
+    if p.bend_limit > 0.0:
+        share = by / p.bend_limit
+        if abs(share) >= 1.0:
+            return _NO_FORCE if by > 0.0 else -_NO_FORCE
+        return p.bend_limit / p.bend * math.atanh(share)
+    return by / p.bend
+
+
+@stage
+def _place(
+    r: float,
+    side: float,
+    p: LoaderParameters,
+    friction: FrictionParameters,
+    m: ModificationState,
+    s: LoaderState,
+    linkage_p: LinkageParameters,
+) -> tuple[float, float]:
+    """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
+    low, high = 0.0, p.travel
+    x = min(r, high)
+    level = p.breakout + m.breakout + friction.running - side * s.external
+    force = level
+    for _ in range(_ITERATIONS):
+        force = level + (p.basic_gradient + p.cubic * x * x) * x + smooth_force(m, x)
+        over = x + bend(linkage_p, force) - r
+        if over > 0.0:
+            high = x
+        else:
+            low = x
+        stiffness = p.basic_gradient + 3.0 * p.cubic * x * x + slope(m, x)
+        rise = 1.0 + bend_slope(linkage_p, force) * stiffness
+        after = x - over / rise if rise > 0.0 else 0.5 * (low + high)
+        if not low <= after <= high:
+            after = 0.5 * (low + high)
+        if abs(after - x) <= 1e-14 * r:
+            break
+        x = after
+    return x, force if x >= r else _NO_FORCE
+
+
+@stage
+def free(stop: ReachState) -> None:
+    """Let a hand go as far as its own structure's bend, before the first frame."""
+    stop.top_force, stop.bottom_force = _NO_FORCE, -_NO_FORCE
+
+
+@stage
+def set_reach(
+    p: ReachParameters,
+    stop: ReachState,
+    loader_p: LoaderParameters,
+    friction: FrictionParameters,
+    m: ModificationState,
+    loader: LoaderState,
+    linkage_p: LinkageParameters,
+) -> None:
+    """Find where the grip stands at its reach with a frame's gradients and external force."""
+    stop.top, stop.top_force = _place(p.reach, 1.0, loader_p, friction, m, loader, linkage_p)
+    size, force = _place(p.reach, -1.0, loader_p, friction, m, loader, linkage_p)
+    stop.bottom, stop.bottom_force = -size, -force
+
+
+@stage
+def bounds(
+    p: ReachParameters,
+    stop: ReachState,
+    loader_p: LoaderParameters,
+    linkage_p: LinkageParameters,
+    computed: float,
+) -> tuple[float, float]:
+    """Return how far down and up δc may go in a substep, d: the travel, or the reach.
+
+    From beyond the reach, if it has moved inward, only back.
+    """
+    travel = loader_p.travel
+    if p.reach == 0.0:
+        return -travel, travel
+    half = 0.5 * linkage_p.play
+    low = max(-travel, min(stop.bottom - half, computed))
+    return low, min(travel, max(stop.top + half, computed))
+
+
+@stage
+def stop_linkage(
+    stop: ReachState, p: LinkageParameters, s: LinkageState, position: float, grip: float
+) -> None:
+    """Stop servo and grip where the reach stops them; `position` and `grip` are those before."""
+    half = 0.5 * p.play
+    top, bottom = max(stop.top + half, position), min(stop.bottom - half, position)
+    if s.position > top:
+        s.position, s.rate = top, min(s.rate, 0.0)
+    elif s.position < bottom:
+        s.position, s.rate = bottom, max(s.rate, 0.0)
+    s.grip = min(max(s.grip, min(stop.bottom, grip)), max(stop.top, grip))
+
+
+@stage
+def seated(stop: ReachState, p: LinkageParameters, computed: float) -> int:
+    """Tell on which side δc stands where the reach stops it, or 0."""
+    half = 0.5 * p.play
+    if abs(computed - (stop.top + half)) <= _SEAT * abs(computed):
+        return 1
+    return -1 if abs(computed - (stop.bottom - half)) <= _SEAT * abs(computed) else 0
+
+
+@stage
+def within_reach(
+    p: ReachParameters,
+    stop: ReachState,
+    linkage_p: LinkageParameters,
+    linkage: LinkageState,
+    computed: float,
+    asked: float,
+) -> float:
+    """Return the force of one asked for, N, that the stop leaves on the grip."""
+    if linkage_p.bend > 0.0:
+        at = linkage.grip
+        return max(min(asked, unbent(linkage_p, p.reach - at)), unbent(linkage_p, -p.reach - at))
+    side = seated(stop, linkage_p, computed)
+    if side == 0:
+        return asked
+    return min(asked, stop.top_force) if side > 0 else max(asked, stop.bottom_force)
