@@ -77,7 +77,8 @@ def kept_figures(name: str) -> dict[str, float]:
 def under(name: str) -> str:
     """Return what a benchmark was measured on, and what else the machine did."""
     entry = everything()[name]
-    return f"{entry['machine']['cores']} cores that bore a load of {entry['load_before']:g} of other work"
+    cores, load = entry["machine"]["cores"], entry["load_before"]
+    return f"{cores} cores that bore a load of {load:g} of other work"
 
 
 def frame_cost() -> str:
