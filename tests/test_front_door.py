@@ -203,7 +203,7 @@ def test_a_fault_of_the_rig_names_the_rig_where_there_is_no_file() -> None:
 
 def test_a_record_says_what_it_holds_and_draws_it() -> None:
     record = fly(column=PULL)
-    assert repr(record).startswith("Record(120 rows, 1 s at 120 Hz; 43 channels: time_s, ")
+    assert repr(record).startswith("Record(120 rows, 1 s at 120 Hz; 46 channels: time_s, ")
     frame = record.to_polars()
     assert frame.shape == (120, 43)
     assert np.array_equal(frame["pitch_rad"].to_numpy(), record["pitch_rad"])
