@@ -205,7 +205,7 @@ def test_a_record_says_what_it_holds_and_draws_it() -> None:
     record = fly(column=PULL)
     assert repr(record).startswith("Record(120 rows, 1 s at 120 Hz; 46 channels: time_s, ")
     frame = record.to_polars()
-    assert frame.shape == (120, 43)
+    assert frame.shape == (120, 46)
     assert np.array_equal(frame["pitch_rad"].to_numpy(), record["pitch_rad"])
     figure = record.plot("column_force_N", "pitch_rate_rad_per_s")
     assert [axes.get_ylabel() for axes in figure.axes] == ["column force, N", "pitch rate, °/s"]
