@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
+from coupled.rig.inertia import set_inertia
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import set_gradients
@@ -162,6 +163,7 @@ def _loader(
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
+        set_inertia(p.inertia, p.loader, s.loader, gradient[0, k])
         read = p.sensing.read_scale * s.loader.computed + misread[k]
         out[1, k] = set_product(p, m, s.loader.computed, read)
         out[0, k] = s.loader.computed

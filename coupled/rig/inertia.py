@@ -1,0 +1,74 @@
+"""Inertia: mass and damping of the loader's model, where they go with the gradient.
+
+    m = m₀·f_m(G_T),    c = c₀·f_c(G_T)
+
+Eq. (12) gives the loader a spring of G_T/(1 − K·G_T) on δc, so that a constant m and c swing
+faster and less damped than specified: the frequency by 1/√(1 − K·G_T), the damping ratio by
+√(1 − K·G_T). With both factors 1/(1 − K·G_T) they are as specified again. Other factors can
+make a release look as specified (`calibration/letgo`). They stand in a table over the gradient
+that the schedule asks for, straight between its rows and held at its ends, and are set at each
+frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration, Given
+from coupled.rig.loader import LoaderParameters, LoaderState
+from coupled.rig.parameters import MAX_ROWS
+
+Table = NDArray[np.float64]
+
+
+class InertiaParameters(Protocol):
+    """The table of factors."""
+
+    rows: int  # 0 for none
+    gradient: Table  # G_T, N/d, rising
+    mass_factor: Table
+    damping_factor: Table
+
+
+def _column(of: str) -> Callable[[Given], Table]:
+    """Return what gives a column of the table at its full length; one left out is 1 all over."""
+
+    def column(g: Given) -> Table:
+        host = g.control.compensation
+        values: list[float] = getattr(host, of) or [1.0] * len(host.inertia_gradient or [])
+        return np.pad(np.array(values, dtype=float), (0, MAX_ROWS - len(values)))
+
+    return column
+
+
+_TABLE = ("gradient", "mass_factor", "damping_factor")
+INERTIA = Declaration(
+    layout(InertiaParameters, **dict.fromkeys(_TABLE, (MAX_ROWS,))),
+    derived={
+        "rows": lambda g: len(g.control.compensation.inertia_gradient or []),
+        "gradient": _column("inertia_gradient"),
+        "mass_factor": _column("mass_factor"),
+        "damping_factor": _column("damping_factor"),
+    },
+)
+
+
+@stage
+def set_inertia(
+    p: InertiaParameters, loader_p: LoaderParameters, s: LoaderState, gradient: float
+) -> None:
+    """Set m and c for the frame, by the gradient that the schedule asks for, N/d."""
+    if p.rows == 0:
+        return
+    g, row = p.gradient, 1
+    while row < p.rows - 1 and gradient > g[row]:
+        row += 1
+    share = min(max((gradient - g[row - 1]) / (g[row] - g[row - 1]), 0.0), 1.0)
+    mass, damping = p.mass_factor, p.damping_factor
+    s.mass = loader_p.mass * (mass[row - 1] + share * (mass[row] - mass[row - 1]))
+    s.damping = loader_p.damping * (damping[row - 1] + share * (damping[row] - damping[row - 1]))
