@@ -70,6 +70,7 @@ class ControlState(Protocol):
     modification: modification.ModificationState
     gauge: gauge.GaugeState
     loader: loader.LoaderState
+    inertia: inertia.InertiaState
     linkage: linkage.LinkageState
     sensing: sensing.SensingState
     surface: surface.SurfaceState

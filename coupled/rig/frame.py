@@ -14,7 +14,7 @@ from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import gauge_force, move_gauge, start_gauge
 from coupled.rig.hand import ask, hold, move_muscle, only_scripted
-from coupled.rig.inertia import set_inertia
+from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import (
@@ -84,7 +84,7 @@ def host_frame(
         keep_last(m)
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
     set_gradients(p.modification, m, first, second)
-    set_inertia(p.inertia, p.loader, s.loader, first)
+    set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
     product = set_product(p, m, computed, computed_read)
     estimated = estimate(p.compensation, computed_read, force_read)
     command = command_surface(p.surface, s.surface, estimated, pressure)
@@ -158,6 +158,8 @@ def run_frame(
         ahead = acting + force[node] - force[node - 1]
         if gauged:
             ahead = gauge_force(p.gauge, s.gauge, ahead)
+        if p.inertia.rows > 0:
+            ahead = lead_force(p.inertia, s.inertia, ahead)
         ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
         move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
         position, grip = s.linkage.position, s.linkage.grip

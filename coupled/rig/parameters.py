@@ -70,6 +70,8 @@ class Compensation(Section):
     inertia_gradient: list[float] | None = quantity("N_per_{d}", None, min_length=2)
     mass_factor: list[float] | None = quantity("", None)
     damping_factor: list[float] | None = quantity("", None)
+    force_lead: list[float] | None = quantity("s", None)
+    force_lead_lag: float = quantity("s", 0.002, gt=0)
 
 
 class Sensing(Section):

@@ -169,24 +169,31 @@ def _check_inertia(control: Control, file: object, path: str, d: str) -> None:
     host, table = control.compensation, control.compensation.inertia_gradient
     key = f"{path}.compensation.inertia_gradient_N_per_{d}"
     if table is None:
-        for name in ("mass_factor", "damping_factor"):
+        for name in ("mass_factor", "damping_factor", "force_lead"):
             if getattr(host, name) is not None:
                 problem = f"needs the gradients that it goes by: inertia_gradient_N_per_{d}"
-                raise InputError(file, f"{path}.compensation.{name}", problem)
+                raise InputError(file, f"{path}.compensation.{_with_unit(name)}", problem)
         return
     if len(table) > MAX_ROWS:
         raise InputError(file, key, f"has more than {MAX_ROWS} rows")
     if any(b <= a for a, b in pairwise(table)):
         raise InputError(file, key, "must rise from value to value")
-    for name in ("mass_factor", "damping_factor"):
+    for name in ("mass_factor", "damping_factor", "force_lead"):
         factors: list[float] | None = getattr(host, name)
         if factors is None:
             continue
         if len(factors) != len(table):
             problem = f"has {len(factors)} values, inertia_gradient_N_per_{d} {len(table)}"
-            raise InputError(file, f"{path}.compensation.{name}", f"{problem}; give as many")
-        if min(factors) <= 0.0:
+            where = f"{path}.compensation.{_with_unit(name)}"
+            raise InputError(file, where, f"{problem}; give as many")
+        if name == "force_lead" and min(factors) < 0.0:
+            raise InputError(file, f"{path}.compensation.force_lead_s", "a lead is not negative")
+        if name != "force_lead" and min(factors) <= 0.0:
             raise InputError(file, f"{path}.compensation.{name}", "a factor must be above 0")
+
+
+def _with_unit(name: str) -> str:
+    return f"{name}_s" if name == "force_lead" else name
 
 
 def _check_schedule(control: Control, file: object, path: str, d: str) -> None:

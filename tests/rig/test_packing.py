@@ -37,6 +37,7 @@ RIG = bench(
         f"{HOST}.inertia_gradient_N_per_m": [500.0, 2000.0],
         f"{HOST}.mass_factor": [1.0, 0.8],
         f"{HOST}.damping_factor": [1.0, 0.9],
+        f"{HOST}.force_lead_s": [0.0, 0.02],
     }
 )
 COLUMN = RIG.controls["column"]

@@ -38,7 +38,7 @@ from scipy.linalg import expm
 
 from coupled.rig.equations import modifying_gradient
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control, Sensing
+from coupled.rig.parameters import Compensation, Control, Sensing
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     if loader.multiplier == "hybrid":
         stiffness += added_gradient(control)
     w = 2.0 * math.pi * loader.servo_frequency
-    a = np.zeros((10, 10))
+    a = np.zeros((12, 12))
     a[_COMPUTED, _RATE] = a[_POSITION, _SPEED] = 1.0
     a[_RATE, :2] = -stiffness / loader.mass, -loader.damping / loader.mass
     a[_SPEED, [_COMPUTED, _POSITION, _SPEED]] = w * w, -w * w, -2.0 * loader.servo_damping_ratio * w
@@ -103,6 +103,7 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
         width, force = _add_hand(a, hand, loader.bend)
     force -= sensing.gauge_mass * a[_SPEED]
     width, force = _add_amplifier(a, sensing, width, force)
+    width, force = _add_lead(a, control.compensation, width, force)
     late_s = loader.delay + sensing.gauge_delay + 1.0 / (rig.frame_rate * rig.substeps)
     if sensing.gauge_sampling > 0.0:
         late_s += 0.5 / sensing.gauge_sampling
@@ -151,6 +152,16 @@ def _add_amplifier(a: Floats, sensing: Sensing, width: int, force: Floats) -> tu
     a[width + 1] = w * w * (force - passed)
     a[width + 1, width + 1] -= 2.0 * sensing.gauge_damping_ratio * w
     return width + 2, passed
+
+
+def _add_lead(a: Floats, host: Compensation, width: int, force: Floats) -> tuple[int, Floats]:
+    """Add the lead on the force, the first of its table; return states and the force's row."""
+    lead, lag = (host.force_lead or [0.0])[0], host.force_lead_lag
+    if lead == 0.0:
+        return width, force
+    a[width] = force / lag
+    a[width, width] -= 1.0 / lag
+    return width + 1, force + lead * a[width]
 
 
 def mass_limit(servo_rad_per_s: float, damping_ratio: float, lag_s: float) -> float:

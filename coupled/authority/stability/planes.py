@@ -143,7 +143,7 @@ def linear_rig(
     }
     given = {key: value for key, value in linear.items() if value is not None}
     given[f"schedule.second_gradient_N_per_{d}"] = None
-    for key in (f"inertia_gradient_N_per_{d}", "mass_factor", "damping_factor"):
+    for key in ("mass_factor", "damping_factor"):
         given[f"compensation.{key}"] = None
     alone = {name: changed(control, given, rig.name, f"controls.{name}", d)}
     whole: dict[str, Any] = {"controls": alone, "flight": None, "noise": {}}
@@ -158,7 +158,7 @@ def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
     table = host.inertia_gradient
     if table is None:
         return {}
-    one = [1.0] * len(table)
+    one, lead = [1.0] * len(table), host.force_lead or [0.0] * len(table)
     mass, damping = (
         float(np.interp(gradient, table, factors or one))
         for factors in (host.mass_factor, host.damping_factor)
@@ -166,6 +166,8 @@ def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
     return {
         "loader.mass_kg": mass * loader.mass,
         f"loader.damping_N_s_per_{d}": damping * loader.damping,
+        f"compensation.inertia_gradient_N_per_{d}": [gradient, gradient + 1.0],
+        "compensation.force_lead_s": [float(np.interp(gradient, table, lead))] * 2,
     }
 
 
