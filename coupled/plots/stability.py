@@ -11,7 +11,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from coupled.authority.stability.limits import gradient_range
-from coupled.authority.stability.planes import Kind, Plane
+from coupled.authority.stability.planes import KINDS, Kind, Plane
 from coupled.plots.pages import panels
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -25,18 +25,22 @@ _LABELS: dict[Kind, str] = {
     "frame": "frame time T, ms",
     "hand": "hand's stiffness, K·k",
     "servo": "servo's frequency, Hz",
+    "gauge": "gauge's bandwidth, Hz",
+    "mass": "mass beyond the gauge, m_g/m",
 }
 _TITLES: dict[Kind, str] = {
     "assumed": "free hand, eq. (12)",
     "frame": "free hand, digital product",
     "hand": "in a hand that holds",
     "servo": "held fast",
+    "gauge": "in a hand as stiff as K",
+    "mass": "free hand, mass at the grip",
 }
 
 
 def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> Figure:
     """Draw the planes of each control, a row each."""
-    figure, grid = panels(len(planes), 4, 3.1)
+    figure, grid = panels(len(planes), len(KINDS), 3.1)
     norm = SymLogNorm(_LINEAR, vmin=-_FASTEST, vmax=_FASTEST)
     for row, (name, of_control) in zip(grid, planes.items(), strict=True):
         for axes, plane in zip(row, of_control, strict=True):
@@ -93,7 +97,11 @@ def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
         "frame": 1.0 / rig.frame_rate / MILLISECOND_s,
         "hand": _ARM_N_per_d * bend,
         "servo": control.loader.servo_frequency,
+        "gauge": control.sensing.gauge_frequency,
+        "mass": control.sensing.gauge_mass / control.loader.mass,
     }[plane.kind]
+    if own == 0.0:
+        return
     ends = np.array(gradient_range(control)) * bend
     label = "the rig's gradients, as filed (hand: a pilot's arm)"
     axes.plot(ends, [own, own], color="#00a000", linewidth=3.5, label=label)

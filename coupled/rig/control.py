@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from coupled.rig import (
     compensation,
     friction,
+    gauge,
     hand,
+    inertia,
     linkage,
     loader,
     modification,
@@ -49,7 +51,9 @@ class ControlParameters(Protocol):
     reach: Annotated[reach.ReachParameters, reach.REACH]
     schedule: Annotated[schedule.ScheduleParameters, schedule.SCHEDULE]
     modification: Annotated[modification.ModificationParameters, modification.MODIFICATION]
+    gauge: Annotated[gauge.GaugeParameters, gauge.GAUGE]
     loader: Annotated[loader.LoaderParameters, loader.LOADER]
+    inertia: Annotated[inertia.InertiaParameters, inertia.INERTIA]
     friction: Annotated[friction.FrictionParameters, friction.FRICTION]
     linkage: Annotated[linkage.LinkageParameters, linkage.LINKAGE]
     sensing: Annotated[sensing.SensingParameters, sensing.SENSING]
@@ -64,8 +68,11 @@ class ControlState(Protocol):
     reach: reach.ReachState
     schedule: schedule.ScheduleState
     modification: modification.ModificationState
+    gauge: gauge.GaugeState
     loader: loader.LoaderState
+    inertia: inertia.InertiaState
     linkage: linkage.LinkageState
+    sensing: sensing.SensingState
     surface: surface.SurfaceState
 
 

@@ -12,13 +12,21 @@ from numpy.typing import NDArray
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
+from coupled.rig.gauge import gauge_force, move_gauge, start_gauge
 from coupled.rig.hand import ask, hold, move_muscle, only_scripted
+from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
-from coupled.rig.modification import ModificationState, modifying_force, set_gradients
+from coupled.rig.modification import (
+    ModificationState,
+    exchange_last,
+    keep_last,
+    modifying_force,
+    set_gradients,
+)
 from coupled.rig.reach import bounds, free, seated, set_reach, stop_linkage, within_reach
 from coupled.rig.schedule import gradients, read_pressure
-from coupled.rig.sensing import converted, read_computed, read_force
+from coupled.rig.sensing import converted, read_computed, read_force, sample
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -66,10 +74,17 @@ def host_frame(
     m = s.modification
     ended = m.held if p.modification.digital else modifying_force(m, computed)
 
-    force_read = read_force(p.sensing, force, out[0])
-    computed_read = read_computed(p.sensing, computed, out[1])
+    at_gauge = s.gauge.force if p.gauge.present else force
+    sampled_force, sampled = at_gauge, computed
+    if p.sensing.skewed:
+        sampled_force, sampled = s.sensing.force, s.sensing.computed
+    force_read = read_force(p.sensing, sampled_force, out[0])
+    computed_read = read_computed(p.sensing, sampled, out[1])
+    if p.modification.late > 0:
+        keep_last(m)
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
     set_gradients(p.modification, m, first, second)
+    set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
     product = set_product(p, m, computed, computed_read)
     estimated = estimate(p.compensation, computed_read, force_read)
     command = command_surface(p.surface, s.surface, estimated, pressure)
@@ -122,9 +137,18 @@ def run_frame(
     # Asked once a frame, not at every node.
     stopped = p.reach.reach > 0.0
     scripted = only_scripted(p.hand) and not stopped
+    gauged, skewed, late = p.gauge.present != 0, p.sensing.skewed != 0, p.modification.late
     if stopped:
         set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
-    for node in range(first_node + 1, first_node + p.clock.substeps + 1):
+    last = first_node + p.clock.substeps
+    if skewed:
+        at_gauge = s.gauge.force if gauged else s.hand.force
+        sample(p.sensing, s.sensing, s.loader.computed, at_gauge, p.clock.substeps, True)
+    if late > 0:
+        exchange_last(s.modification)
+    for node in range(first_node + 1, last + 1):
+        if late > 0 and node == first_node + 1 + late:
+            exchange_last(s.modification)
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
         before = s.loader.computed
@@ -132,17 +156,28 @@ def run_frame(
         if stopped and seated(s.reach, p.linkage, before) != 0:
             acting = s.hand.asked  # of which the stop takes what it must
         ahead = acting + force[node] - force[node - 1]
+        if gauged:
+            ahead = gauge_force(p.gauge, s.gauge, ahead)
+        if p.inertia.rows > 0:
+            ahead = lead_force(p.inertia, s.inertia, ahead)
         ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
         move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
         position, grip = s.linkage.position, s.linkage.grip
         move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
+        if gauged:
+            move_gauge(p.gauge, s.gauge, p.linkage, s.linkage, s.loader.computed)
         if scripted:
             s.hand.force = force[node] + s.hand.muscle
-            continue
-        if stopped:
-            stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
-        rate = (held[node] - held[node - 1]) / h
-        set_hand(p, s, force[node], held[node], rate)
+        else:
+            if stopped:
+                stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
+            rate = (held[node] - held[node - 1]) / h
+            set_hand(p, s, force[node], held[node], rate)
+        if skewed:
+            at_gauge = s.gauge.force if gauged else s.hand.force
+            sample(p.sensing, s.sensing, s.loader.computed, at_gauge, last - node, False)
+    if late >= p.clock.substeps:
+        exchange_last(s.modification)
 
 
 @entry
@@ -176,7 +211,8 @@ def step_frame(
         if k == 0:
             free(s.reach)
             set_hand(p, s, force[0], held[0], 0.0)
-            start_delay(p.loader, s.loader, s.hand.force)
+            start_delay(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
+            s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
         first = 1 + CHANNELS_PER_CONTROL * i
         out = row[first : first + CHANNELS_PER_CONTROL]
         command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import CONTROL, STAGES, ControlArray, ControlState
 from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame, set_hand
+from coupled.rig.gauge import start_gauge
 from coupled.rig.loader import start_delay
 from coupled.rig.packing import Hand, pack
 from coupled.rig.rig import Rig
@@ -81,7 +82,7 @@ def _grow(
     s.linkage.position = s.linkage.grip = 0.8
     s.hand.at = s.linkage.grip
     set_hand(p, s, 0.0, 0.0, 0.0)
-    start_delay(p.loader, s.loader, s.hand.force)
+    start_delay(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
     grown = 0.0
     for k in range(len(logs)):
         out[:] = 0.0  # what it holds is the noise of what is read

@@ -14,6 +14,8 @@ control inside its friction band does not creep.
 The hardening spring enters by its slope at the midpoint (one Newton step), which
 keeps the order. An F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the
 motion and half a substep after it (Strang's splitting), each exactly: of second order, too.
+
+m and c are those of the rig file, or go with the gradient (`inertia`).
 """
 
 from __future__ import annotations
@@ -56,6 +58,8 @@ class LoaderState(Protocol):
 
     computed: float  # δc, d
     rate: float  # δc', d/s
+    mass: float  # m as it now is, kg
+    damping: float  # c as it now is, N·s/d
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     delayed: float  # the pilot's force as the loader has it, N
     felt: float  # F_mod as the loader feels it where it is held, N
@@ -81,7 +85,7 @@ LOADER = Declaration(
         "held": lambda g: g.control.loader.multiplier == "digital" or _half_step_gain(g) > 0.0,
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
-    fixed=("external",),
+    fixed=("external", "mass", "damping"),
 )
 
 
@@ -93,7 +97,8 @@ def set_external(p: LoaderParameters, s: LoaderState, load_factor: float) -> Non
 
 @stage
 def start_delay(p: LoaderParameters, s: LoaderState, force: float) -> None:
-    """Begin with the pilot's force at the first node, N, and none before it."""
+    """Begin at rest with the pilot's force at the first node, N, and none before it."""
+    s.mass, s.damping = p.mass, p.damping
     s.history[0] = force
     s.delayed = force if p.delay_substeps == 0.0 else 0.0
 
@@ -181,8 +186,8 @@ def _midpoint(
     """
     v = s.rate
     middle = s.computed + 0.5 * span * v
-    inertia = 2.0 * p.mass / span + p.damping + 0.5 * span * _stiffness(p, m, middle)
-    push -= _elastic(p, m, s, middle) + p.damping * v
+    inertia = 2.0 * s.mass / span + s.damping + 0.5 * span * _stiffness(p, m, middle)
+    push -= _elastic(p, m, s, middle) + s.damping * v
     if friction.breakaway == 0.0:
         return v + push / inertia
     halfway = v + (push - running_friction(friction, v) * direction) / inertia
@@ -274,7 +279,7 @@ def _move(
         else:  # the preload stops a control too slow to leave neutral within the substep
             s.computed = 0.0
             surplus = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
-            if p.mass * abs(s.rate) <= (h - done) * surplus:
+            if s.mass * abs(s.rate) <= (h - done) * surplus:
                 s.rate = 0.0
     s.rate = 0.0
 

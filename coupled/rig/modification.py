@@ -32,6 +32,11 @@ is made of v₁ = S₁·δc, eq. (2). So a wrong S₁ of the loader's electronic
 
 and the break lies where v₁ says that δc is δc₁. A digital product is made of δc as the host
 reads it, to the same effect.
+
+An analog multiplier is not at zero where its product is: to F_mod it adds an offset, which
+drifts in time, F_offset + r·t, set anew at each frame. What the host puts out may come late by
+a part of the frame; until then the last frame's ΔG stands (or its product, where that is what
+the host makes).
 """
 
 from __future__ import annotations
@@ -58,6 +63,9 @@ class ModificationParameters(Protocol):
     digital: int  # the product ΔG·δc is made by the host and held over a frame
     made: float  # ΔF as made over ΔF as asked for: S₂ assumed over real
     multiplied: float  # δc as the analog multiplier has it over δc: S₁ real over assumed
+    offset: float  # of the analog multiplier at the start, N
+    drift: float  # N a frame
+    late: int  # substeps after t_k at which what the host puts out arrives
 
 
 class ModificationState(Protocol):
@@ -68,6 +76,18 @@ class ModificationState(Protocol):
     break_computed: float  # δc₁, d; 0 for one segment
     breakout: float  # F_extra, N
     held: float  # the digital product, N
+    offset: float  # of the analog multiplier, N
+    frames: int  # since the start
+    last_first: float  # the same of the frame before
+    last_second: float
+    last_break_computed: float
+    last_breakout: float
+    last_held: float
+    last_offset: float
+
+
+def _analog(g: Given) -> float:
+    return float(g.control.loader.multiplier == "hybrid")
 
 
 def _multiplied(given: Given) -> float:
@@ -88,9 +108,15 @@ MODIFICATION = Declaration(
         "digital": lambda g: g.control.loader.multiplier == "digital",
         "made": lambda g: 1.0 / g.control.sensing.modifying_scale,
         "multiplied": _multiplied,
+        "offset": lambda g: _analog(g) * g.control.loader.multiplier_offset,
+        "drift": lambda g: _analog(g) * g.control.loader.multiplier_drift * g.frame_s,
+        "late": lambda g: round(g.control.sensing.gradient_skew / g.substep_s),
     },
     state=layout(ModificationState),
-    fixed=("first", "second", "break_computed", "breakout"),
+    fixed=(
+        *("first", "second", "break_computed", "breakout", "offset"),
+        *("last_first", "last_second", "last_break_computed", "last_breakout", "last_offset"),
+    ),
 )
 
 
@@ -102,6 +128,8 @@ def set_gradients(
 
     Eq. (12) for each segment; appendix C, with the breakout's term or as printed.
     """
+    s.offset = p.offset + p.drift * s.frames
+    s.frames += 1
     bend = p.bend if p.compensated else 0.0
     preload = p.breakout if p.exact else 0.0
     s.break_computed = 0.0
@@ -126,9 +154,27 @@ def set_gradients(
 
 
 @stage
+def keep_last(s: ModificationState) -> None:
+    """Keep what stands at the end of a frame, for a host whose output comes late."""
+    s.last_first, s.last_second, s.last_break_computed = s.first, s.second, s.break_computed
+    s.last_breakout, s.last_held, s.last_offset = s.breakout, s.held, s.offset
+
+
+@stage
+def exchange_last(s: ModificationState) -> None:
+    """Exchange what this frame's output is with what the last one's was."""
+    s.first, s.last_first = s.last_first, s.first
+    s.second, s.last_second = s.last_second, s.second
+    s.break_computed, s.last_break_computed = s.last_break_computed, s.break_computed
+    s.breakout, s.last_breakout = s.last_breakout, s.breakout
+    s.held, s.last_held = s.last_held, s.held
+    s.offset, s.last_offset = s.last_offset, s.offset
+
+
+@stage
 def smooth_force(s: ModificationState, computed: float) -> float:
-    """Return F_mod in N without its breakout, at δc in d: eq. (11), in two segments."""
-    force = s.first * computed
+    """Return F_mod in N without its breakout, at δc in d: eq. (11), in two segments, and offset."""
+    force = s.first * computed + s.offset
     if s.break_computed > 0.0:
         beyond = abs(computed) - s.break_computed
         if beyond > 0.0:

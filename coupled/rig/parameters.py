@@ -16,6 +16,7 @@ from coupled.schema import Section, quantity
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
 MAX_ROWS = 32  # of a schedule's table
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
+GAUGE_SLOTS = 256  # of the gauge's, likewise
 
 
 class Loader(Section):
@@ -33,6 +34,8 @@ class Loader(Section):
     cubic: float = quantity("N_per_{d}3", 0.0, ge=0)
     delay: float = quantity("s", 0.0, ge=0, le=0.2)
     multiplier: Literal["hybrid", "digital"] = "hybrid"
+    multiplier_offset: float = quantity("N", 0.0)
+    multiplier_drift: float = quantity("N_per_s", 0.0)
     modifying_lag: float = quantity("s", 0.0, ge=0, le=10)
     servo_frequency: float = quantity("Hz", gt=0)
     servo_damping_ratio: float = quantity("", gt=0)
@@ -64,10 +67,15 @@ class Compensation(Section):
     basic_gradient: float | None = quantity("N_per_{d}", None, ge=0)
     breakout: float | None = quantity("N", None, ge=0)
     breakout_term: Literal["exact", "printed"] = "exact"
+    inertia_gradient: list[float] | None = quantity("N_per_{d}", None, min_length=2)
+    mass_factor: list[float] | None = quantity("", None)
+    damping_factor: list[float] | None = quantity("", None)
+    force_lead: list[float] | None = quantity("s", None)
+    force_lead_lag: float = quantity("s", 0.002, gt=0)
 
 
 class Sensing(Section):
-    """Scales and converters between loader and host (figure 3); 0 bits is no converter.
+    """Gauge, scales and converters between loader and host (figure 3); 0 bits is no converter.
 
     Each scale is real over assumed. S₁ is in two parts: the electronics' own (`computed_scale`),
     in v₁ for host and analog multiplier alike, and that of the host's reading of v₁ alone.
@@ -82,6 +90,15 @@ class Sensing(Section):
     s1: float = quantity("V_per_{d}", 0.0, ge=0)
     s2: float = quantity("V_per_N", 0.0, ge=0)
     s3: float = quantity("V_per_N", 0.0, ge=0)
+    gauge_mass: float = quantity("kg", 0.0, ge=0)
+    gauge_order: Literal["first", "second"] = "second"
+    gauge_frequency: float = quantity("Hz", 0.0, ge=0)
+    gauge_damping_ratio: float = quantity("", 0.7, gt=0)
+    gauge_delay: float = quantity("s", 0.0, ge=0, le=0.1)
+    gauge_sampling: float = quantity("Hz", 0.0, ge=0)
+    computed_skew: float = quantity("s", 0.0, ge=0)
+    force_skew: float = quantity("s", 0.0, ge=0)
+    gradient_skew: float = quantity("s", 0.0, ge=0)
 
     @property
     def read_scale(self) -> float:

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
+from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import set_gradients
@@ -162,13 +163,17 @@ def _loader(
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
+        set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
         read = p.sensing.read_scale * s.loader.computed + misread[k]
         out[1, k] = set_product(p, m, s.loader.computed, read)
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
-                move_loader(p.loader, p.friction, m, s.loader, force[node], ends, h)
+                led = force[node]
+                if p.inertia.rows > 0:
+                    led = lead_force(p.inertia, s.inertia, led)
+                move_loader(p.loader, p.friction, m, s.loader, led, ends, h)
 
 
 @entry

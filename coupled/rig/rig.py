@@ -20,7 +20,14 @@ from coupled.record.channels import (
     noisy_channels,
     unit_of,
 )
-from coupled.rig.parameters import DELAY_SLOTS, MAX_ROWS, PLAIN_NAME, Control, Flight
+from coupled.rig.parameters import (
+    DELAY_SLOTS,
+    GAUGE_SLOTS,
+    MAX_ROWS,
+    PLAIN_NAME,
+    Control,
+    Flight,
+)
 from coupled.schema import Section, build, changed, grouped, known_keys, quantity
 
 
@@ -141,8 +148,52 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    _check_dynamics(rig, control, file, path)
+    _check_inertia(control, file, path, d)
     _check_schedule(control, file, path, d)
     _check_converters(control, file, path, d)
+
+
+def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None:
+    sensing, frame_s = control.sensing, 1.0 / rig.frame_rate
+    if sensing.gauge_delay * rig.frame_rate * rig.substeps > GAUGE_SLOTS - 2:
+        problem = "is too long for this loader_rate_Hz; lower either"
+        raise InputError(file, f"{path}.sensing.gauge_delay_s", problem)
+    for key in ("computed_skew", "force_skew", "gradient_skew"):
+        if getattr(sensing, key) > frame_s:
+            problem = f"must lie within the frame of {frame_s:g} s"
+            raise InputError(file, f"{path}.sensing.{key}_s", problem)
+
+
+def _check_inertia(control: Control, file: object, path: str, d: str) -> None:
+    host, table = control.compensation, control.compensation.inertia_gradient
+    key = f"{path}.compensation.inertia_gradient_N_per_{d}"
+    if table is None:
+        for name in ("mass_factor", "damping_factor", "force_lead"):
+            if getattr(host, name) is not None:
+                problem = f"needs the gradients that it goes by: inertia_gradient_N_per_{d}"
+                raise InputError(file, f"{path}.compensation.{_with_unit(name)}", problem)
+        return
+    if len(table) > MAX_ROWS:
+        raise InputError(file, key, f"has more than {MAX_ROWS} rows")
+    if any(b <= a for a, b in pairwise(table)):
+        raise InputError(file, key, "must rise from value to value")
+    for name in ("mass_factor", "damping_factor", "force_lead"):
+        factors: list[float] | None = getattr(host, name)
+        if factors is None:
+            continue
+        if len(factors) != len(table):
+            problem = f"has {len(factors)} values, inertia_gradient_N_per_{d} {len(table)}"
+            where = f"{path}.compensation.{_with_unit(name)}"
+            raise InputError(file, where, f"{problem}; give as many")
+        if name == "force_lead" and min(factors) < 0.0:
+            raise InputError(file, f"{path}.compensation.force_lead_s", "a lead is not negative")
+        if name != "force_lead" and min(factors) <= 0.0:
+            raise InputError(file, f"{path}.compensation.{name}", "a factor must be above 0")
+
+
+def _with_unit(name: str) -> str:
+    return f"{name}_s" if name == "force_lead" else name
 
 
 def _check_schedule(control: Control, file: object, path: str, d: str) -> None:

@@ -8,6 +8,10 @@ reading (transducer to host) is not.
 
 Steps and ranges are those of what is made: a ΔF, or ΔG, sent by assumed scales is made by the
 real ones.
+
+A host reads its channels one after the other. With a skew, the δc or F of the frame at t_k is
+that of t_k − skew, straight between the loader's nodes; what it puts out may come late, too
+(`modification`).
 """
 
 from __future__ import annotations
@@ -34,6 +38,16 @@ class SensingParameters(Protocol):
     product_range: float
     gradient_step: float  # of ΔG (hybrid), N/d
     gradient_range: float
+    skewed: int  # δc or F is read before t_k
+    computed_skew: float  # by how much, in substeps
+    force_skew: float
+
+
+class SensingState(Protocol):
+    """What was there when the host sampled it, within the frame that ends at t_k."""
+
+    computed: float  # δc, d
+    force: float  # F, N
 
 
 _SCALES: dict[str, Callable[[Sensing], float]] = {  # full scale of each, in its own unit
@@ -59,7 +73,13 @@ SENSING = Declaration(
     section="control.sensing",
     derived={"read_scale": lambda g: g.control.sensing.read_scale}
     | {f"{of}_range": _range(of) for of in _SCALES}
-    | {f"{of}_step": _step(of) for of in _SCALES},
+    | {f"{of}_step": _step(of) for of in _SCALES}
+    | {
+        "skewed": lambda g: g.control.sensing.computed_skew + g.control.sensing.force_skew > 0.0,
+        "computed_skew": lambda g: g.control.sensing.computed_skew / g.substep_s,
+        "force_skew": lambda g: g.control.sensing.force_skew / g.substep_s,
+    },
+    state=layout(SensingState),
 )
 
 
@@ -70,6 +90,20 @@ def converted(value: float, step: float, full_scale: float) -> float:
         return value
     rounded = step * math.floor(value / step + 0.5)
     return min(max(rounded, -full_scale), full_scale - step)
+
+
+@stage
+def sample(
+    p: SensingParameters, s: SensingState, computed: float, force: float, left: int, first: bool
+) -> None:
+    """Take up δc in d and F in N at a node, `left` substeps before the frame's end.
+
+    `first` is the frame's first node, from which the samples are made anew.
+    """
+    if first:
+        s.computed = s.force = 0.0
+    s.computed += max(0.0, 1.0 - abs(p.computed_skew - left)) * computed
+    s.force += max(0.0, 1.0 - abs(p.force_skew - left)) * force
 
 
 @stage

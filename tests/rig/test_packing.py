@@ -33,6 +33,11 @@ RIG = bench(
         f"{SENSING}.s1_V_per_m": 400.0,
         f"{SENSING}.s2_V_per_N": 0.3,
         f"{SENSING}.s3_V_per_N": 0.2,
+        f"{SENSING}.gauge_frequency_Hz": 40.0,
+        f"{HOST}.inertia_gradient_N_per_m": [500.0, 2000.0],
+        f"{HOST}.mass_factor": [1.0, 0.8],
+        f"{HOST}.damping_factor": [1.0, 0.9],
+        f"{HOST}.force_lead_s": [0.0, 0.02],
     }
 )
 COLUMN = RIG.controls["column"]
@@ -44,7 +49,8 @@ def other(value: Any) -> Any:
         return not value
     if isinstance(value, str):
         others = ("hybrid", "digital", "exact", "printed", "elevator", "aileron", "", "today")
-        return others[others.index(value) ^ 1]
+        more = ("first", "second")
+        return more[more.index(value) ^ 1] if value in more else others[others.index(value) ^ 1]
     if isinstance(value, list):
         return [*value[:-1], 1.01 * value[-1] + 1.0]
     return value + 1 if isinstance(value, int) else 1.01 * value + 1e-3

@@ -30,7 +30,7 @@ _POINTS = 41
 _SIMULATED_s = 8.0
 _CLAMP_rad_per_s = 6.0
 # From which end of its values a question is asked: where a rig is at its most stable.
-_FROM_ABOVE: tuple[Kind, ...] = ("servo",)
+_FROM_ABOVE: tuple[Kind, ...] = ("servo", "gauge")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,12 @@ loader, servo and structure, whose stiffness is at most 1/K. τ is the loader's 
 substep, in which hand and loader exchange force and motion; it is taken by its Padé fraction
 of second order.
 
+    gauge     F_g = F − m_g·x''  through its amplifier, its delay, half a sample of its converter
+
+A mass m_g between gauge and grip closes a loop of its own, also in a free hand. Fast beside the
+springs it is 1 + (m_g/m)·S(s)·A(s) = 0 with the servo S and the amplifier A; with a first-order
+amplifier of lag τ that has a closed form, `mass_limit`.
+
 The digital product ΔG·δc stands still over a frame of T seconds, so the state goes by
 
     z(t + T) = (exp(A·T) − ∫exp(A·s) ds·B·ΔG·C)·z(t),    δc = C·z
@@ -32,7 +38,7 @@ from scipy.linalg import expm
 
 from coupled.rig.equations import modifying_gradient
 from coupled.rig.packing import Hand
-from coupled.rig.parameters import Control
+from coupled.rig.parameters import Compensation, Control, Sensing
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -85,14 +91,22 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     if loader.multiplier == "hybrid":
         stiffness += added_gradient(control)
     w = 2.0 * math.pi * loader.servo_frequency
-    a = np.zeros((8, 8))
+    a = np.zeros((12, 12))
     a[_COMPUTED, _RATE] = a[_POSITION, _SPEED] = 1.0
     a[_RATE, :2] = -stiffness / loader.mass, -loader.damping / loader.mass
     a[_SPEED, [_COMPUTED, _POSITION, _SPEED]] = w * w, -w * w, -2.0 * loader.servo_damping_ratio * w
-    if hand.stiffness == hand.damping == hand.integral == 0.0:
+    sensing, free = control.sensing, hand.stiffness == hand.damping == hand.integral == 0.0
+    if free and sensing.gauge_mass == 0.0:
         return a[:4, :4].copy()
-    width, force = _add_hand(a, hand, loader.bend)
-    late_s = loader.delay + 1.0 / (rig.frame_rate * rig.substeps)
+    force = np.zeros(len(a))
+    if not free:
+        width, force = _add_hand(a, hand, loader.bend)
+    force -= sensing.gauge_mass * a[_SPEED]
+    width, force = _add_amplifier(a, sensing, width, force)
+    width, force = _add_lead(a, control.compensation, width, force)
+    late_s = loader.delay + sensing.gauge_delay + 1.0 / (rig.frame_rate * rig.substeps)
+    if sensing.gauge_sampling > 0.0:
+        late_s += 0.5 / sensing.gauge_sampling
     # e^(−τs) = 1 − (12/τ)·s/(s² + (6/τ)·s + 12/τ²)
     a[width, width + 1] = 1.0
     a[width + 1] = force
@@ -123,6 +137,43 @@ def _add_hand(a: Floats, hand: Hand, bend: float) -> tuple[int, Floats]:
         a[integral] = -hand.integral * bend * force
         a[integral, _POSITION] -= hand.integral
     return width, force
+
+
+def _add_amplifier(a: Floats, sensing: Sensing, width: int, force: Floats) -> tuple[int, Floats]:
+    """Add the gauge's amplifier behind a force; return how many states there are, and its row."""
+    if sensing.gauge_frequency == 0.0:
+        return width, force
+    w, passed = 2.0 * math.pi * sensing.gauge_frequency, np.zeros(len(a))
+    passed[width] = 1.0
+    if sensing.gauge_order == "first":
+        a[width] = w * (force - passed)
+        return width + 1, passed
+    a[width, width + 1] = 1.0
+    a[width + 1] = w * w * (force - passed)
+    a[width + 1, width + 1] -= 2.0 * sensing.gauge_damping_ratio * w
+    return width + 2, passed
+
+
+def _add_lead(a: Floats, host: Compensation, width: int, force: Floats) -> tuple[int, Floats]:
+    """Add the lead on the force, the first of its table; return states and the force's row."""
+    lead, lag = (host.force_lead or [0.0])[0], host.force_lead_lag
+    if lead == 0.0:
+        return width, force
+    a[width] = force / lag
+    a[width, width] -= 1.0 / lag
+    return width + 1, force + lead * a[width]
+
+
+def mass_limit(servo_rad_per_s: float, damping_ratio: float, lag_s: float) -> float:
+    """Return the greatest m_g/m of a free loader without spring and damping, by Routh.
+
+    Of τ·s³ + (1 + 2ζωτ)·s² + (2ζω + τω²)·s + ω²·(1 + m_g/m), the servo's ω and ζ, and τ the lag
+    of a first-order amplifier. Without lag any mass is stable.
+    """
+    w, z = servo_rad_per_s, damping_ratio
+    if lag_s == 0.0:
+        return math.inf
+    return (1.0 + 2.0 * z * w * lag_s) * (2.0 * z * w + lag_s * w * w) / (lag_s * w * w) - 1.0
 
 
 def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:

@@ -7,6 +7,8 @@ limits taken out, which only ever hold or bound a motion:
     frame    T, a free hand: the digital product ΔG·δc that stands still over a frame
     hand     K·k_h, hybrid: a hand of that stiffness, on the structure's 1/K
     servo    its frequency, hybrid: the grip held fast
+    gauge    the bandwidth of its amplifier, hybrid: a hand as stiff as the structure
+    mass     between gauge and grip over the loader's own, hybrid: a free hand
 
 Where a growth changes its sign along the second quantity is found by bisection, in simulation
 and by theory.
@@ -27,12 +29,15 @@ from coupled.authority.stability.linear import growth as linear_growth
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
-Kind = Literal["assumed", "frame", "hand", "servo"]
-KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo")
+Kind = Literal["assumed", "frame", "hand", "servo", "gauge", "mass"]
+KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo", "gauge", "mass")
+GAUGE_Hz = 50.0  # the amplifier of a gauge that a rig file says nothing of
+FIRM = 1.0  # K·k_h of a hand as stiff as the structure
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
 
 _SIMULATED_s = 4.0
@@ -44,6 +49,8 @@ _VALUES: dict[Kind, tuple[float, float]] = {
     "frame": (0.002, 0.2),
     "hand": (0.01, 100.0),
     "servo": (2.0, 200.0),
+    "gauge": (0.5, 200.0),
+    "mass": (0.05, 50.0),
 }
 _FAR = 1e12  # a stop that a linear rig never meets
 
@@ -94,6 +101,8 @@ class Question:
     frame_s: float | None = None
     host_bend: float | None = None  # K̂, d/N
     host_gradient: bool | None = None  # whether the host corrects the gradient
+    gauge_frequency_Hz: float | None = None
+    gauge_mass: float | None = None  # between gauge and grip, kg
 
 
 def linear_rig(
@@ -116,6 +125,9 @@ def linear_rig(
         f"loader.servo_rate_limit_{d}_per_s": 0.0,
         f"loader.bend_limit_{d}": 0.0,
         "loader.bob_weight_N_per_g": 0.0,
+        "loader.multiplier_offset_N": 0.0,
+        "loader.multiplier_drift_N_per_s": 0.0,
+        **_inertia_there(control, gradient, d),
         "loader.multiplier": question.multiplier,
         "loader.servo_frequency_Hz": question.servo_frequency_Hz,
         "schedule.dynamic_pressure_Pa": [0.0, 1.0],
@@ -126,14 +138,37 @@ def linear_rig(
         f"compensation.bend_{d}_per_N": question.host_bend,
         "compensation.gradient": question.host_gradient,
         "sensing.word_length_bits": 0,
+        "sensing.gauge_frequency_Hz": question.gauge_frequency_Hz,
+        "sensing.gauge_mass_kg": question.gauge_mass,
     }
     given = {key: value for key, value in linear.items() if value is not None}
     given[f"schedule.second_gradient_N_per_{d}"] = None
+    for key in ("mass_factor", "damping_factor"):
+        given[f"compensation.{key}"] = None
     alone = {name: changed(control, given, rig.name, f"controls.{name}", d)}
     whole: dict[str, Any] = {"controls": alone, "flight": None, "noise": {}}
     if question.frame_s is not None:
         whole["frame_rate_Hz"] = 1.0 / question.frame_s
     return changed(rig, whole, rig.name)
+
+
+def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
+    """Return m and c as they are at one gradient, in place of what goes by it."""
+    host, loader = control.compensation, control.loader
+    table = host.inertia_gradient
+    if table is None:
+        return {}
+    one, lead = [1.0] * len(table), host.force_lead or [0.0] * len(table)
+    mass, damping = (
+        float(np.interp(gradient, table, factors or one))
+        for factors in (host.mass_factor, host.damping_factor)
+    )
+    return {
+        "loader.mass_kg": mass * loader.mass,
+        f"loader.damping_N_s_per_{d}": damping * loader.damping,
+        f"compensation.inertia_gradient_N_per_{d}": [gradient, gradient + 1.0],
+        "compensation.force_lead_s": [float(np.interp(gradient, table, lead))] * 2,
+    }
 
 
 def posed(
@@ -147,6 +182,12 @@ def posed(
         question = Question("digital", frame_s=value)
     elif kind == "servo":
         question, hand = Question("hybrid", servo_frequency_Hz=value), Hand(HELD_FAST / bend)
+    elif kind == "gauge":
+        question, hand = Question("hybrid", gauge_frequency_Hz=value), Hand(FIRM / bend)
+    elif kind == "mass":
+        loader, own_Hz = rig.controls[name].loader, rig.controls[name].sensing.gauge_frequency
+        mass = value * loader.mass
+        question = Question("hybrid", gauge_frequency_Hz=own_Hz or GAUGE_Hz, gauge_mass=mass)
     else:
         question, hand = Question("hybrid"), Hand(value / bend)
     return linear_rig(rig, name, gradient, question), hand

@@ -22,12 +22,16 @@ _QUANTITIES: dict[Kind, str] = {
     "frame": "frame_s",
     "hand": "hand_stiffness_times_bend",
     "servo": "servo_frequency_Hz",
+    "gauge": "gauge_frequency_Hz",
+    "mass": "gauge_mass_over_loader_mass",
 }
 _WORDS: dict[Kind, tuple[str, float]] = {
     "assumed": ("K̂/K, free hand", 1.0),
     "frame": ("frame of a digital product, ms", 1.0 / MILLISECOND_s),
     "hand": ("hand's stiffness, K·k", 1.0),
     "servo": ("servo with the grip held fast, Hz", 1.0),
+    "gauge": ("gauge's amplifier in a hand with K·k = 1, Hz", 1.0),
+    "mass": ("mass between gauge and grip over m, free hand", 1.0),
 }
 
 

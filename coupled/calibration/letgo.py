@@ -1,0 +1,79 @@
+"""Mass, damping and lead that go with the gradient, so that a release is as specified.
+
+Eq. (12) makes the loader swing faster than specified, and a control let go springs back by its
+structure's bend at once: to δ·(1 − K·G_T), from rest. The rigid one that is specified falls
+through 90 % of its displacement with some speed already, and Part 60 counts from there. So
+
+    f_m = f_c = 1/(1 − K̂·G_T)                   frequency and damping ratio as specified
+    T ≈ √(2·K̂·G_T − (K̂·G_T)²)·√(m/G_T)         the speed that an undamped motion has there
+
+with T sought in simulation so that the first crossing of zero comes when specified: the servo's
+lag asks for more. A control that does not swing needs none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+
+from coupled.calibration.checks import swing_of
+from coupled.calibration.specification import specified_rig
+from coupled.calibration.sweeps import feel_pressures, release
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.equations import specified_gradient
+from coupled.rig.rig import Rig
+
+Row = tuple[float, float, float]  # G_T in N/d, the factor on m and c, T in s
+LATE = 0.06  # of the first crossing, within the rule's 10 %: less lead, less overshoot
+_LONGEST_s = 0.2
+
+
+def scheduled(rig: Rig, control: ControlName) -> Rig:
+    """Return a compensated rig whose mass, damping and lead go with the gradient specified.
+
+    They stand at the least, middle and greatest gradient of its schedule, where the checks are
+    made.
+    """
+    specified = specified_rig(rig.only(control))
+    rows = [_row(rig, control, q, specified) for q in feel_pressures(specified, control)]
+    return with_rows(rig, control, sorted(rows))
+
+
+def with_rows(rig: Rig, control: ControlName, rows: list[Row]) -> Rig:
+    """Return the rig with the table of those rows, rising; a single one holds everywhere."""
+    if len(rows) == 1:
+        rows = [rows[0], (rows[0][0] + 1.0, *rows[0][1:])]
+    key = f"controls.{control}.compensation"
+    factors = [float(f"{factor:.4g}") for _, factor, _ in rows]
+    return rig.changed(
+        {
+            f"{key}.inertia_gradient_N_per_{unit_of(control)}": [row[0] for row in rows],
+            f"{key}.mass_factor": factors,
+            f"{key}.damping_factor": factors,
+            f"{key}.force_lead_s": [float(f"{lead:.4g}") for *_, lead in rows],
+        }
+    )
+
+
+def estimated_lead(mass: float, gradient: float, share: float) -> float:
+    """Return T in s without damping and servo, for K·G_T = `share`."""
+    return math.sqrt(share * (2.0 - share) * mass / gradient)
+
+
+def _row(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Row:
+    data = rig.controls[control]
+    gradient = float(specified_gradient(data.schedule, pressure))
+    factor = 1.0 / (1.0 - data.compensation.bend * gradient)
+    wanted = swing_of(release(specified, control, pressure, 1.0))
+    if not wanted.peaks.size:
+        return gradient, factor, 0.0
+
+    def late(lead: float) -> float:
+        tried = with_rows(rig, control, [(gradient, factor, lead)])
+        now = swing_of(release(tried, control, pressure, 1.0))
+        return float(now.crossings[0]) / float(wanted.crossings[0]) - 1.0 - LATE
+
+    if late(0.0) <= 0.0 or late(_LONGEST_s) >= 0.0:
+        return gradient, factor, 0.0
+    return gradient, factor, float(brentq(late, 0.0, _LONGEST_s, xtol=1e-4))

@@ -1,0 +1,160 @@
+"""Gauge: from the hand's force to the force that loader and host are given.
+
+    mass       F_g = F − m_g·x''        the inertia of what lies between gauge and grip
+    amplifier  y'' = ω²·(F_g − y) − 2ζω·y',    or  y' = ω·(F_g − y)
+    delay      y(t − τ)
+    converter  sampled at a rate of its own and held until the next sample
+
+A gauge does not feel the hand but what the structure beneath it carries. What lies between,
+grip, yoke, and the upper part of the column, takes its share m_g·x'' to be moved, and a free
+control whose gauge reads −m_g·x'' pushes itself: with the lag of gauge and servo in between,
+that is what sets how light a loader's simulated mass may be (`authority/stability`).
+
+The mass moves with the servo, below the bend: its own vibration upon the structure, at
+1/√(K·m_g), is left out. x'' is what the servo's equation says at the last node, none where its
+speed is at its limit. The amplifier is stepped exactly for a force that runs straight over a
+substep. With every number neutral the stage is skipped, and the hand's own force goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.declaration import Declaration, Given
+from coupled.rig.linkage import LinkageParameters, LinkageState, servo_weights
+from coupled.rig.parameters import GAUGE_SLOTS
+
+
+class GaugeParameters(Protocol):
+    """Mass, amplifier, delay and converter of a gauge; d is m, or rad for a wheel."""
+
+    present: int  # 0 where the gauge gives the hand's force as it is
+    mass: float  # m_g, kg (N per d/s²)
+    servo_stiffness: float  # ω², 1/s²
+    servo_damping: float  # 2ζω, 1/s
+    position: NDArray[np.float64]  # weights of (y, y', F_g before, F_g after) in the next y
+    speed: NDArray[np.float64]  # and in the next y'
+    delay_substeps: float  # τ over the substep
+    samples: float  # in a substep; 0 for a converter that follows
+
+
+class GaugeState(Protocol):
+    """What is on its way from the grip to the loader."""
+
+    acceleration: float  # x'' at the last node, d/s²
+    given: float  # F_g at the last node, N
+    passed: float  # y, N
+    rate: float  # y', N/s
+    force: float  # what loader and host get, N
+    phase: float  # of the converter's sample, 0 to 1
+    node: int  # substeps since the start
+    history: NDArray[np.float64]  # y at past nodes, N
+
+
+def amplifier_weights(
+    order: str, frequency_Hz: float, damping_ratio: float, h: float
+) -> NDArray[np.float64]:
+    """Return the exact one-substep map of an amplifier, shape (2, 4), as `servo_weights` has it.
+
+    0 Hz is an amplifier that follows at once.
+    """
+    if frequency_Hz == 0.0:
+        return np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    w = 2.0 * math.pi * frequency_Hz
+    if order == "second":
+        return servo_weights(w, damping_ratio, h)
+    left = math.exp(-w * h)
+    ramp = -math.expm1(-w * h) / (w * h)
+    return np.array([[left, 0.0, ramp - left, 1.0 - ramp], [0.0, 0.0, 0.0, 0.0]])
+
+
+def _amplifier(g: Given) -> NDArray[np.float64]:
+    s = g.control.sensing
+    return amplifier_weights(s.gauge_order, s.gauge_frequency, s.gauge_damping_ratio, g.substep_s)
+
+
+def _servo_rate(g: Given) -> float:
+    return 2.0 * math.pi * g.control.loader.servo_frequency
+
+
+def _present(g: Given) -> bool:
+    s = g.control.sensing
+    return any((s.gauge_mass, s.gauge_frequency, s.gauge_delay, s.gauge_sampling))
+
+
+GAUGE = Declaration(
+    layout(GaugeParameters, position=(4,), speed=(4,)),
+    section="control.sensing",
+    derived={
+        "present": _present,
+        "mass": lambda g: g.control.sensing.gauge_mass,
+        "servo_stiffness": lambda g: _servo_rate(g) ** 2,
+        "servo_damping": lambda g: 2.0 * g.control.loader.servo_damping_ratio * _servo_rate(g),
+        "position": lambda g: _amplifier(g)[0],
+        "speed": lambda g: _amplifier(g)[1],
+        "delay_substeps": lambda g: g.control.sensing.gauge_delay / g.substep_s,
+        "samples": lambda g: g.control.sensing.gauge_sampling * g.substep_s,
+    },
+    state=layout(GaugeState, history=(GAUGE_SLOTS,)),
+    fixed=("phase",),
+)
+
+
+@stage
+def start_gauge(p: GaugeParameters, s: GaugeState, force: float) -> float:
+    """Begin at rest with the hand's force at the first node, N; return what the gauge gives."""
+    if p.present == 0:
+        return force
+    s.given = force
+    s.passed = force if p.position[3] == 1.0 else 0.0  # 1 where no amplifier lags
+    s.history[0] = s.passed
+    s.force = s.passed if p.delay_substeps == 0.0 else 0.0
+    return s.force
+
+
+@stage
+def gauge_force(p: GaugeParameters, s: GaugeState, force: float) -> float:
+    """Return the force in N that loader and host get at the next node, the hand's there given."""
+    before, y, rate = s.given, s.passed, s.rate
+    s.given = force - p.mass * s.acceleration
+    a, b = p.position, p.speed
+    s.passed = a[0] * y + a[1] * rate + a[2] * before + a[3] * s.given
+    s.rate = b[0] * y + b[1] * rate + b[2] * before + b[3] * s.given
+    if abs(s.passed) < TINY and abs(s.rate) < TINY:
+        s.passed = s.rate = 0.0
+    s.node += 1
+    s.history[s.node & (GAUGE_SLOTS - 1)] = s.passed
+    late = s.passed
+    if p.delay_substeps > 0.0:
+        whole = int(p.delay_substeps)
+        share = p.delay_substeps - whole
+        near = s.history[(s.node - whole) & (GAUGE_SLOTS - 1)] if s.node >= whole else 0.0
+        far = s.history[(s.node - whole - 1) & (GAUGE_SLOTS - 1)] if s.node > whole else 0.0
+        late = (1.0 - share) * near + share * far
+    s.phase += p.samples
+    if p.samples == 0.0 or s.phase >= 1.0 - 1e-9:
+        s.phase = max(s.phase - math.floor(s.phase + 1e-9), 0.0)
+        s.force = late
+    return s.force
+
+
+@stage
+def move_gauge(
+    p: GaugeParameters,
+    s: GaugeState,
+    linkage_p: LinkageParameters,
+    linkage: LinkageState,
+    computed: float,
+) -> None:
+    """Take up how the mass beyond the gauge is accelerated at a node where δc stands, d."""
+    s.acceleration = (
+        p.servo_stiffness * (computed - linkage.position) - p.servo_damping * linkage.rate
+    )
+    limit = linkage_p.rate_limit
+    if limit > 0.0 and abs(linkage.rate) >= limit and s.acceleration * linkage.rate > 0.0:
+        s.acceleration = 0.0
