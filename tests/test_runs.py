@@ -8,7 +8,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from coupled.authority.compare import Comparison, compare
+from coupled.authority.compare import Comparison, Flight, compare
+from coupled.campaign.standards import judge_standard
 from coupled.flight.runfile import read_run
 from coupled.plots.flights import draw_comparison
 from coupled.resources import shipped_runs
@@ -151,3 +152,32 @@ def test_the_wheels_loss_that_is_expected_is_its_closed_form(configuration: str)
     run = read_run("roll-authority")[0]
     [expect] = [e for e in run.expect if e.measure == "loss" and e.configuration == configuration]
     assert expect.equal == pytest.approx(closed_form(configuration), abs=2e-4)
+
+
+def test_every_number_of_the_recoverys_card_is_what_is_flown() -> None:
+    """The words of the card are made from the flights; each outcome has its margin."""
+    manoeuvres = read_run("recovery")
+    card = " ".join(manoeuvres[0].card.split())
+    stops = {f.configuration: f for f in compare(manoeuvres[:1])}
+    free = compare(manoeuvres[1:])
+    lost = [stops[name] for name in ("uncompensated", "gradient only")]
+    saved = [flight for name, flight in stops.items() if flight not in lost]
+    assert all("met the ground" in flight.outcome.ended_early for flight in lost)
+    after = [f"{flight.record.time_s[-1]:.0f} s" for flight in lost]
+    assert f"meet the ground, after {after[0]} and {after[1]}" in card
+
+    def height_lost(flights: list[Flight]) -> float:
+        assert all(flight.outcome.ended_early == "" for flight in flights)
+        return max(450.0 - float(flight.record["altitude_m"].min()) for flight in flights)
+
+    assert f"the others lose {height_lost(saved):.0f} m at most" in card
+    assert f"and lose {height_lost(list(free)):.0f} m at most" in card
+    whole = stops["compensated"]
+    greatest = judge_standard("25.143(d) long-term", "column", whole, None)
+    force = np.abs(whole.record["column_force_N"])
+    assert f"{force.max():.0f} N at the greatest" in card
+    assert force.max() < 0.9 * 333.6
+    assert f"{greatest.value:.0f} N over 20 s, where it has {greatest.most:.1f} N" in card
+    assert greatest.value > 2.0 * (greatest.most or 0.0)
+    for flight in stops.values():
+        assert flight.record["column_deflection_m"].max() <= 7 * 0.0254 + 1e-9

@@ -1,6 +1,6 @@
-"""How an aircraft answers its elevator at one frequency, found by flying it.
+"""How an aircraft answers one of its controls at one frequency, found by flying it.
 
-Two aircraft of their own are flown from the trim, one with a small sine on the elevator
+Two aircraft of their own are flown from the trim, one with a small sine on the surface's
 command and one with its negative, faded in; half the difference of their motions, without
 what drifts, is the answer. So it holds whatever the model has between command and
 surface, and an even nonlinearity falls out.
@@ -17,27 +17,43 @@ from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.record.channels import ALTITUDE, LOAD, PITCH, PRESSURE, SPEED, ControlName
+from coupled.record.channels import (
+    ALTITUDE,
+    HEADING,
+    LOAD,
+    PITCH,
+    PRESSURE,
+    ROLL,
+    SIDESLIP,
+    SPEED,
+    ControlName,
+)
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 
-_SIZE = 0.004  # of the elevator command: linear, and far above rounding
+_SIZE = 0.004  # of the command: linear, and far above rounding
 _FADE, _WAIT, _MEASURED = 2.0, 2.0, 4.0  # periods
 _LEAST_WAIT_s = 10.0  # the short period of the slowest aircraft here has died down by then
 _DRIFT = 3  # order of the polynomial that takes what drifts
 
 
 class Response(NamedTuple):
-    """What a unit of elevator command, JSBSim's ±1, makes of the motion at one frequency."""
+    """What a unit of a surface's command, JSBSim's ±1, makes of the motion at one frequency.
+
+    Roll, heading and sideslip are 0 on a rig without wheel and pedals, which does not read them.
+    """
 
     pitch: complex  # rad
     flight_path: complex  # rad, over the frame before (`path_angle`)
     airspeed: complex  # true, m/s
     load_factor: complex
     pressure_Pa: float  # q̄ of the trim
+    roll: complex = 0j  # rad
+    heading: complex = 0j  # rad
+    sideslip: complex = 0j  # rad
 
 
 def elevator_response(
@@ -47,17 +63,35 @@ def elevator_response(
     file: object,
     rate_rad_per_s: float,
 ) -> Response:
-    """Return the response of an aircraft in still air.
+    """Return the response of an aircraft to its elevator, in still air."""
+    return control_response(flight, frame_s, controls, "column", file, rate_rad_per_s)
+
+
+def control_response(
+    flight: Flight,
+    frame_s: float,
+    controls: tuple[ControlName, ...],
+    control: ControlName,
+    file: object,
+    rate_rad_per_s: float,
+) -> Response:
+    """Return the response of an aircraft to the surface of one of its controls, in still air.
 
     The command is set once a frame; the motion of row k is read before that of row k acts.
     """
     still = changed(flight, {"gust_rms_m_per_s": 0.0}, file)
-    return _response(still.model_dump_json(), frame_s, controls, file, rate_rad_per_s)
+    moved = controls.index(control)
+    return _response(still.model_dump_json(), frame_s, controls, moved, file, rate_rad_per_s)
 
 
 @lru_cache(maxsize=64)
 def _response(
-    flight_json: str, frame_s: float, controls: tuple[ControlName, ...], file: object, rate: float
+    flight_json: str,
+    frame_s: float,
+    controls: tuple[ControlName, ...],
+    moved: int,
+    file: object,
+    rate: float,
 ) -> Response:
     flight = Flight.model_validate_json(flight_json)
     period = 2.0 * math.pi / rate
@@ -67,15 +101,17 @@ def _response(
     command = _SIZE * fade * np.sin(rate * times)
     planes = [_aircraft(flight, frame_s, controls, file) for _ in "+-"]
     pressure_Pa = planes[0].motion()[PRESSURE]
-    up = _fly(planes[0], command, frame_s)
-    down = _fly(planes[1], -command, frame_s)
+    up = _fly(planes[0], command, moved, frame_s)
+    down = _fly(planes[1], -command, moved, frame_s)
     late = times >= wait
     t = times[late]
     drift = np.polynomial.chebyshev.chebvander(np.linspace(-1.0, 1.0, t.size), _DRIFT)
     basis = np.column_stack((np.sin(rate * t), np.cos(rate * t), drift))
     found = np.linalg.lstsq(basis, 0.5 * (up - down)[late], rcond=None)[0]
-    pitch, path, speed, load = (found[0] + 1j * found[1]) / _SIZE
-    return Response(complex(pitch), complex(path), complex(speed), complex(load), pressure_Pa)
+    answer = [complex(x) for x in (found[0] + 1j * found[1]) / _SIZE]
+    pitch, path, speed, load = answer[:4]
+    roll, heading, sideslip = answer[4:] if len(answer) > 4 else (0j, 0j, 0j)
+    return Response(pitch, path, speed, load, pressure_Pa, roll, heading, sideslip)
 
 
 def _aircraft(
@@ -84,16 +120,23 @@ def _aircraft(
     return make_aircraft(flight, frame_s, controls, [aircraft_folder()], file)
 
 
-def _fly(airframe: JSBSimAirframe, command: Floats, frame_s: float) -> Floats:
-    """Return pitch, path, speed and load factor under an elevator command, shape (frames, 4)."""
-    rows = np.empty((command.size, 4))
+def _fly(airframe: JSBSimAirframe, command: Floats, moved: int, frame_s: float) -> Floats:
+    """Return the motion that a `Response` has under a surface's command, a row a frame."""
+    lateral = len(airframe.motion()) > max(ROLL, HEADING, SIDESLIP)
+    rows = np.zeros((command.size, 7 if lateral else 4))
     before = airframe.motion()[ALTITUDE]
+    commands = [0.0, 0.0, 0.0]
     for row, value in zip(rows, command.tolist(), strict=True):
         motion = airframe.motion()
         path = path_angle(motion, before, frame_s)
         before = motion[ALTITUDE]
-        row[:] = motion[PITCH], path, motion[SPEED], motion[LOAD]
-        airframe.step((value, 0.0, 0.0))
+        row[:4] = motion[PITCH], path, motion[SPEED], motion[LOAD]
+        if lateral:
+            row[4:] = motion[ROLL], motion[HEADING], motion[SIDESLIP]
+        commands[moved] = value
+        airframe.step((commands[0], commands[1], commands[2]))
+    if lateral:
+        rows[:, 5] = np.unwrap(rows[:, 5])
     return rows
 
 

@@ -77,6 +77,10 @@ LATERAL = (
     "roll_rad",
     "heading_rad",
 )
+# In the motion of a rig with wheel or pedals they follow the longitudinal ones.
+ROLL = len(LONGITUDINAL) + LATERAL.index("roll_rad")
+HEADING = len(LONGITUDINAL) + LATERAL.index("heading_rad")
+SIDESLIP = len(LONGITUDINAL) + LATERAL.index("sideslip_rad")
 
 
 def motion_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.pilot import Track
+from coupled.flight.pilot import Attitude, Track
 from coupled.flight.pilot.crossover import (
     Acting,
     Compensation,
@@ -23,7 +23,11 @@ from coupled.flight.pilot.crossover import (
 from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import elevator_response
 from coupled.flight.runfile import read_run
+from coupled.record.channels import ControlName, motion_channels
 from coupled.record.record import Record
+from coupled.resources import shipped_rigs
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
 
 RUN = """
 name = "test"
@@ -32,18 +36,34 @@ rig = "{rig}"
 duration_s = {duration}
 seed = 3
 
-[pilot.column]
+[pilot.{control}]
 kind = "track"
 {pilot}
+
+[[case]]
+label = "without dry friction"
+[case.rig]
+{smooth}
 """
 _PERIOD_s = 60.0
+_SLIP = "sine_rad = 0.0005\nintegral_rad_per_s = 3.0"
+_PATH = "sine_rad = 0.001\nintegral_rad_per_s = 1.0"
 
 
 def manoeuvre(
-    folder: Path, pilot: str, rig: str = "report-column", duration: float = 6
+    folder: Path,
+    pilot: str,
+    rig: str = "report-column",
+    duration: float = 6,
+    control: ControlName = "column",
 ) -> Manoeuvre:
     path = folder / "test.toml"
-    path.write_text(RUN.format(duration=duration, pilot=pilot, rig=rig), encoding="utf-8")
+    dry = ("friction_N", "breakaway_N", "breakout_N")
+    smooth = "\n".join(f'"controls.{control}.loader.{key}" = 0.0' for key in dry)
+    path.write_text(
+        RUN.format(duration=duration, pilot=pilot, rig=rig, control=control, smooth=smooth),
+        encoding="utf-8",
+    )
     return read_run(str(path))[0]
 
 
@@ -75,23 +95,35 @@ def sines(crossover: float) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("rig", "what", "crossover", "margin", "size"),
+    ("rig", "control", "what", "crossover", "margin", "size"),
     [
-        ("report-column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
-        ("report-column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
-        ("awjsra", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
-        ("report-column", "flight_path", 0.7, 0.9, "sine_rad = 0.001\nintegral_rad_per_s = 1.0"),
-        ("report-column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),
+        ("report-column", "column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
+        ("report-column", "column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
+        ("awjsra", "column", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
+        ("report-column", "column", "flight_path", 0.7, 0.9, _PATH),
+        ("report-column", "column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),
+        ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002"),
+        ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002\narm_mass_kg = 0.36"),
+        ("737", "wheel", "heading", 0.3, 0.9, "sine_rad = 0.001"),
+        ("737", "pedals", "heading", 0.3, 0.7, "sine_rad = 0.0002"),
+        ("737", "pedals", "sideslip", 0.3, 1.0, _SLIP),
+        ("t37", "pedals", "sideslip", 0.5, 1.0, _SLIP),
     ],
 )
 def test_the_loop_crosses_over_as_set(
-    tmp_path: Path, rig: str, what: str, crossover: float, margin: float, size: str
+    tmp_path: Path,
+    rig: str,
+    control: ControlName,
+    what: str,
+    crossover: float,
+    margin: float,
+    size: str,
 ) -> None:
     rates = [float(rate) for rate in sines(crossover)]
     pilot = f'what = "{what}"\ncrossover_rad_per_s = {crossover}\nphase_margin_rad = {margin}\n'
     pilot += f"sine_rates_rad_per_s = {rates}\n{size}\n"
-    wait = 60.0 if what == "airspeed" else 20.0
-    flown = manoeuvre(tmp_path, pilot, rig, 1.0 + wait + _PERIOD_s)
+    wait = 60.0 if what in ("airspeed", "heading") else 20.0
+    flown = manoeuvre(tmp_path, pilot, rig, 1.0 + wait + _PERIOD_s, control)
     record = fly(flown.configured("rigid"))
     assert record.manifest["ended_early"] is None
     climb = np.diff(record["altitude_m"], prepend=record["altitude_m"][0]) / record.time_s[1]
@@ -100,13 +132,43 @@ def test_the_loop_crosses_over_as_set(
         "flight_path": np.arcsin(climb / record["true_airspeed_m_per_s"]),
         "airspeed": record["true_airspeed_m_per_s"],
     }
-    pilots = flown.pilots["column"]
+    if control != "column":
+        seen |= {"roll": record["roll_rad"], "heading": np.unwrap(record["heading_rad"])}
+        seen["sideslip"] = record["sideslip_rad"]
+    pilots = flown.pilots[control]
     assert isinstance(pilots, Track)
     found, left = measured(record, seen[what], pilots)
     print(f"{rig} {what}: {found:.3f} of {crossover} rad/s, {left:.3f} of {margin} rad")
     # Small sines: the T-37's tables have kinks, which larger ones feel.
     assert found == pytest.approx(crossover, rel=0.01)
     assert left == pytest.approx(margin, abs=0.015)
+
+
+@pytest.mark.parametrize(("control", "channel"), [("wheel", "roll_rad"), ("pedals", "heading_rad")])
+def test_an_attitude_is_captured_with_the_control_that_has_it(
+    control: ControlName, channel: str
+) -> None:
+    gains = {"wheel": (120.0, 60.0, 20.0), "pedals": (1500.0, 1500.0, 300.0)}[control]
+    proportional, rate, integral = gains
+    pilot = Attitude(
+        change_rad=0.1,
+        gain_N_per_rad=proportional,
+        rate_gain_N_s_per_rad=rate,
+        integral_gain_N_per_rad_s=integral,
+    )
+    rig = smooth_rig("737", control)
+    record = fly(Manoeuvre(rig, {control: pilot}, 40.0)).data
+    names = motion_channels(list(rig.controls), flown=True)
+    angle = record[:, names.index(channel) - len(names)]
+    moved = np.unwrap(angle) - angle[0]
+    assert moved[-200:].mean() == pytest.approx(0.1, abs=0.02)
+    assert np.ptp(moved[-200:]) < 0.02
+
+
+def smooth_rig(name: str, control: ControlName) -> Rig:
+    dry = ("friction_N", "breakaway_N", "breakout_N")
+    rig = read_rig(shipped_rigs()[name])
+    return rig.changed({f"controls.{control}.loader.{key}": 0.0 for key in dry})
 
 
 @pytest.mark.parametrize("element", [0.3 * np.exp(-2.9j), 7.0 * np.exp(-1.3j), np.exp(2.6j)])
@@ -189,6 +251,21 @@ def test_far_above_the_short_period_pitch_falls_by_four_an_octave() -> None:
             "frame rate",
         ),
         ("crossover_rad_per_s = 9.0", "crossover_rad_per_s", "of lead"),
+        (
+            'what = "roll"\ncrossover_rad_per_s = 1.0',
+            "what",
+            "roll is not followed with the column",
+        ),
+        (
+            "crossover_rad_per_s = 2.0\nroll_crossover_rad_per_s = 1.0",
+            "roll_crossover_rad_per_s",
+            "has no part in following pitch",
+        ),
+        (
+            "crossover_rad_per_s = 2.0\narm_stiffness_N_per_rad = 9.0",
+            "arm_stiffness_N_per_rad",
+            "unit",
+        ),
         ("crossover = 2.0", "crossover", "crossover_rad_per_s"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A hand that looks at the pitch attitude, with gains of its own."""
+"""A hand that looks at the attitude, with gains of its own."""
 
 from __future__ import annotations
 
@@ -6,19 +6,27 @@ from typing import Literal
 
 import numpy as np
 
-from coupled.flight.pilot.base import STRONGEST, Action, Pilot, Start, edges, needs_aircraft
-from coupled.record.channels import PITCH, PITCH_RATE, ControlName
+from coupled.flight.pilot.base import (
+    STRONGEST,
+    Action,
+    Pilot,
+    Start,
+    edges,
+    needs_aircraft,
+    turned,
+)
+from coupled.record.channels import ATTITUDE, RATE, ControlName, motion_channels
 from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
 class Attitude(Pilot):
-    """A hand that captures a pitch attitude `change_rad` from where it finds it, and holds it.
+    """A hand that captures an attitude `change_rad` from where it finds it, and holds it.
 
-    Force on the column through the muscle's lag: gain on the error of pitch, its integral,
-    and pitch rate. Limited to `force_limit_N`. On the column of a rig that flies. Raises
-    InputError as a run file does.
+    On the column the attitude is pitch, on the wheel roll, on the pedals heading. Force
+    through the muscle's lag: gain on the error, its integral, and the rate about that axis.
+    Limited to `force_limit_N`. On a rig that flies. Raises InputError as a run file does.
 
     >>> import coupled
     >>> coupled.Attitude(change_rad=0.05, gain_N_per_rad=900, rate_gain_N_s_per_rad=150).lag_s
@@ -35,22 +43,24 @@ class Attitude(Pilot):
     force_limit_N: float = quantity("", 330.0, gt=0, le=STRONGEST)
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse any but the column of a rig that flies."""
+        """Refuse a rig without an aircraft."""
         super().check(rig, control, file)
         needs_aircraft(rig, control, file)
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the hand, with a memory of its own."""
         found, integral, last = None, 0.0, self.start_s
+        names = motion_channels(list(rig.controls), flown=True)
+        angle, rate = names.index(ATTITUDE[control]), names.index(RATE[control])
 
         def look(time: float, motion: tuple[float, ...]) -> float:
             nonlocal found, integral, last
             if time < self.start_s:
                 return 0.0
-            found = motion[PITCH] if found is None else found
+            found = motion[angle] if found is None else found
             share = edges(np.array([time]), [(self.start_s, 1.0)], self.rise_s)[0]
-            error = found + self.change_rad * float(share) - motion[PITCH]
-            damping = self.rate_gain_N_s_per_rad * motion[PITCH_RATE]
+            error = self.change_rad * float(share) - turned(found, motion[angle])
+            damping = self.rate_gain_N_s_per_rad * motion[rate]
             force = self.gain_N_per_rad * error + integral - damping
             if abs(force) < self.force_limit_N:
                 integral += self.integral_gain_N_per_rad_s * error * (time - last)

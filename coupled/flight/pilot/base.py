@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
@@ -105,7 +106,13 @@ def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> 
 
 
 def needs_aircraft(rig: Rig, control: ControlName, file: object) -> None:
-    """Refuse a pilot who looks at the motion, on any but the column of a rig that flies."""
-    if control != "column" or rig.flight is None:
-        problem = "only the column of a rig that flies follows pitch, path or airspeed"
+    """Refuse a pilot who looks at the motion, on a rig that has none."""
+    if rig.flight is None:
+        problem = "looks at the aircraft's motion, and the rig has no aircraft; give one that flies"
         raise InputError(file, f"pilot.{control}", problem)
+
+
+def turned(found_rad: float, now_rad: float) -> float:
+    """Return by how much an angle differs from another, within half a turn, rad."""
+    away = now_rad - found_rad
+    return away - 2.0 * math.pi * round(away / (2.0 * math.pi))

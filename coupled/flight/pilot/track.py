@@ -1,22 +1,23 @@
-"""A pilot who tracks pitch, flight path or airspeed with the column, by the crossover model.
+"""A pilot who tracks attitude, path, airspeed, heading or sideslip, by the crossover model.
 
 The pilot has practised on the aircraft with the feel that is specified: gain and lead are
 those which, on a rigid rig without friction and breakout, make the loop cross over at the
 frequency and with the phase margin that are set. On another rig the same pilot flies with
 what practice gave. Path and airspeed are flown through the attitude, as pilots do: an
-outer loop asks for pitch.
+outer loop asks for pitch; so is heading with the wheel, through roll.
 
 The muscles' command works against feel and arm together, so a stiffer feel gives a smaller
 deflection:
 
-    δ·(m·s² + (c + c_h)·s + G_T + k_h) = u/(T_n·s + 1)
+    δ·((m + m_h)·s² + (c + c_h)·s + G_T + k_h) = u/(T_n·s + 1)
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from coupled.flight.pilot.base import (
     Start,
     edges,
     needs_aircraft,
+    turned,
 )
 from coupled.flight.pilot.crossover import (
     Acting,
@@ -40,23 +42,44 @@ from coupled.flight.pilot.crossover import (
     delay_response,
 )
 from coupled.flight.pilot.remnant import Remnant
-from coupled.flight.response import Response, elevator_response, path_angle
-from coupled.record.channels import ALTITUDE, PITCH, SPEED, ControlName
+from coupled.flight.response import Response, control_response, path_angle
+from coupled.record.channels import (
+    ALTITUDE,
+    HEADING,
+    PITCH,
+    ROLL,
+    SIDESLIP,
+    SPEED,
+    ControlName,
+    unit_of,
+)
 from coupled.rig.equations import specified_gradient
 from coupled.rig.packing import COMMAND_SIGN, Hand
 from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
-What = Literal["pitch", "flight_path", "airspeed"]
+What = Literal["pitch", "flight_path", "airspeed", "roll", "heading", "sideslip"]
+# What each control may follow, first what it follows where nothing is said.
+FOLLOWED: Mapping[ControlName, tuple[What, ...]] = {
+    "column": ("pitch", "flight_path", "airspeed"),
+    "wheel": ("roll", "heading"),
+    "pedals": ("heading", "sideslip"),
+}
+# The attitude through which a control flies the others; pedals have none.
+_THROUGH: Mapping[ControlName, What] = {"column": "pitch", "wheel": "roll"}
+# Where a positive force makes less of what is followed: a higher nose costs airspeed, and
+# right pedal turns the nose away from a wind that then comes from the left.
+_LESSENED: tuple[What, ...] = ("airspeed", "sideslip")
 
 
 class Track(Pilot):
     """Tracks a target: a change of what the aircraft flew at `start_s`, and a sum of sines.
 
-    `what` is `pitch`, `flight_path` or `airspeed`; the open loop crosses over at
-    `crossover_rad_per_s` with `phase_margin_rad` (0.7). The target is `change_rad` and
-    `sine_rad`, of airspeed `change_m_per_s` and `sine_m_per_s`. On the column of a rig that
-    flies. Raises InputError as a run file does, and for a loop that no pilot can give.
+    `what` is, on the column, `pitch` (where nothing is said), `flight_path` or `airspeed`; on
+    the wheel `roll` or `heading`; on the pedals `heading` or `sideslip`. The open loop crosses
+    over at `crossover_rad_per_s` with `phase_margin_rad` (0.7). The target is `change_rad` and
+    `sine_rad`, of airspeed `change_m_per_s` and `sine_m_per_s`. On a rig that flies.
+    Raises InputError as a run file does, and for a loop that no pilot can give.
 
     >>> import coupled
     >>> coupled.Track(crossover_rad_per_s=1.5, change_rad=0.05).what
@@ -70,6 +93,8 @@ class Track(Pilot):
     integral_rad_per_s: float = quantity("", 0.0, ge=0, le=10)
     pitch_crossover_rad_per_s: float = quantity("", 1.5, gt=0.01, le=10)
     pitch_phase_margin_rad: float = quantity("", 0.7, gt=0, le=1.5)
+    roll_crossover_rad_per_s: float = quantity("", 1.5, gt=0.01, le=10)
+    roll_phase_margin_rad: float = quantity("", 0.7, gt=0, le=1.5)
     change_rad: float = quantity("", 0.0, ge=-1.5, le=1.5)
     change_m_per_s: float = quantity("", 0.0, ge=-200, le=200)
     rise_s: float = quantity("", 1.0, ge=0, le=7200)
@@ -80,19 +105,42 @@ class Track(Pilot):
     lag_s: float = quantity("", 0.1, ge=0, le=2)
     arm_stiffness_N_per_m: float = quantity("", 500.0, ge=0, le=1e5)
     arm_damping_N_s_per_m: float = quantity("", 10.0, ge=0, le=1e4)
+    arm_stiffness_N_per_rad: float = quantity("", 90.0, ge=0, le=1e5)
+    arm_damping_N_s_per_rad: float = quantity("", 2.0, ge=0, le=1e4)
+    arm_mass_kg: float = quantity("", 0.0, ge=0, le=20)
     force_limit_N: float = quantity("", 333.6, gt=0, le=STRONGEST)
     lasting_force_N: float = quantity("", 44.5, gt=0, le=STRONGEST)
     endurance_s: float = quantity("", 60.0, gt=0, le=7200)
     remnant: float = quantity("", 0.0, ge=0, le=1)
+    _BY_UNIT: ClassVar[tuple[str, ...]] = (
+        *Pilot._BY_UNIT,
+        "arm_stiffness_N_per",
+        "arm_damping_N_s_per",
+    )
+
+    def follows(self, control: ControlName) -> What:
+        """Return what is followed with a control."""
+        return self.what if "what" in self.model_fields_set else FOLLOWED[control][0]
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse a target in the unit of another, and sines that no frame can follow."""
+        """Refuse what a control does not follow, another's unit, sines too quick for a frame."""
         super().check(rig, control, file)
         needs_aircraft(rig, control, file)
-        wrong = "rad" if self.what == "airspeed" else "m_per_s"
+        what = self.follows(control)
+        if what not in FOLLOWED[control]:
+            problem = f"{what} is not followed with the {control}; give "
+            problem += " or ".join(FOLLOWED[control])
+            raise InputError(file, f"pilot.{control}.what", problem)
+        through = _THROUGH.get(control)
+        for inner in ("pitch", "roll"):
+            for key in (f"{inner}_crossover_rad_per_s", f"{inner}_phase_margin_rad"):
+                if key in self.model_fields_set and (inner != through or inner == what):
+                    problem = f"has no part in following {what} with the {control}; leave it out"
+                    raise InputError(file, f"pilot.{control}.{key}", problem)
+        wrong = "rad" if what == "airspeed" else "m_per_s"
         for key in (f"change_{wrong}", f"sine_{wrong}"):
             if key in self.model_fields_set:
-                problem = f"is no target for {self.what}; give it in its own unit"
+                problem = f"is no target for {what}; give it in its own unit"
                 raise InputError(file, f"pilot.{control}.{key}", problem)
         if any(not 0.0 < rate < rig.frame_rate for rate in self.sine_rates_rad_per_s):
             problem = f"must lie between 0 and {rig.frame_rate:g}, the frame rate"
@@ -101,69 +149,84 @@ class Track(Pilot):
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the arm and its command, practised on the rig as it is specified."""
         hand = Hand(
-            self.arm_stiffness_N_per_m,
-            self.arm_damping_N_s_per_m,
+            *self._arm(control),
             lag_s=self.lag_s,
             strongest=self.force_limit_N,
             lasting=min(self.lasting_force_N, 0.999 * self.force_limit_N),
             endurance_s=self.endurance_s,
+            mass=self.arm_mass_kg,
         )
-        return Action(hand=hand, look=self._look(rig, *self._practised(rig, start), start.seed))
+        practised = self._practised(rig, control, start)
+        return Action(hand=hand, look=self._look(rig, control, *practised, start.seed))
 
-    def _practised(self, rig: Rig, start: Start) -> tuple[Compensation, Compensation | None]:
-        """Return the compensation on pitch, and that of path or airspeed around it, if any."""
+    def _arm(self, control: ControlName) -> tuple[float, float]:
+        """Return the arm's stiffness in N/d and its damping in N·s/d on a control."""
+        if unit_of(control) == "rad":
+            return self.arm_stiffness_N_per_rad, self.arm_damping_N_s_per_rad
+        return self.arm_stiffness_N_per_m, self.arm_damping_N_s_per_m
+
+    def _practised(
+        self, rig: Rig, control: ControlName, start: Start
+    ) -> tuple[Compensation, Compensation | None]:
+        """Return the compensation on the attitude, and that of what is flown through it, if any.
+
+        Where nothing is flown through an attitude, the first is on what is followed itself.
+        """
         frame_s, controls = 1.0 / rig.frame_rate, tuple(rig.controls)
 
-        def element(rate: float) -> Response:
+        def element(what: What, rate: float) -> complex:
             """Return what the aircraft does per newton of the pilot's command."""
             assert rig.flight is not None
-            answer = elevator_response(rig.flight, frame_s, controls, start.rig_file, rate)
-            limbs = self._limbs(rig, answer.pressure_Pa, rate)
+            file = start.rig_file
+            answer = control_response(rig.flight, frame_s, controls, control, file, rate)
+            limbs = self._limbs(rig, control, answer.pressure_Pa, rate)
             limbs *= delay_response(self.delay_s, frame_s, rate)
-            pitch, path, speed, load = (limbs * motion for motion in answer[:4])
-            return Response(pitch, path, speed, load, answer.pressure_Pa)
+            sign = -1.0 if what in _LESSENED else 1.0
+            return sign * limbs * _motion(answer, what)
 
-        crossover = self.crossover_rad_per_s
-        asked = ("crossover", crossover, self.phase_margin_rad, self.integral_rad_per_s)
-        if self.what == "pitch":
-            return self._adapted(element(crossover).pitch, asked, frame_s, start.file), None
-        inner_rate = self.pitch_crossover_rad_per_s
-        of_pitch = ("pitch_crossover", inner_rate, self.pitch_phase_margin_rad, 0.0)
-        inner = self._adapted(element(inner_rate).pitch, of_pitch, frame_s, start.file)
-        answer, by_pilot = element(crossover), compensation_response(inner, frame_s, crossover)
-        # A higher nose makes the path steeper, and the airspeed less.
-        motion = answer.flight_path if self.what == "flight_path" else -answer.airspeed
-        closed = by_pilot * motion / (1.0 + by_pilot * answer.pitch)
-        outer = self._adapted(closed, asked, frame_s, start.file)
-        return inner, replace(outer, gain=-outer.gain) if self.what == "airspeed" else outer
+        def adapted(
+            key: str, motion: complex, rate: float, margin: float, integral: float
+        ) -> Compensation:
+            found = adapt(motion, rate, margin, integral, frame_s)
+            if isinstance(found, Compensation):
+                return found
+            word = "lead" if found > 0.0 else "lag"
+            problem = f"takes {math.degrees(abs(found)):.0f}° of {word} with this phase margin"
+            place = f"pilot.{control}.{key}crossover_rad_per_s"
+            raise InputError(start.file, place, f"{problem}, of which a pilot gives at most 80°")
 
-    def _limbs(self, rig: Rig, pressure_Pa: float, rate: float) -> complex:
-        """Return the elevator command per newton of the pilot's, on the rig as specified."""
-        control, s, frame_s = rig.controls["column"], 1j * rate, 1.0 / rig.frame_rate
+        what, crossover = self.follows(control), self.crossover_rad_per_s
+        own = (crossover, self.phase_margin_rad, self.integral_rad_per_s)
+        sign = -1.0 if what in _LESSENED else 1.0
+        through = _THROUGH.get(control, what)
+        if what == through:
+            found = adapted("", element(what, crossover), *own)
+            return replace(found, gain=sign * found.gain), None
+        inner_rate, inner_margin = self.pitch_crossover_rad_per_s, self.pitch_phase_margin_rad
+        if through == "roll":
+            inner_rate, inner_margin = self.roll_crossover_rad_per_s, self.roll_phase_margin_rad
+        inner = adapted(f"{through}_", element(through, inner_rate), inner_rate, inner_margin, 0.0)
+        by_pilot = compensation_response(inner, frame_s, crossover)
+        closed = by_pilot * element(what, crossover)
+        closed /= 1.0 + by_pilot * element(through, crossover)
+        outer = adapted("", closed, *own)
+        return inner, replace(outer, gain=sign * outer.gain)
+
+    def _limbs(self, rig: Rig, name: ControlName, pressure_Pa: float, rate: float) -> complex:
+        """Return the surface command per newton of the pilot's, on the rig as specified."""
+        control, s, frame_s = rig.controls[name], 1j * rate, 1.0 / rig.frame_rate
         loader, rigging = control.loader, control.rigging
         servo = 2.0 * math.pi * loader.servo_frequency
         follows = servo**2 / (s**2 + 2.0 * loader.servo_damping_ratio * servo * s + servo**2)
         gradient = specified_gradient(control.schedule, pressure_Pa)
         feel = loader.mass * s**2 + loader.damping * s + gradient
-        arm = (self.arm_stiffness_N_per_m + self.arm_damping_N_s_per_m * s) * follows
+        stiffness, damping = self._arm(name)
+        arm = (stiffness + damping * s + self.arm_mass_kg * s**2) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame
         # The host takes δc, ahead of the servo, which only the arm feels.
         drive: complex = COMMAND_SIGN[control.surface] / control.travel
         drive /= (1.0 + rigging.stretch_loss * pressure_Pa) * (1.0 + rigging.lag * s)
         return complex(drive * late / ((1.0 + self.lag_s * s) * (feel + arm)))
-
-    def _adapted(
-        self, element: complex, asked: tuple[str, float, float, float], frame_s: float, file: object
-    ) -> Compensation:
-        key, crossover, margin, integral = asked
-        found = adapt(element, crossover, margin, integral, frame_s)
-        if isinstance(found, Compensation):
-            return found
-        word = "lead" if found > 0.0 else "lag"
-        problem = f"takes {math.degrees(abs(found)):.0f}° of {word} with this phase margin"
-        raise InputError(
-            file, f"pilot.column.{key}_rad_per_s", f"{problem}, of which a pilot gives at most 80°"
-        )
 
     def target(self, times: Floats) -> Floats:
         """Return what is tracked over time, about what was flown at the start; rad or m/s."""
@@ -173,16 +236,22 @@ class Track(Pilot):
             phase = 2.4 * i * i  # so that the peaks do not meet; each begins at zero
             sines += np.sin(rate * after + phase) - np.sin(phase) * np.exp(-after)
         step = edges(times, [(self.start_s, 1.0)], self.rise_s)
-        if self.what == "airspeed":
+        if self.what == "airspeed":  # which only a column follows
             return np.asarray(self.change_m_per_s * step + self.sine_m_per_s * sines)
         return np.asarray(self.change_rad * step + self.sine_rad * sines)
 
     def _look(
-        self, rig: Rig, on_pitch: Compensation, around: Compensation | None, seed: int
+        self,
+        rig: Rig,
+        control: ControlName,
+        on_attitude: Compensation,
+        around: Compensation | None,
+        seed: int,
     ) -> Look:
         """Return the pilot's eyes and hands, with a memory of their own."""
-        frame_s = 1.0 / rig.frame_rate
-        inner, late = Acting(on_pitch, frame_s), Delay(self.delay_s, frame_s)
+        frame_s, what = 1.0 / rig.frame_rate, self.follows(control)
+        through = _THROUGH.get(control, what)
+        inner, late = Acting(on_attitude, frame_s), Delay(self.delay_s, frame_s)
         outer = Acting(around, frame_s) if around is not None else None
         remnant = Remnant(self.remnant, self.lag_s, frame_s, seed)
         found: tuple[float, float] | None = None
@@ -194,11 +263,33 @@ class Track(Pilot):
             before = motion[ALTITUDE]
             if time < self.start_s:
                 return 0.0
-            seen = {"pitch": motion[PITCH], "flight_path": path, "airspeed": motion[SPEED]}
-            found = (motion[PITCH], seen[self.what]) if found is None else found
-            pitch, flown = motion[PITCH] - found[0], seen[self.what] - found[1]
+            now = (_seen(motion, path, through), _seen(motion, path, what))
+            found = now if found is None else found
+            attitude = _away(found[0], now[0], through)
             asked = float(self.target(np.array([time]))[0])
-            error = (asked if outer is None else outer(asked - flown)) - pitch
+            if outer is not None:
+                asked = outer(asked - _away(found[1], now[1], what))
+            error = asked - attitude
             return inner(late(error + remnant(error)))
 
         return look
+
+
+def _seen(motion: tuple[float, ...], path_rad: float, what: What) -> float:
+    """Return what a pilot looks at, rad or m/s."""
+    if what == "flight_path":
+        return path_rad
+    places = {"pitch": PITCH, "airspeed": SPEED, "roll": ROLL}
+    return motion[(places | {"heading": HEADING, "sideslip": SIDESLIP})[what]]
+
+
+def _away(found: float, now: float, what: What) -> float:
+    """Return how far what is followed is from where it was found; a heading by the nearer way."""
+    return turned(found, now) if what in ("roll", "heading") else now - found
+
+
+def _motion(answer: Response, what: What) -> complex:
+    """Return what an aircraft makes of a command, of what is followed."""
+    motions = {"pitch": answer.pitch, "flight_path": answer.flight_path}
+    motions |= {"airspeed": answer.airspeed, "roll": answer.roll}
+    return (motions | {"heading": answer.heading, "sideslip": answer.sideslip})[what]
