@@ -20,7 +20,9 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import math
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -183,9 +185,11 @@ def properties(values: Floats) -> str:
 
 
 def inputs() -> str:
-    """Return a hash of all that the tables rest on: the aircraft's files, and the two scripts."""
-    files = sorted([*HERE.glob("*.xml"), *HERE.glob("*/*.xml"), HERE / "awjsra.toml"])
-    made = hashlib.sha256()
+    """Return a hash of all that the tables rest on: aircraft, its trim, and the two scripts."""
+    with RIG.open("rb") as file:
+        trim = json.dumps(tomllib.load(file)["flight"], sort_keys=True)
+    made = hashlib.sha256(trim.encode())
+    files = sorted([*HERE.glob("*.xml"), *HERE.glob("*/*.xml")])
     for path in [*files, HERE / "fit.py", HERE / "validate.py"]:
         made.update(path.read_bytes())
     return made.hexdigest()[:16]
