@@ -2,8 +2,8 @@
 
     python aircraft/awjsra/elsewhere.py
 
-Trims at 40,000 lb, and the modes that JSBSim's linearisation has there. No figure was published
-for any of them.
+Trims at 40,000 lb, the column force per g of a pull at constant speed on the rig's schedule, and
+the modes that JSBSim's linearisation has there. No figure was published for any of them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import jsbsim
 import numpy as np
-from validate import RIG, trimmed
+from validate import RIG, column_gradient, force_at_constant_speed, trimmed
 
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
@@ -99,18 +99,25 @@ def images() -> tuple[float, float]:
 
 def table() -> str:
     """Return the trims as a Markdown table, and what is to be said beside it."""
-    lines = ["| kt, path | flaps, nozzles | α | elevator | hot thrust | pitch | roll and yaw |"]
-    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
+    lines = [
+        "| kt, path | flaps, nozzles | α | elevator | hot thrust | lb/g | pitch | roll and yaw |"
+    ]
+    lines.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for knots, path, flaps, nozzles in TRIMS:
-        fdm = trimmed(rig_at(knots, path, flaps, nozzles))
+        rig = rig_at(knots, path, flaps, nozzles)
+        fdm = trimmed(rig)
         set_at = f"{knots:.0f}, {path:g}° | {flaps:g}°, {nozzles:g}°"
         elevator = math.degrees(fdm["fcs/elevator-pos-rad"])
         trim = (
             f"{fdm['aero/alpha-deg']:.1f}° | {elevator:.1f}° | {fdm['aero/hot-thrust-lbs']:.0f} lb"
         )
+        pounds, speed = column_gradient(rig, fdm), fdm["velocities/vt-fps"]
         model = jsbsim.FGLinearization(fdm)
+        force = force_at_constant_speed(model, pounds, speed)
         pitch, sides = modes(model, ("Vt", "Alpha", "Theta", "Q")), modes(model, SIDES)
-        lines.append(f"| {set_at} | {trim} | {', '.join(pitch)} | {', '.join(sides)} |")
+        lines.append(
+            f"| {set_at} | {trim} | {force:.0f} | {', '.join(pitch)} | {', '.join(sides)} |"
+        )
     powered, at_powered = greatest_lift(65.0, 0.75)
     idle, at_idle = greatest_lift(65.0, 0.0)
     clean, at_clean = greatest_lift(0.0, 0.0)
