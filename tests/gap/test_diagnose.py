@@ -25,6 +25,7 @@ from tests.support.records import OWN, available, reference
 
 SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "coulomb_friction", {"friction_N": 2.0}),
+    (False, "presliding_friction", {"friction_N": 4.0, "stiffness_N_per_{d}": 2e4}),
     (False, "viscous_damping", {"factor": 1.5}),
     (False, "inertia", {"factor": 1.4}),
     (False, "gradient_error", {"factor": 1.08}),
