@@ -38,7 +38,8 @@ def _limit(name: str, key: str, low: float, high: float, *starts: float) -> Para
 
 
 def _bend(start: float) -> Parameter:
-    return replace(_value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start), scanned=False)
+    bend = _value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start)
+    return replace(bend, scanned=False, host="K̂")
 
 
 def _switch(key: str, on: Any) -> Parameter:
@@ -99,7 +100,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "loader",
         "gradient_error",
-        _factor("loader.basic_gradient_N_per_{d}", 1.05),
+        replace(_factor("loader.basic_gradient_N_per_{d}", 1.05), host="the host's G_B"),
         *("computed", "missing"),
     ),
     _one(
@@ -111,7 +112,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "loader",
         "breakout",
-        _added("breakout_N", "loader.breakout_N", 0, 60, 2.0),
+        replace(_added("breakout_N", "loader.breakout_N", 0, 60, 2.0), host="the host's F_BO"),
         *("computed", "missing"),
     ),
     _one(

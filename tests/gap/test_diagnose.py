@@ -204,7 +204,7 @@ def test_diagnose_on_the_command_line(tmp_path: Path) -> None:
     write_record(record.between(0.0, 15.0), tmp_path / "r.csv")
     done = coupled(tmp_path, "diagnose", "r.csv", "--rig", "report-column", "--json", "d.json")
     assert done.returncode == 0, done.stderr
-    assert "The gap lies in the linkage: backlash" in " ".join(done.stdout.split())
+    assert "of the linkage's gap; what remains is noise" in " ".join(done.stdout.split())
     found = json.loads((tmp_path / "d.json").read_text())
     assert found["effects"][0]["parameters"]["play_m"]["value"] == pytest.approx(1e-3, rel=0.05)
     better = coupled(
