@@ -30,10 +30,11 @@ def diagnose(
     one. `records` is one record or several of that rig, as `Record`, as files, or by name;
     each needs `time_s` and what its stages need (force and deflections of the control, q̄).
 
-    `found.verdict` is `no_gap`, `effect`, `ambiguous` or `unexplained`; `found.effects` are the
-    effects, each with its parameters, their values and 95 % intervals; `found.improved` is the
-    rig with them; `found.as_dict()` the JSON of the command line. Raises InputError where
-    records and rig cannot be held against each other.
+    `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
+    `found.effects` are the effects, each with its parameters, their values and 95 % intervals;
+    `found.budget` shares each guilty stage's residual out to them, to what no effect explains,
+    and to noise; `found.improved` is the rig with them; `found.as_dict()` the JSON of the command
+    line. Raises InputError where records and rig cannot be held against each other.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37")

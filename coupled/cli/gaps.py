@@ -117,9 +117,15 @@ def _diagnose(
 
 
 def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path]) -> None:
-    from coupled.cli.tables.gaps import print_closed_loop, print_power, print_stages
+    from coupled.cli.tables.gaps import (
+        print_closed_loop,
+        print_effects,
+        print_power,
+        print_stages,
+    )
 
     out.print(whole.summary, markup=False, highlight=False)
+    print_effects(out, whole.effects, whole.budget)
     print_stages(out, whole.stages)
     if whole.closed_loop is not None:
         print_closed_loop(out, whole.closed_loop)

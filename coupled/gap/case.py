@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from coupled.gap.effect import Effect
+from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, fit
 from coupled.gap.library import SETTINGS
 from coupled.gap.output import Output, Part, stage_gaps
@@ -52,6 +52,12 @@ class Case:
         """Return the settings whose number none of these effects frees."""
         freed = {SETTINGS[effect.name].name for effect in effects if effect.name in SETTINGS}
         return [setting for setting in self.settings if setting.name not in freed]
+
+    def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
+        """Return the rig with some of the effects that a fit found, and its settings."""
+        every = (*effects, *self.nuisances(found.effects))
+        rig = possible(self.nominal, self.control, every, {**self.neutral, **found.values})
+        return self.nominal if rig is None else rig
 
     def fit(
         self,

@@ -1,40 +1,35 @@
 """A diagnosis: where the gap lies, which effects cause it, how far it shrinks.
 
-The verdict is `no_gap` where every stage stays within its floor, `effect` where the effects
-found close the gap, `ambiguous` where the record does not distinguish them from others, and
-`unexplained` where structure is left, or none of the library's effects earns its place.
+The verdict is `no_gap` where every stage stays within its floor, `effect` where what the effects
+found leave is noise, `mostly` where they are certain and hold most of the gap, `ambiguous` where
+the record does not distinguish them from others, and `unexplained` where nothing that is credible
+holds half of it.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs, needs, trim_speed
+from coupled.gap.answer import effects_of, settings_of, verdict_of
+from coupled.gap.budget import stage_budget
 from coupled.gap.case import Case, Tell
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.choose import Choice, Found, search
+from coupled.gap.choose import Choice, search
 from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.effect import Effect, Parameter, field_of
-from coupled.gap.library import EFFECTS, SETTINGS
+from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.result import (
-    EffectResult,
-    ParameterEstimate,
-    SettingResult,
     StageResult,
-    Verdict,
 )
-from coupled.gap.shrink import shrink
+from coupled.gap.shrink import floors_of, shrink
 from coupled.gap.stages import Reader, compensation_gap
 from coupled.gap.surfaces import surface_points
-from coupled.gap.thresholds import DOUBT, GUILTY_FROM, SURE
+from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import remains, where
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -74,16 +69,26 @@ def diagnose(
     choice = search(rig, control, outputs, library, tell, refloored)
     case = Case(rig, control, outputs, tell, refloored)
     stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
+    fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values)
+    floors = floors_of(case, choice)
+    budgets = [
+        stage_budget(stage.name, case, choice.settled, fitted, floors)
+        for stage in stages
+        if stage.guilty
+    ]
+    budget = tuple(one for one in budgets if one is not None)
+    effects = effects_of(case, choice, readers, stages, budget)
     return Diagnosis(
         control=control,
-        verdict=_verdict(choice, stages),
+        verdict=verdict_of(choice, stages, effects, budget),
         stages=stages,
-        effects=_effects(choice, control, readers, stages),
+        effects=effects,
+        budget=budget,
         rivals=tuple(
             (s.effect.name, *(r.effect.name for r in s.rivals)) for s in choice.steps if s.rivals
         ),
-        settings=_settings(choice, rig, control),
-        shrink=shrink(case, choice),
+        settings=settings_of(choice, rig, control),
+        shrink=shrink(case, fitted, floors),
         nominal=rig,
         improved=choice.fit.rig,
         records=dict(records),
@@ -210,60 +215,3 @@ class _Judge:
         most = max(ours, key=lambda o: o.gap(improved))
         record = self.readers[most.record].record
         return replace(found, remains=remains(most, improved, record, reader.control))
-
-
-def _verdict(choice: Choice, stages: Sequence[StageResult]) -> Verdict:
-    blamed = {step.effect.stage for step in choice.steps}
-    if any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages):
-        return "unexplained"
-    if not choice.steps:
-        return "no_gap"
-    return "ambiguous" if any(step.rivals for step in choice.steps) else "effect"
-
-
-def _settings(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
-    found = []
-    for setting in SETTINGS.values():
-        for p in setting.free:
-            factor = choice.fit.values.get(setting.value_key(p))
-            if factor is not None:
-                name = field_of(rig, control, p.key)
-                found.append(SettingResult(name, setting.stage, factor))
-    return tuple(found)
-
-
-def _effects(
-    choice: Choice, control: ControlName, readers: Sequence[Reader], stages: Sequence[StageResult]
-) -> tuple[EffectResult, ...]:
-    """Return the effects found, the largest first."""
-    left = {stage.name for stage in stages if stage.unexplained}
-
-    def result(step: Found) -> EffectResult:
-        effect = step.effect
-        sure = DOUBT if effect.stage in left else SURE
-        scatter = _sample_error(effect, readers)
-        numbers = tuple(_estimate(choice, effect, p, control, scatter) for p in effect.free)
-        return EffectResult(effect.name, effect.stage, step.probability * sure, numbers)
-
-    return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
-
-
-def _estimate(
-    choice: Choice, effect: Effect, p: Parameter, control: ControlName, scatter: float
-) -> ParameterEstimate:
-    key, fit = effect.value_key(p), choice.fit
-    value, low, high = fit.values[key], fit.low[key], fit.high[key]
-    if scatter > 0.0:  # the records meet a sample of it
-        low = value - math.hypot(value - low, 1.96 * scatter * value)
-        high = value + math.hypot(high - value, 1.96 * scatter * value)
-    ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
-    return ParameterEstimate(p.named(control), value, *ends)
-
-
-def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
-    """Return the relative standard error of an effect's number from what the records meet of it."""
-    one: Callable[[Record, float], float] | None = effect.sample_error
-    if one is None:
-        return 0.0
-    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
-    return float(np.sqrt(np.sum(np.square(each)))) / len(each)

@@ -76,6 +76,8 @@ class Diagnosis(Findings):
             "stages": {stage.name: stage.as_dict() for stage in self.stages},
             "effects": [effect.as_dict() for effect in self.effects],
             "rivals": [list(group) for group in self.rivals],
+            "budget": {one.stage: one.as_dict() for one in self.budget},
+            "budget_95": {one.stage: one.intervals() for one in self.budget},
             "shrink": self.shrink.as_dict(),
             "settings": {setting.name: setting.factor for setting in self.settings},
         }

@@ -32,7 +32,8 @@ class Parameter:
     the starts count.
 
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
-    the least size that shows is sought; of an `inverse` one, less does more.
+    the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. `host`
+    is what the host calls its own number for it, which is then to be set.
     """
 
     name: str
@@ -46,10 +47,23 @@ class Parameter:
     scanned: bool = True
     shape: bool = False
     inverse: bool = False
+    host: str = ""
 
     def named(self, control: str) -> str:
         """Return its name with its unit on this control."""
         return self.name.format(d=unit_of(control))
+
+    def key_on(self, control: str) -> str:
+        """Return its key in a rig file, from the control or the flight on."""
+        return self.key.format(d=unit_of(control))
+
+    def unit(self, rig: Rig, control: ControlName) -> str:
+        """Return the unit of the rig's number as it is written: N·s/m."""
+        last = self.key_on(control).rpartition(".")[2]
+        unit = last.removeprefix(field_of(rig, control, self.key)).lstrip("_")
+        over, _, under = unit.partition("per_")
+        text = (over.strip("_") or "1") + "/" + under.strip("_") if under else unit
+        return text.replace("_", "·").removesuffix("3") + ("³" if text.endswith("3") else "")
 
     def nominal(self, rig: Rig, control: ControlName) -> Any:
         """Return what the rig has."""

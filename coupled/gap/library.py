@@ -7,14 +7,13 @@ traits by which it is scanned, judged, distinguished from its like and drawn.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from coupled.gap.air import NEEDS as AIR
 from coupled.gap.air import spread_of_air
-from coupled.gap.effect import Drawing, Effect, Likeness, Parameter, Signature
-from coupled.gap.thresholds import FAINT_STRIBECK_d_per_s
+from coupled.gap.effect import Drawing, Effect, Parameter, Signature
+from coupled.gap.frictions import FRICTIONS
 
 WHOLE_s = 1e4  # a zoom that shows the whole record
 # A pot is set, and a servo tuned, to a per cent or two: no effect, but a setting that every fit
@@ -39,7 +38,8 @@ def _limit(name: str, key: str, low: float, high: float, *starts: float) -> Para
 
 
 def _bend(start: float) -> Parameter:
-    return replace(_value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start), scanned=False)
+    bend = _value("bend_{d}_per_N", "loader.bend_{d}_per_N", 0, 1e-2, start)
+    return replace(bend, scanned=False, host="K̂")
 
 
 def _switch(key: str, on: Any) -> Parameter:
@@ -57,16 +57,6 @@ def _one(
 ) -> Effect:
     """Return an effect of one parameter; y against x is how it is drawn."""
     return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s))
-
-
-def _breaks_away(values: Mapping[str, float], nominal_N: float) -> dict[str, float]:
-    """Return a breakaway of twice the running friction, which hardly shows in a faint gap."""
-    running = values["friction_N"]
-    return {
-        "friction_N": running,
-        "breakaway_N": 2.0 * running + nominal_N,
-        "stribeck_{d}_per_s": FAINT_STRIBECK_d_per_s,
-    }
 
 
 EFFECTS: tuple[Effect, ...] = (
@@ -88,30 +78,7 @@ EFFECTS: tuple[Effect, ...] = (
         _factor("schedule.slope", 1.05),
         *("pressure", "gradient", "law", WHOLE_s),
     ),
-    _one(
-        "loader",
-        "coulomb_friction",
-        _added("friction_N", "loader.friction_N", 0, 60, 1.5),
-        *("speed", "missing"),
-    ),
-    Effect(
-        "stribeck_friction",
-        "loader",
-        (
-            _added("friction_N", "loader.friction_N", 0, 60, 1.0, 0.3, 0.1),
-            replace(
-                _value("breakaway_N", "loader.breakaway_N", 0, 200, 2.0, 3.0, 3.0),
-                above="loader.friction_N",
-            ),
-            replace(
-                _value("stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", 2e-4, 0.05, 2e-3),
-                scanned=False,
-                shape=True,
-            ),
-        ),
-        Signature("speed", "missing"),
-        alike=Likeness("coulomb_friction", "loader.friction_N", _breaks_away),
-    ),
+    *FRICTIONS,
     replace(
         _one(
             "loader",
@@ -133,7 +100,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "loader",
         "gradient_error",
-        _factor("loader.basic_gradient_N_per_{d}", 1.05),
+        replace(_factor("loader.basic_gradient_N_per_{d}", 1.05), host="the host's G_B"),
         *("computed", "missing"),
     ),
     _one(
@@ -145,7 +112,7 @@ EFFECTS: tuple[Effect, ...] = (
     _one(
         "loader",
         "breakout",
-        _added("breakout_N", "loader.breakout_N", 0, 60, 2.0),
+        replace(_added("breakout_N", "loader.breakout_N", 0, 60, 2.0), host="the host's F_BO"),
         *("computed", "missing"),
     ),
     _one(

@@ -8,14 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from coupled.gap.budget import StageBudget
+from coupled.gap.credibility import Credibility
 from coupled.gap.output import explained_below
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import Remains, Where
 
 # Of the JSON that is written. Where it is read back, one without a format is read, as one written
 # before formats had numbers, and a newer one is refused by name (`files.check_format`).
-FORMAT = 1
-Verdict = Literal["no_gap", "effect", "ambiguous", "unexplained"]
+FORMAT = 2
+Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -81,16 +83,35 @@ class StageResult:
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A parameter with its 95 % interval; an end is None where nothing determines it."""
+    """A parameter with its 95 % interval; an end is None where nothing determines it.
+
+    `key` is the rig file's, in `unit`; it is `filed` there, and `found` is what it should be. The
+    parameter's own value is that number, a factor on it, or what is added to it. `filed` is None
+    where the rig has none of it; `found_low` and `found_high` are the interval's ends; `host` is
+    what the host calls the number that it assumes for it, where it has one.
+    """
 
     name: str
     value: float
     low: float | None
     high: float | None
+    key: str = ""
+    unit: str = ""
+    filed: float | None = None
+    found: float = 0.0
+    found_low: float | None = None
+    found_high: float | None = None
+    host: str = ""
+
+    @property
+    def relative(self) -> bool:
+        """Whether its change is given as a share of what is filed."""
+        return self.name == "factor"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        return {"value": self.value, "low": self.low, "high": self.high}
+        own = {"value": self.value, "low": self.low, "high": self.high}
+        return own | {"key": self.key, "filed": self.filed, "found": self.found}
 
 
 @dataclass(frozen=True)
@@ -101,6 +122,7 @@ class EffectResult:
     stage: str
     probability: float
     parameters: tuple[ParameterEstimate, ...]
+    credibility: Credibility | None = None
 
     @property
     def value(self) -> float | None:
@@ -109,12 +131,14 @@ class EffectResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        return {
+        found = {
             "name": self.name,
             "stage": self.stage,
             "probability": self.probability,
             "parameters": {p.name: p.as_dict() for p in self.parameters},
         }
+        known = self.credibility
+        return found | ({} if known is None else {"credibility": known.as_dict()})
 
 
 @dataclass(frozen=True)
@@ -140,6 +164,7 @@ class Findings:
     effects: tuple[EffectResult, ...]
     rivals: tuple[tuple[str, ...], ...]
     settings: tuple[SettingResult, ...]
+    budget: tuple[StageBudget, ...]
 
     def stage(self, name: str) -> StageResult:
         """Return a stage by its name; KeyError where the records have none of it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice
-from coupled.gap.fit import touched
+from coupled.gap.fit import Fit, touched
 from coupled.gap.output import Output
 from coupled.gap.thresholds import BOOTSTRAPS, FEW_STRETCHES
 from coupled.rig.rig import Rig
@@ -67,13 +68,19 @@ class Shrink:
         return self.widest.as_dict() | {"channels": [c.as_dict() for c in self.channels]}
 
 
-def shrink(case: Case, choice: Choice) -> Shrink:
+Floors = Mapping[tuple[int, str], float]
+
+
+def floors_of(case: Case, choice: Choice) -> dict[tuple[int, str], float]:
+    """Return the floors of the improved rig by record and channel: noise's part depends on it."""
+    if not choice.fit.effects or case.refloored is None:
+        return {}
+    return {(o.record, o.channel): o.floor for o in case.refloored(choice.fit.rig)}
+
+
+def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:
     """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
-    rig, outputs, effects = case.nominal, case.outputs, choice.fit.effects
-    found = case.fit(effects, "fitted", choice.fit.values).rig
-    floors = {}
-    if effects and case.refloored is not None:  # what noise leaves depends on the rig
-        floors = {(o.record, o.channel): o.floor for o in case.refloored(choice.fit.rig)}
+    rig, outputs, effects, found = case.nominal, case.outputs, fitted.effects, fitted.rig
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
 

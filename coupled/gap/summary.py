@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from coupled.gap.result import EffectResult, Findings, ParameterEstimate
+from coupled.gap.budget import StageBudget
+from coupled.gap.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.shrink import Shrink
 from coupled.gap.thresholds import FREE_LEAST, ONSET_s
 from coupled.gap.where import Remains
@@ -38,7 +39,7 @@ def plain(name: str) -> str:
 
 def summary(found: Findings, shrink: Shrink, next_test: str) -> str:
     """Return what is wrong, how large, how sure, how much it explains, and what to record next."""
-    said = [_what(found), _settings(found)]
+    said = [_what(found), _set(found), _settings(found)]
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
@@ -55,15 +56,57 @@ def _not_judged(found: Findings) -> str:
 
 
 def _what(found: Findings) -> str:
-    named = "; ".join(_effect(effect) for effect in found.effects)
     if found.verdict == "no_gap":
         within = "every stage that could be judged stays within its noise"
         return f"No gap in the {found.control}: {within}."
-    where = ", ".join(found.guilty)
+    budgets = {one.stage: one for one in found.budget}
     if found.verdict == "unexplained":
+        named = "; ".join(_effect(effect) for effect in found.effects)
         also = f" Found nevertheless: {named}." if named else ""
-        return f"A gap in the {where} that no effect of the library explains.{also}"
-    return f"The gap lies in the {where}: {named}."
+        return (
+            f"A gap in the {', '.join(found.guilty)} that no effect of the library explains.{also}"
+        )
+    return " ".join(
+        _explained(found, found.stage(name), budgets.get(name)) for name in found.guilty
+    )
+
+
+def _explained(found: Findings, stage: StageResult, budget: StageBudget | None) -> str:
+    """Return which effects explain how much of a stage's gap, and what remains of it."""
+    ours = [e for e in found.effects if e.stage == stage.name]
+    beside = [e for e in found.effects if e.stage != stage.name]
+    if budget is None:
+        return f"The gap lies in the {stage.name}."
+    shares = [
+        f"{_effect(effect)}, explains {_per_cent(budget.of(effect.name))}"
+        for effect in (*ours, *(e for e in beside if budget.of(e.name) >= FREE_LEAST / 100))
+    ]
+    said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
+    if not stage.unexplained or stage.remains is None:
+        return f"{said}; what remains is noise."
+    near = stage.remains.reversals
+    where = "" if near is None else f", within {1000 * near.within_s:.0f} ms of each reversal,"
+    rest = f"{_per_cent(budget.remains)} remains{where}"
+    return f"{said}; {rest} and no effect of the library explains it."
+
+
+def _per_cent(share: float) -> str:
+    """Return a share in per cent; with a decimal where it is nearly nothing or nearly all."""
+    nearly = share < 0.01 or 0.99 < share < 0.9995
+    return f"{100 * share:.1f} %" if nearly else f"{100 * share:.0f} %"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _set(found: Findings) -> str:
+    """Return what to set, so that host and rig file have what was found."""
+    if found.verdict not in ("effect", "mostly"):
+        return ""
+    numbers = [p for effect in found.effects for p in effect.parameters]
+    said = [f"Set {p.host or f'{p.key} of the rig file'} to {_found(p)}." for p in numbers]
+    return " ".join(said)
 
 
 def _settings(found: Findings) -> str:
@@ -142,12 +185,28 @@ def _closes(shrink: Shrink) -> str:
 
 
 def _effect(effect: EffectResult) -> str:
-    numbers = ", ".join(_number(parameter) for parameter in effect.parameters)
+    numbers = ", ".join(change(parameter) for parameter in effect.parameters)
     return f"{plain(effect.name)}, {numbers}" if numbers else plain(effect.name)
 
 
-def _number(p: ParameterEstimate) -> str:
-    value = f"{p.name} {in_figures(p.name, p.value)}"
-    if p.low is None or p.high is None:
-        return value
-    return f"{value} ({in_figures(p.name, p.low)} to {in_figures(p.name, p.high)})"
+def _found(p: ParameterEstimate) -> str:
+    return f"{figure(p.found)} {p.unit}".rstrip()
+
+
+def figure(value: float) -> str:
+    """Return a number of the rig in four figures; small ones as 1.95e-4."""
+    if value == 0.0 or abs(value) >= 1e-3:
+        return f"{value:.4g}"
+    digits, _, power = f"{value:.2e}".partition("e")
+    return f"{digits}e{int(power)}"
+
+
+def change(p: ParameterEstimate) -> str:
+    """Return a parameter as filed → found (change), with its unit."""
+    unit = f" {p.unit}" if p.unit else ""
+    if p.filed is None:
+        return f"none → {figure(p.found)}{unit}"
+    more = p.found - p.filed
+    sign = "+" if more >= 0.0 else ""
+    by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
+    return f"{figure(p.filed)} → {figure(p.found)}{unit} ({by})"

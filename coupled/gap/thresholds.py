@@ -74,7 +74,12 @@ MOST_EFFECTS = 4  # chosen: effects in one answer
 
 # Probabilities (`diagnose`).
 SURE = 0.97  # share of what the search was sure of that was right in blind trials
-DOUBT = 0.3  # a decision: structure is left, and an effect found may only imitate it
+DOUBT = 0.3  # a decision: what an effect is still worth that is not credible beside a remainder
+REMAINDER = 0.02  # chosen: share of a gap, from which what is left makes an effect doubtful
+
+# Verdicts (`diagnose`).
+CERTAIN = 0.7  # chosen: probability from which an effect counts as certain beside a remainder
+MOST = 0.5  # of a guilty stage's gap, that certain effects must hold; the contract's
 
 # Where a gap lies (`where`).
 WHERE_WINDOW_s = 0.5  # chosen: windows whose rms gives the onset
@@ -82,6 +87,9 @@ WHERE_LOUD = 2.0  # chosen: floors from which a window shows the gap
 WHERE_SHARE = 0.05  # chosen: least share of the variance that is worth saying
 NO_SIGN = 0.05  # chosen: of a signal's rms, under which its sign is not sure
 WHERE_MOST = 4  # chosen: signals that are named
+NEAR_s = (0.03, 0.1, 0.3)  # chosen: from the reversals of motion, for what remains about them
+NEAR_SHARE = 0.6  # chosen: of its power that then lies so near,
+NEAR_DENSER = 1.5  # chosen: and by which it is denser there
 SPECTRUM_s = 8.0  # chosen: length of a periodogram
 
 # What a model free in form takes (`flexible`).
@@ -108,3 +116,11 @@ PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 # What the summary says (`summary`).
 ONSET_s = 5.0  # chosen: a gap that begins later has a beginning
 FREE_LEAST = 5  # chosen: %, under which a model free in form explains nothing
+
+# Whether an effect is the cause (`credibility`).
+# Set on records that are in no trial: Coulomb friction for one that yields by 0.2 and 0.5 mm takes
+# 0.99 and 0.89 beside a free model, and drifts by 0.01 and 0.03; viscous damping for one by the
+# square of the speed takes 0.65.
+DRIFT = 0.3  # of an effect's size, by which it surely differs from half to half of the records
+FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it
+LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size

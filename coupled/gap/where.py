@@ -19,10 +19,13 @@ from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
+    NEAR_DENSER,
+    NEAR_SHARE,
     NO_SIGN,
     WHERE_LOUD,
     WHERE_MOST,
     WHERE_SHARE,
+    NEAR_s,
     SPECTRUM_s,
     WHERE_WINDOW_s,
 )
@@ -90,6 +93,18 @@ class Where:
 
 
 @dataclass(frozen=True)
+class Reversals:
+    """A residual that sits about the reversals of motion: its share within so long of one, s."""
+
+    within_s: float
+    share: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"within_s": self.within_s, "share": self.share}
+
+
+@dataclass(frozen=True)
 class Remains:
     """What the effects found leave of a stage that they do not explain.
 
@@ -102,10 +117,12 @@ class Remains:
     peak_Hz: float
     free_share: float
     free_in: str
+    reversals: Reversals | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        return {
+        near = {} if self.reversals is None else {"reversals": self.reversals.as_dict()}
+        return near | {
             "gap": self.gap,
             "follows": [item.as_dict() for item in self.follows],
             "peak_Hz": self.peak_Hz,
@@ -132,7 +149,7 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
 
 def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> Remains:
     """Return what the effects found leave of an output."""
-    left, answers = output.residual(improved), _response(output, improved, record, control)
+    left, answers = output.residual(improved), response(output, improved, record, control)
     known = signals(output.stage, record, control, output.frame_rate_Hz)
     share, signal = free_share(output, left, known, answers)
     return Remains(
@@ -141,10 +158,34 @@ def remains(output: Output, improved: Rig, record: Record, control: ControlName)
         peak_Hz=_peak(left, output.frame_rate_Hz),
         free_share=share,
         free_in=signal,
+        reversals=_reversals(left, known, output.frame_rate_Hz),
     )
 
 
-def _response(
+def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Reversals | None:
+    """Return within how long of the reversals most of a residual lies, None where it does not."""
+    side = next((s for name, s in known.items() if name.endswith("rate_sign")), None)
+    if side is None:
+        return None
+    moving = np.flatnonzero(side)
+    turned = np.flatnonzero(np.diff(side[moving]) != 0.0)
+    turns = 0.5 * (moving[turned] + moving[turned + 1])
+    if not turns.size:
+        return None
+    frames = np.arange(len(left))
+    after = np.searchsorted(turns, frames)
+    last, following = turns[np.maximum(after - 1, 0)], turns[np.minimum(after, len(turns) - 1)]
+    away_s = np.minimum(np.abs(frames - last), np.abs(following - frames)) / rate_Hz
+    power = float(left @ left)
+    for within_s in NEAR_s:
+        near = away_s <= within_s
+        share = float(left[near] @ left[near]) / power
+        if share >= NEAR_SHARE and share >= NEAR_DENSER * float(np.mean(near)):
+            return Reversals(within_s, share)
+    return None
+
+
+def response(
     output: Output, rig: Rig, record: Record, control: ControlName
 ) -> tuple[Floats, Floats] | None:
     """Return the digital filter by which a loader answers to a force, at its mean gradient."""

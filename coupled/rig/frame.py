@@ -119,6 +119,20 @@ def set_hand(
 
 
 @stage
+def _sample(p: ControlParameters, s: ControlState, left: int, begins: bool) -> None:
+    """Let the host's channels be sampled with so many substeps of the frame left."""
+    at_gauge = s.gauge.force if p.gauge.present else s.hand.force
+    sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, begins)
+
+
+@stage
+def _exchange(s: ControlState, due: bool) -> None:
+    """Exchange the product of this frame and the last where that is due."""
+    if due:
+        exchange_last(s.modification)
+
+
+@stage
 def run_frame(
     p: ControlParameters,
     s: ControlState,
@@ -142,13 +156,10 @@ def run_frame(
         set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
     last = first_node + p.clock.substeps
     if skewed:
-        at_gauge = s.gauge.force if gauged else s.hand.force
-        sample(p.sensing, s.sensing, s.loader.computed, at_gauge, p.clock.substeps, True)
-    if late > 0:
-        exchange_last(s.modification)
+        _sample(p, s, p.clock.substeps, True)
+    _exchange(s, late > 0)
     for node in range(first_node + 1, last + 1):
-        if late > 0 and node == first_node + 1 + late:
-            exchange_last(s.modification)
+        _exchange(s, late > 0 and node == first_node + 1 + late)
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
         before = s.loader.computed
@@ -174,10 +185,8 @@ def run_frame(
             rate = (held[node] - held[node - 1]) / h
             set_hand(p, s, force[node], held[node], rate)
         if skewed:
-            at_gauge = s.gauge.force if gauged else s.hand.force
-            sample(p.sensing, s.sensing, s.loader.computed, at_gauge, last - node, False)
-    if late >= p.clock.substeps:
-        exchange_last(s.modification)
+            _sample(p, s, last - node, False)
+    _exchange(s, late >= p.clock.substeps)
 
 
 @entry

@@ -1,10 +1,21 @@
-"""Dry friction of the loader: Coulomb, and Stribeck with its breakaway.
+"""Dry friction of the loader: Coulomb, Stribeck with its breakaway, and contacts that yield.
 
 Running friction opposes the motion; from rest the control holds until the net
 force exceeds the breakaway. Between the two, friction falls with speed as
 F_c + (F_s − F_c)·exp(−(v/v_s)²) (Armstrong-Hélouvry, Dupont and Canudas de Wit,
 Automatica 30, 1994, their Stribeck term with exponent 2). It is set-valued at rest:
 a control left inside the band stays exactly where it is.
+
+A contact with a stiffness yields before it slips. Its bristles bend by z: in the direction of
+motion as the way, up to a share of z_c = F/stiffness, and from there towards z_c by
+dz/dx = (z_c − z)/(z_c − share·z_c); turned back, they give back all that they have bent
+(elastoplastic: Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002, their α a straight
+line). Below its share the contact is a spring: nothing creeps, whatever the force does. The force
+is stiffness·z, and a damping that fades with speed, which lets a stuck control come to rest.
+
+z depends on the way alone, and is solved exactly along it; so no event is located. A step takes
+the mean force over its way, an averaged vector field of second order; a turn inside a step costs
+the difference between two ways of length h², which keeps the order.
 """
 
 from __future__ import annotations
@@ -13,7 +24,7 @@ import math
 from typing import Protocol
 
 from coupled.rig.compiled import layout, stage
-from coupled.rig.declaration import Declaration
+from coupled.rig.declaration import Declaration, Given
 
 
 class FrictionParameters(Protocol):
@@ -22,6 +33,20 @@ class FrictionParameters(Protocol):
     running: float  # F_c, N
     breakaway: float  # F_s ≥ F_c, N
     stribeck_rate: float  # v_s, d/s
+    stiffness: float  # of the contact, N/d; 0 for a rigid one
+    contact_damping: float  # N·s/d at rest
+
+
+ELASTIC_SHARE = 0.3  # of the bristles' length, bent before any of it slips
+CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
+NEWTON_STEPS = 20
+SOLVED = 1e-12  # of the speeds at hand
+
+
+def _stiffness(given: Given) -> float:
+    """Return the stiffness of a contact that carries friction, N/d."""
+    loader = given.control.loader
+    return loader.friction_stiffness if max(loader.friction, loader.breakaway) > 0.0 else 0.0
 
 
 FRICTION = Declaration(
@@ -30,6 +55,10 @@ FRICTION = Declaration(
     derived={
         "running": lambda g: g.control.loader.friction,
         "breakaway": lambda g: max(g.control.loader.friction, g.control.loader.breakaway),
+        "stiffness": _stiffness,
+        "contact_damping": lambda g: (
+            CONTACT_DAMPING * math.sqrt(_stiffness(g) * g.control.loader.mass)
+        ),
     },
 )
 
@@ -41,3 +70,88 @@ def running_friction(p: FrictionParameters, rate: float) -> float:
         return p.running
     ratio = rate / p.stribeck_rate
     return p.running + (p.breakaway - p.running) * math.exp(-ratio * ratio)
+
+
+@stage
+def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tuple[float, float]:
+    """Return how far bristles are bent after a way, and on the mean over it, both in d.
+
+    `level` is the friction at which they slip, N.
+    """
+    if way == 0.0:
+        return bent, bent
+    side = 1.0 if way > 0.0 else -1.0
+    most = level / p.stiffness
+    slips, soft = ELASTIC_SHARE * most, (1.0 - ELASTIC_SHARE) * most
+    z, left, area = side * bent, abs(way), 0.0
+    if z < slips:
+        straight = min(left, slips - z)
+        area = straight * (z + 0.5 * straight)
+        z += straight
+        left -= straight
+    if left > 0.0:
+        nearer = -math.expm1(-left / soft) * (most - z)
+        area += most * left - soft * nearer
+        z += nearer
+    return side * z, side * area / abs(way)
+
+
+@stage
+def bent_after(p: FrictionParameters, bent: float, rate: float, way: float) -> float:
+    """Return how far bristles are bent after a way at a rate, d; 0 of a rigid contact."""
+    if p.stiffness == 0.0:
+        return 0.0
+    return yielded(p, running_friction(p, rate), bent, way)[0]
+
+
+@stage
+def yielding_speed(
+    p: FrictionParameters, bent: float, v: float, push: float, inertia: float, span: float
+) -> float:
+    """Return the speed u at the middle of a step of `span` seconds, in d/s, of a yielding contact.
+
+    inertia·(u − v) + force over the way u·span = push, with `v` the speed at its start. The force
+    rises with the way, ever less: from the speed of a contact that does not slip, Newton's steps
+    run up to u from one side.
+    """
+    spring = p.stiffness * (0.5 * span)
+    u = (inertia * v + push - p.stiffness * bent) / (inertia + spring + p.contact_damping)
+    for _ in range(NEWTON_STEPS):
+        level, fading = running_friction(p, u), u / p.stribeck_rate
+        damping = p.contact_damping * math.exp(-fading * fading)
+        way = u * span
+        after, mean = yielded(p, level, bent, way)
+        force = p.stiffness * mean + damping * (after - bent) / span
+        slope = inertia
+        if way != 0.0:
+            slope += max(p.stiffness * (after - mean) / way * span, 0.0)
+        change = (push - force - inertia * (u - v)) / slope
+        u += change
+        if abs(change) <= SOLVED * (abs(u) + abs(v)):
+            break
+    return u
+
+
+@stage
+def rubbing_speed(
+    p: FrictionParameters,
+    bent: float,
+    v: float,
+    push: float,
+    direction: float,
+    inertia: float,
+    span: float,
+) -> float:
+    """Return the speed at the middle of a step of `span` seconds, of any friction, in d/s.
+
+    `push` is the force but for friction, N, `inertia` what it has to move, N·s/d, `direction` the
+    side to which a rigid contact slides.
+    """
+    if p.breakaway == 0.0:
+        return v + push / inertia
+    if p.stiffness > 0.0:
+        return yielding_speed(p, bent, v, push, inertia, span)
+    halfway = v + (push - running_friction(p, v) * direction) / inertia
+    if p.breakaway > p.running:  # Stribeck: once more with the speed just found
+        halfway = v + (push - running_friction(p, halfway) * direction) / inertia
+    return halfway

@@ -9,7 +9,8 @@ smoothed: between two events (the control comes to rest, passes neutral, meets a
 stop) the equation is smooth and is stepped by the implicit midpoint rule, A-stable
 and of second order; an event inside a substep is located, and the rest of the substep
 goes on from there. So the order is kept through stick, slip and impact, and a
-control inside its friction band does not creep.
+control inside its friction band does not creep. A friction whose contact yields is no
+event, but a force that depends on the way (`friction`).
 
 The hardening spring enters by its slope at the midpoint (one Newton step), which
 keeps the order. An F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Ends, Given, first_order_gain
-from coupled.rig.friction import FrictionParameters, running_friction
+from coupled.rig.friction import FrictionParameters, bent_after, rubbing_speed
 from coupled.rig.modification import ModificationState, modifying_force, slope, smooth_force
 from coupled.rig.parameters import DELAY_SLOTS
 
@@ -60,6 +61,7 @@ class LoaderState(Protocol):
     rate: float  # δc', d/s
     mass: float  # m as it now is, kg
     damping: float  # c as it now is, N·s/d
+    bent: float  # by how much a friction's contact has yielded, d
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     delayed: float  # the pilot's force as the loader has it, N
     felt: float  # F_mod as the loader feels it where it is held, N
@@ -188,12 +190,7 @@ def _midpoint(
     middle = s.computed + 0.5 * span * v
     inertia = 2.0 * s.mass / span + s.damping + 0.5 * span * _stiffness(p, m, middle)
     push -= _elastic(p, m, s, middle) + s.damping * v
-    if friction.breakaway == 0.0:
-        return v + push / inertia
-    halfway = v + (push - running_friction(friction, v) * direction) / inertia
-    if friction.breakaway > friction.running:  # Stribeck: once more with the speed just found
-        halfway = v + (push - running_friction(friction, halfway) * direction) / inertia
-    return halfway
+    return rubbing_speed(friction, s.bent, v, push, direction, inertia, span)
 
 
 @stage
@@ -239,14 +236,15 @@ def _move(
     after = _delay(p, s, force)
     s.delayed = after
     breakout = p.breakout + (0.0 if p.held else m.breakout)
-    dry = friction.breakaway > 0.0
+    dry = friction.breakaway > 0.0 and friction.stiffness == 0.0
     done = 0.0
     for _ in range(MAX_EVENTS):
         x, v = s.computed, s.rate
         direction = _sign(v)
         if v == 0.0:
-            hold = friction.breakaway + (breakout if x == 0.0 else 0.0)
+            hold = (friction.breakaway if dry else 0.0) + (breakout if x == 0.0 else 0.0)
             balance = s.external - breakout * _sign(x) - _elastic(p, m, s, x)
+            balance -= friction.stiffness * s.bent
             start = before + (after - before) * done / h + balance
             share, direction = _release(p, s, hold, start, after + balance, ends)
             if direction == 0.0:
@@ -264,6 +262,7 @@ def _move(
         acceleration = 2.0 * (halfway - v) / left
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
+        s.bent = bent_after(friction, s.bent, halfway, s.computed - x)
         if event == NOTHING:
             if abs(s.computed) < TINY and abs(s.rate) < TINY:
                 s.computed = s.rate = 0.0
@@ -278,7 +277,8 @@ def _move(
                 s.stop = 1 if above else -1
         else:  # the preload stops a control too slow to leave neutral within the substep
             s.computed = 0.0
-            surplus = friction.running + breakout - abs(pull - _elastic(p, m, s, 0.0))
+            hold = (friction.running if dry else 0.0) + breakout
+            surplus = hold - abs(pull - friction.stiffness * s.bent - _elastic(p, m, s, 0.0))
             if s.mass * abs(s.rate) <= (h - done) * surplus:
                 s.rate = 0.0
     s.rate = 0.0

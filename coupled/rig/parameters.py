@@ -29,6 +29,7 @@ class Loader(Section):
     friction: float = quantity("N", 0.0, ge=0)
     breakaway: float = quantity("N", 0.0, ge=0)
     stribeck_rate: float = quantity("{d}_per_s", 0.002, gt=0)
+    friction_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     bob_weight: float = quantity("N_per_g", 0.0)
     offset: float = quantity("N", 0.0)
     cubic: float = quantity("N_per_{d}3", 0.0, ge=0)

@@ -25,6 +25,7 @@ from tests.support.records import OWN, available, reference
 
 SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "coulomb_friction", {"friction_N": 2.0}),
+    (False, "presliding_friction", {"friction_N": 4.0, "stiffness_N_per_{d}": 2e4}),
     (False, "viscous_damping", {"factor": 1.5}),
     (False, "inertia", {"factor": 1.4}),
     (False, "gradient_error", {"factor": 1.08}),
@@ -203,7 +204,7 @@ def test_diagnose_on_the_command_line(tmp_path: Path) -> None:
     write_record(record.between(0.0, 15.0), tmp_path / "r.csv")
     done = coupled(tmp_path, "diagnose", "r.csv", "--rig", "report-column", "--json", "d.json")
     assert done.returncode == 0, done.stderr
-    assert "The gap lies in the linkage: backlash" in " ".join(done.stdout.split())
+    assert "of the linkage's gap; what remains is noise" in " ".join(done.stdout.split())
     found = json.loads((tmp_path / "d.json").read_text())
     assert found["effects"][0]["parameters"]["play_m"]["value"] == pytest.approx(1e-3, rel=0.05)
     better = coupled(

@@ -75,6 +75,7 @@ def diagnosis_of(case: Case, effects: list[Effect], rival: Effect | None = None)
         ),
         rivals=(),
         settings=(),
+        budget=(),
         shrink=Shrink(held, (held,)),
         nominal=nominal,
         improved=fitted.rig,

@@ -126,7 +126,7 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     record = made(tmp_path, nominal, {"coulomb_friction": {"friction_N": 2.0}}, 4)
     found = diagnose(nominal, {"a": record}, "column")
     said = found.summary
-    assert "The gap lies in the loader: coulomb friction, friction_N 2.0" in said
+    assert "Coulomb friction, 0 → 2.0" in said
     assert "Probability 0.97." in said
     assert "% of the gap on held-out data" in said
 

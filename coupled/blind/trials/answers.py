@@ -12,7 +12,8 @@ from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
 from coupled.files import check_format, read_json
 
-VERDICTS = ("no_gap", "effect", "ambiguous", "unexplained", "refused", "failed")
+VERDICTS = ("no_gap", "effect", "mostly", "ambiguous", "unexplained", "refused", "failed")
+NAMING = ("effect", "mostly")  # those that name effects as certain
 MISSING = "missing"  # the verdict of a record without a diagnosis
 FORMAT = 2  # the newest of a diagnosis that is read
 
@@ -68,7 +69,7 @@ class Answer:
 
         Where another effect is the same law on this record, naming just these two is exact.
         """
-        if self.verdict == "effect":
+        if self.verdict in NAMING:
             return self.names_right
         alike = frozenset(self.truth.alike)
         return bool(alike) and self.contains and self.possible == self.truth.names | alike
@@ -82,7 +83,7 @@ class Answer:
     @property
     def contains(self) -> bool:
         """Whether it is exact, or names no more than it holds possible, the truth among them."""
-        if self.verdict == "effect":
+        if self.verdict in NAMING:
             return self.names_right
         ambiguous = self.verdict == "ambiguous" and self.truth.names <= self.possible
         return ambiguous and len(self.found) == len(self.truth.names)
@@ -90,7 +91,7 @@ class Answer:
     @property
     def wrong(self) -> bool:
         """Whether it is sure of something that is not so."""
-        return self.verdict == "effect" and not self.exact
+        return self.verdict in NAMING and not self.exact
 
     @property
     def stage_right(self) -> bool:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from scipy.stats import beta
 
-from coupled.blind.trials.answers import MISSING, Answer
+from coupled.blind.trials.answers import MISSING, NAMING, Answer
 from coupled.blind.trials.result import (
     ByEffect,
     ClearSingles,
@@ -74,7 +74,7 @@ def score(answers: Sequence[Answer]) -> Score:
         outsiders=Outsiders(
             unexplained=_of(outsiders, lambda a: a.verdict == "unexplained"),
             stage=_of(outsiders, lambda a: a.stage_right),
-            false_attributions=_of(outsiders, lambda a: a.verdict == "effect"),
+            false_attributions=_of(outsiders, lambda a: a.verdict in NAMING),
         ),
         pairs=Pairs(
             whole=_of(pairs, lambda a: a.exact),
@@ -91,7 +91,7 @@ def score(answers: Sequence[Answer]) -> Score:
 
 
 def _alarm(answer: Answer) -> bool:
-    if answer.verdict == "effect" and answer.found:
+    if answer.verdict in NAMING and answer.found:
         return not answer.names_right
     return answer.verdict not in ("no_gap", MISSING, "refused")
 

@@ -8,10 +8,11 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.gap.batch import Row
+from coupled.gap.budget import StageBudget
 from coupled.gap.flown import ChannelAgain
 from coupled.gap.power import EffectPower
-from coupled.gap.result import StageResult
-from coupled.gap.summary import in_figures
+from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.summary import change, figure, in_figures, plain
 
 
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
@@ -30,6 +31,41 @@ def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
         table.add_row(stage.name, f"{stage.gap:.2f}", left, remark)
     console.print()
     console.print(table)
+
+
+def print_effects(
+    console: Console, effects: Sequence[EffectResult], budget: Sequence[StageBudget]
+) -> None:
+    """Print each effect's numbers, as filed and as found, and its share of its stage's residual."""
+    if not effects:
+        return
+    table = Table("effect", "filed → found", box=None)
+    for head in ("95 % interval", "share", "prob."):
+        table.add_column(head, justify="right")
+    known = {one.stage: one for one in budget}
+    for effect in effects:
+        shares = known[effect.stage].shares if effect.stage in known else ()
+        share = next((one for one in shares if one.name == effect.name), None)
+        explains = "" if share is None else f"{100 * share.value:.1f} %"
+        first, *rest = effect.parameters or (None,)
+        sure = f"{effect.probability:.2f}"
+        table.add_row(plain(effect.name), *_number(first), explains, sure)
+        for parameter in rest:
+            table.add_row("", *_number(parameter), "", "")
+    for one in budget:
+        for left in (one.unexplained, one.noise):
+            table.add_row(f"{one.stage}: {left.name}", "", "", f"{100 * left.value:.1f} %", "")
+    console.print()
+    console.print(table)
+
+
+def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
+    """Return a parameter's change and interval, in the rig's own number."""
+    if parameter is None:
+        return "", ""
+    low, high = parameter.found_low, parameter.found_high
+    ends = "" if low is None or high is None else f"{figure(low)} to {figure(high)}"
+    return change(parameter), ends
 
 
 def print_closed_loop(console: Console, channels: Sequence[ChannelAgain]) -> None:

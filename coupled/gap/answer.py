@@ -1,0 +1,130 @@
+"""What is said of the effects found: their numbers, how sure each is, and the verdict on all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+
+from coupled.gap.budget import StageBudget
+from coupled.gap.case import Case
+from coupled.gap.choose import Choice, Found
+from coupled.gap.credibility import credibility
+from coupled.gap.effect import Effect, Parameter, field_of
+from coupled.gap.library import SETTINGS
+from coupled.gap.result import (
+    EffectResult,
+    ParameterEstimate,
+    SettingResult,
+    StageResult,
+    Verdict,
+)
+from coupled.gap.stages import Reader
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, REMAINDER, SURE
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+
+def verdict_of(
+    choice: Choice,
+    stages: Sequence[StageResult],
+    effects: Sequence[EffectResult],
+    budget: Sequence[StageBudget],
+) -> Verdict:
+    """Return the verdict; `mostly` where what is certain leaves structure, but holds more."""
+    guilty = [stage.name for stage in stages if stage.guilty]
+    blamed = {step.effect.stage for step in choice.steps}
+    left = any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
+    known = {one.stage: one for one in budget}
+    sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
+    if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
+        return "unexplained"
+    if not choice.steps:
+        return "no_gap"
+    if any(step.rivals for step in choice.steps):
+        return "ambiguous"
+    return "mostly" if left else "effect"
+
+
+def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
+    """Return the share of a stage's gap that some of the effects hold, noise apart."""
+    return 0.0 if budget is None else sum(budget.of(name) for name in effects)
+
+
+def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
+    """Return what the settings of the nominal rig were found to be."""
+    found = []
+    for setting in SETTINGS.values():
+        for p in setting.free:
+            factor = choice.fit.values.get(setting.value_key(p))
+            if factor is not None:
+                name = field_of(rig, control, p.key)
+                found.append(SettingResult(name, setting.stage, factor))
+    return tuple(found)
+
+
+def effects_of(
+    case: Case,
+    choice: Choice,
+    readers: Sequence[Reader],
+    stages: Sequence[StageResult],
+    budget: Sequence[StageBudget],
+) -> tuple[EffectResult, ...]:
+    """Return the effects found, the largest first.
+
+    What stands beside a remainder may only imitate what is missing: the more it leaves, and the
+    less credible it is, the less sure.
+    """
+    left = {stage.name for stage in stages if stage.unexplained}
+    remains = {one.stage: one.remains for one in budget}
+    records = [reader.record for reader in readers]
+
+    def result(step: Found) -> EffectResult:
+        effect = step.effect
+        known = credibility(effect, case, choice.fit, records, effect.stage in left)
+        rest = remains.get(effect.stage, 0.0) if effect.stage in left else 0.0
+        sure = SURE - (SURE - DOUBT) * (1.0 - known.value) * rest / (rest + REMAINDER)
+        scatter = _sample_error(effect, readers)
+        numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
+        probability = step.probability * sure
+        return EffectResult(effect.name, effect.stage, probability, numbers, known)
+
+    return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
+
+
+def _estimate(
+    choice: Choice, effect: Effect, p: Parameter, case: Case, scatter: float
+) -> ParameterEstimate:
+    key, fit = effect.value_key(p), choice.fit
+    value, low, high = fit.values[key], fit.low[key], fit.high[key]
+    if scatter > 0.0:  # the records meet a sample of it
+        low = value - math.hypot(value - low, 1.96 * scatter * value)
+        high = value + math.hypot(high - value, 1.96 * scatter * value)
+    ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
+    filed = float(p.nominal(case.nominal, case.control))
+    bounds = [None if end is None else float(p.entered(filed, end)) for end in ends]
+    host = case.nominal.controls[case.control].compensation
+    return ParameterEstimate(
+        name=p.named(case.control),
+        value=value,
+        low=ends[0],
+        high=ends[1],
+        key=p.key_on(case.control),
+        unit=p.unit(case.nominal, case.control),
+        filed=None if p.inverse and filed == 0.0 else filed,
+        found=float(p.entered(filed, value)),
+        found_low=bounds[0],
+        found_high=bounds[1],
+        host=p.host if host.deflection or host.gradient else "",
+    )
+
+
+def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
+    """Return the relative standard error of an effect's number from what the records meet of it."""
+    one: Callable[[Record, float], float] | None = effect.sample_error
+    if one is None:
+        return 0.0
+    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    return float(np.sqrt(np.sum(np.square(each)))) / len(each)

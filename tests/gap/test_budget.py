@@ -1,0 +1,116 @@
+"""The budget of a gap: its shares sum to 1, are the truth's, and say what no effect explains."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.gap import diagnose as diagnosing
+from coupled.gap.budget import NOISE, UNEXPLAINED
+from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME, EFFECTS
+from coupled.rig.replay import replay_linkage
+from tests.support.gaps import made, nominal_rig
+
+DRIVES = ("column_computed_m", "column_force_N")
+FRICTION = {"friction_N": 6.0, "stiffness_N_per_{d}": 3e4}  # yields by 0.2 mm
+
+
+def shares(found: Diagnosis, stage: str) -> dict[str, float]:
+    [budget] = [one for one in found.budget if one.stage == stage]
+    assert sum(share.value for share in budget.shares) == pytest.approx(1.0, abs=1e-12)
+    for share in budget.shares:
+        assert share.low <= share.value <= share.high
+    return budget.as_dict()
+
+
+def without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take an effect out of the library: it is then one that the library lacks."""
+    monkeypatch.setattr(diagnosing, "EFFECTS", tuple(e for e in EFFECTS if e.name != name))
+
+
+@pytest.mark.slow
+def test_what_is_nearly_right_explains_most_and_says_what_remains(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Friction that yields, held against Coulomb's alone: found to 3 %, and the rest described."""
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {"presliding_friction": FRICTION}, 4)
+    without("presliding_friction", monkeypatch)
+    found = diagnosing.diagnose(nominal, {"r": record.between(0.0, 20.0)})
+    assert found.verdict == "mostly"
+    [effect] = found.effects
+    assert effect.name == "coulomb_friction"
+    assert effect.probability > 0.9
+    [friction] = effect.parameters
+    assert friction.filed == 0.0
+    assert friction.found == pytest.approx(6.0, rel=0.03)
+    budget = shares(found, "loader")
+    assert budget["coulomb_friction"] > 0.9
+    assert budget[UNEXPLAINED] > 3.0 * budget[NOISE]
+    said = found.summary
+    assert said.startswith("Coulomb friction, 0 → 6.")
+    assert "of the loader's gap" in said
+    assert "no effect of the library explains it" in said
+    table = found.as_dict()
+    assert table["format"] == 2
+    assert sum(table["budget"]["loader"].values()) == pytest.approx(1.0)
+    json.dumps(table, allow_nan=False)
+
+
+def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) -> None:
+    """In the linkage a bend and a play add up: their shares are those of their own signatures."""
+    nominal = nominal_rig(False)
+    values = {"bend": {"bend_{d}_per_N": 1.6e-4}, "backlash": {"play_{d}": 2e-3}}
+    record = made(tmp_path, nominal, values, 4).between(0.0, 20.0)
+    found = diagnosing.diagnose(nominal, {"r": record})
+    assert found.verdict == "effect"
+    budget = shares(found, "linkage")
+    flat = {f"{n}.{k}": v for n, each in values.items() for k, v in each.items()}
+    made_by = {}
+    for some in ((), ("bend",), ("backlash",), ("bend", "backlash")):
+        rig = apply(nominal, "column", [BY_NAME[name] for name in some], flat)
+        made_by[some] = replay_linkage(rig, "column", *(record[name] for name in DRIVES))
+    [output] = [output for output in found.outputs if output.stage == "linkage"]
+    held = output.rows("held")
+    power = {
+        some: float(np.mean((made_by["bend", "backlash"] - line)[held] ** 2))
+        for some, line in made_by.items()
+    }
+    whole = power[()]
+    bend = 0.5 * (whole - power["bend",] + power["backlash",]) / whole
+    assert budget["bend"] == pytest.approx(bend, abs=0.05)
+    assert budget["backlash"] == pytest.approx(1.0 - bend, abs=0.05)
+    assert budget[NOISE] < 0.02
+
+
+def test_a_cause_is_as_large_everywhere_and_what_to_set_is_said(tmp_path: Path) -> None:
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {"bend": {"bend_{d}_per_N": 1.6e-4}}, 4).between(0.0, 20.0)
+    found = diagnosing.diagnose(nominal, {"r": record})
+    [bend] = found.effects
+    known = bend.credibility
+    assert known is not None
+    assert known.value > 0.95
+    assert known.drift < 0.05
+    assert any(regime.by == "time_s" for regime in known.regimes)
+    filed = nominal.controls["column"].loader.bend
+    [number] = bend.parameters
+    assert number.filed == filed
+    assert number.found == number.value
+    assert (number.key, number.unit) == ("loader.bend_m_per_N", "m/N")
+    assert "Bend, 9.14e-5 → " in found.summary
+    assert "Set K̂ to 1.6" in found.summary
+
+
+def test_no_gap_has_no_budget(tmp_path: Path) -> None:
+    nominal = nominal_rig(False)
+    record = made(tmp_path, nominal, {}, 11).between(0.0, 15.0)
+    found = diagnosing.diagnose(nominal, {"r": record})
+    assert found.verdict == "no_gap"
+    assert found.budget == ()
+    assert found.as_dict()["budget"] == {}

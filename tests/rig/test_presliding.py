@@ -1,0 +1,140 @@
+"""Friction whose contact yields before it slips: its closed forms, its limit, its order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.rig.friction import ELASTIC_SHARE, yielded
+from coupled.rig.packing import pack
+from coupled.rig.rig import Rig
+from tests.support.rigs import bench, push
+
+Floats = NDArray[np.float64]
+K = 560.0  # N/m of the spring
+FRICTION_N, STIFFNESS = 6.0, 3e4
+TRAVEL_m = FRICTION_N / STIFFNESS  # 0.2 mm
+PLAIN = {"bend_m_per_N": 0.0, "controls.column.compensation.gradient": False}
+YIELDS = {**PLAIN, "friction_N": FRICTION_N, "friction_stiffness_N_per_m": STIFFNESS}
+
+
+def along(ways: Floats) -> Floats:
+    """Return the bristles' bend after each of some ways, d."""
+    p = pack(bench(YIELDS))[0]["parameters"]["friction"]
+    found, bent = [], 0.0
+    for way in ways.tolist():
+        bent, _ = yielded(p, FRICTION_N, bent, way)
+        found.append(bent)
+    return np.array(found)
+
+
+def test_it_is_a_spring_first_and_slips_at_the_friction_last() -> None:
+    elastic = ELASTIC_SHARE * TRAVEL_m
+    assert along(np.array([elastic]))[0] == pytest.approx(elastic, rel=1e-12)
+    assert along(np.array([40.0 * TRAVEL_m]))[0] == pytest.approx(TRAVEL_m, rel=1e-12)
+    # Between the two, z_c − z fades over the way as an exponential.
+    soft = (1.0 - ELASTIC_SHARE) * TRAVEL_m
+    assert along(np.array([elastic + soft]))[0] == pytest.approx(TRAVEL_m - soft / math.e)
+
+
+def test_a_way_in_parts_is_the_way_whole() -> None:
+    whole = along(np.array([3.0 * TRAVEL_m, -1.7 * TRAVEL_m]))[-1]
+    parts = [np.full(30, 0.1 * TRAVEL_m), np.full(17, -0.1 * TRAVEL_m)]
+    assert along(np.concatenate(parts))[-1] == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize("amplitude", [0.2, 0.6, 1.0, 3.0, 200.0])
+def test_a_closed_loop_loses_what_its_branches_enclose(amplitude: float) -> None:
+    """Masing's loop: both branches are one curve, turned about; its tips are where they meet.
+
+    The tip z_t solves z_c − z_t = soft·exp(−(2A − z_t − share·z_c)/soft); the area between the
+    branches is the loss of a cycle. Below the elastic share it is none.
+    """
+    a, zc = amplitude * TRAVEL_m, TRAVEL_m
+    elastic, soft = ELASTIC_SHARE * zc, (1.0 - ELASTIC_SHARE) * zc
+    steps = 4000
+    cycle = np.concatenate([np.full(steps, -2.0 * a / steps), np.full(steps, 2.0 * a / steps)])
+    bent = np.concatenate(([0.0], along(np.concatenate(([a], np.tile(cycle, 30))))))
+    last = bent[-2 * steps - 1 :]
+    way = np.concatenate(([0.0], np.cumsum(cycle)))
+    loss = STIFFNESS * float(np.sum(0.5 * (last[1:] + last[:-1]) * np.diff(way)))
+    tip = last[0]
+    if a <= elastic:
+        assert loss == pytest.approx(0.0, abs=1e-12)
+        return
+    slipped = 2.0 * a - tip - elastic  # the way on a branch beyond its straight part
+    assert zc - tip == pytest.approx(soft * math.exp(-slipped / soft), rel=1e-3)
+    straight = 0.5 * (elastic**2 - tip**2)  # ∫z over the rising branch's straight part
+    curved = zc * slipped - soft**2 * -math.expm1(-slipped / soft)
+    assert loss == pytest.approx(2.0 * STIFFNESS * (straight + curved), rel=1e-4)
+    if amplitude >= 200.0:  # Coulomb's loop, but for what the contact gives back
+        assert loss == pytest.approx(4.0 * FRICTION_N * a, rel=0.01)
+
+
+def test_a_small_force_is_held_by_spring_and_contact_together() -> None:
+    pull = 0.25 * FRICTION_N
+    held = push(bench(YIELDS), lambda t: pull * np.minimum(t, 1.0), 3.0, K)
+    assert held[-1] == pytest.approx(pull / (K + STIFFNESS), rel=1e-6)
+
+
+def test_nothing_creeps_under_a_force_below_breakaway() -> None:
+    steady = push(bench(YIELDS), 0.8 * FRICTION_N, 12.0, K)
+    assert abs(steady[-1] - steady[len(steady) // 2]) < 1e-12
+
+    def swinging(t: Floats) -> Floats:
+        """Return a force that swings within the elastic share about a constant one."""
+        return FRICTION_N * (0.15 + 0.1 * np.sin(40.0 * t)) * np.minimum(1.0, t)
+
+    swung = push(bench(YIELDS), swinging, 12.0, K)
+    turns = round(2.0 * np.pi / 40.0 * 2000.0) * 12  # of 12 swings, to a fraction of a step
+    assert abs(np.mean(swung[-turns:]) - np.mean(swung[8000 : 8000 + turns])) < 1e-3 * TRAVEL_m
+
+
+def sweep(t: Floats) -> Floats:
+    return 45.0 * np.sin(2.0 * np.pi * (0.3 + 0.2 * t) * t)
+
+
+def moved(rig: Rig) -> Floats:
+    return push(rig, sweep, 4.0, K)
+
+
+def test_the_stiffer_the_contact_the_nearer_is_coulomb() -> None:
+    rigid = moved(bench({**PLAIN, "friction_N": FRICTION_N}))
+    off = [
+        float(np.max(np.abs(moved(bench({**YIELDS, "friction_stiffness_N_per_m": k})) - rigid)))
+        for k in (1e5, 1e6, 1e7)
+    ]
+    # What is left is where in its friction band a control comes to rest.
+    assert off[2] < 1e-3 * float(np.max(np.abs(rigid)))
+    assert off[2] < 0.4 * off[1] < 0.4 * 0.4 * off[0]
+
+
+def test_its_steps_are_of_second_order() -> None:
+    def at(rate_Hz: float) -> Floats:
+        return moved(bench({**YIELDS, "breakout_N": 3.0}).changed({"loader_rate_Hz": rate_Hz}))
+
+    fine = at(32000.0)
+    off = [float(np.sqrt(np.mean((at(rate) - fine) ** 2))) for rate in (2000.0, 4000.0, 8000.0)]
+    assert off[0] < 1e-3 * float(np.max(np.abs(fine)))
+    order = np.log2(off[0] / off[2]) / 2.0
+    assert order > 1.7, off
+
+
+def test_a_rigid_contact_is_as_it_was() -> None:
+    """Neutral: no friction, or no stiffness, and the loader does not know of bristles."""
+    p = pack(bench({**PLAIN, "friction_stiffness_N_per_m": STIFFNESS}))[0]["parameters"]
+    assert p["friction"]["stiffness"] == 0.0
+    free = moved(bench({**PLAIN, "friction_stiffness_N_per_m": STIFFNESS}))
+    assert np.array_equal(free, moved(bench(PLAIN)))
+
+
+def test_a_breakaway_yields_too() -> None:
+    """From rest the contact carries the breakaway; sliding fast, the running friction."""
+    rig = bench({**YIELDS, "breakaway_N": 2.0 * FRICTION_N, "stribeck_rate_m_per_s": 0.01})
+    held = push(rig, lambda t: 1.9 * FRICTION_N * np.minimum(0.1 * t, 1.0), 12.0, K)
+    assert held[-1] < 10.0 * TRAVEL_m
+    gone = push(rig, lambda t: 2.5 * FRICTION_N * np.minimum(0.1 * t, 1.0), 12.0, K)
+    assert gone[-1] > FRICTION_N / K
