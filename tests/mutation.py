@@ -5,11 +5,12 @@
 
 Each mutant changes one operator, comparison, number or condition of the module. It is killed if
 a test fails, or hangs; one that survives is printed with its line: no test holds what it changed.
-`--sample 25` takes that many of the mutants at random, and `--change OLD NEW` is one of your own.
+`--sample 25` takes that many of the mutants at random; `--change OLD NEW`, given once or more,
+makes mutants of your own.
 
-The tests run once without a mutant; then each mutant has a fork of that process, which imports
-the changed module, and what depends on it, anew. No file is changed, so a test that starts
-another process does not see the mutant. Kernels are compiled for each mutant of a stage;
+The tests run once without a mutant. Each run is a fork of this process, which has imported all;
+it imports the changed module, and what depends on it, anew. No file is changed, so a test that
+starts another process does not see the mutant. Kernels are compiled for each mutant of a stage;
 `--plain` runs the rig's as plain Python instead, a hundred times slower and without that minute.
 """
 
@@ -21,6 +22,7 @@ import copy
 import importlib.abc
 import importlib.machinery
 import importlib.util
+import math
 import os
 import random
 import select
@@ -88,6 +90,16 @@ def mutants(source: bytes) -> list[Mutant]:
                 new = f"({new})"
             found.append(Mutant(node.lineno, start, end, source[start:end].decode(), new))
     return sorted(found, key=lambda mutant: (mutant.start, mutant.end, mutant.new))
+
+
+def by_hand(source: bytes, old: str, new: str) -> Mutant:
+    """Return the change of a text that stands once in the source; ValueError where it does not."""
+    if source.count(old.encode()) != 1:
+        message = f"{old!r} is to stand in the module once"
+        raise ValueError(message)
+    start = source.index(old.encode())
+    line = source.count(b"\n", 0, start) + 1
+    return Mutant(line, start, start + len(old.encode()), old, new)
 
 
 def _physics(node: ast.AST) -> Iterator[ast.expr | ast.AugAssign]:
@@ -169,7 +181,9 @@ class _Watch:
     def pytest_sessionstart(self) -> None:
         # After pytest, which rewrites what it imports.
         settings: Any = importlib.import_module("hypothesis").settings
-        settings.register_profile("mutation", deadline=None, derandomize=True, database=None)
+        settings.register_profile(
+            "mutation", deadline=None, derandomize=True, database=None, max_examples=15
+        )
         settings.load_profile("mutation")
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -214,9 +228,12 @@ def forget(names: set[str]) -> None:
         vars(sys.modules.get(package, sys)).pop(inner, None)
 
 
-def _tried(name: str, source: bytes, stale: set[str], tests: list[str], answer: int) -> NoReturn:
+def _tried(
+    name: str, source: bytes, stale: set[str], tests: list[str], limit_s: float, answer: int
+) -> NoReturn:
     """Run the tests with the module changed, in a process of its own; answer the first failure."""
     os.setsid()
+    signal.alarm(math.ceil(limit_s) + 1)  # should this process be ended before it
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
@@ -240,7 +257,7 @@ def killer(name: str, source: bytes, stale: set[str], tests: list[str], limit_s:
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        _tried(name, source, stale, tests, writing)
+        _tried(name, source, stale, tests, limit_s, writing)
     os.close(writing)
     try:
         if not select.select([reading], [], [], limit_s)[0]:
@@ -263,19 +280,17 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=0, help="so many mutants, at random")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--plain", action="store_true", help="the rig's kernels as plain Python")
-    parser.add_argument("--change", nargs=2, metavar=("OLD", "NEW"), help="one change by hand")
+    parser.add_argument(
+        "--change", nargs=2, action="append", metavar=("OLD", "NEW"), help="changes of your own"
+    )
+    parser.add_argument("-k", dest="only", default="", help="of the tests those of such names")
     parser.add_argument("--deselect", action="append", default=[], help="a test not to be run")
     parser.add_argument("--verbose", action="store_true", help="name each mutant's killer")
     given = parser.parse_args()
     source = (ROOT / given.module).read_bytes()
     chosen = mutants(source)
     if given.change:
-        old, new = given.change
-        if source.count(old.encode()) != 1:
-            sys.exit(f"{given.module}: {old!r} is to stand there once")
-        start = source.index(old.encode())
-        line = source.count(b"\n", 0, start) + 1
-        chosen = [Mutant(line, start, start + len(old.encode()), old, new)]
+        chosen = [by_hand(source, old, new) for old, new in given.change]
     elif given.sample and given.sample < len(chosen):
         chosen = sorted(
             random.Random(given.seed).sample(chosen, given.sample), key=lambda m: m.start
@@ -284,17 +299,20 @@ def main() -> None:
         forget(dependants("coupled.rig.compiled") - {"coupled.rig.compiled", __name__})
         interpret()
     tests = [*given.tests, *(f"--deselect={each}" for each in given.deselect)]
-    start_s = time.perf_counter()
-    if pytest.main([*ALWAYS, *tests], plugins=[_Watch()]):
-        sys.exit("the tests fail without a mutant")
-    limit_s = 60.0 + 5.0 * (time.perf_counter() - start_s)
+    tests += ["-k", given.only]
+    # Imports all, and runs nothing: a thread that a test starts would be lost in the forks.
+    pytest.main([*ALWAYS, "--collect-only", *tests], plugins=[_Watch()])
     name = given.module.removesuffix(".py").replace("/", ".")
     stale = dependants(name) - {"__main__", "tests.mutation"}
+    start_s = time.perf_counter()
+    if failed := killer(name, source, stale, tests, 600.0):
+        sys.exit(f"{failed} fails without a mutant")
+    limit_s = 30.0 + 5.0 * (time.perf_counter() - start_s)
     start_s, survived = time.perf_counter(), 0
     for mutant in chosen:
         test = killer(name, mutant.applied(source), stale, tests, limit_s)
         survived += not test
-        if given.verbose or not test:
+        if given.verbose or not test or test.startswith("no end"):
             place = f"{given.module}:{mutant.line}: {mutant.old} → {mutant.new}"
             print(f"{test or 'SURVIVED'}: {place}", flush=True)
     taken = time.perf_counter() - start_s

@@ -11,7 +11,9 @@ import pytest
 
 from coupled.calibration.checks import (
     ControlCheck,
+    breakout,
     dynamic_checks,
+    judged,
     legs,
     static_checks,
     surface_checks,
@@ -163,6 +165,65 @@ def test_a_margin_is_what_is_left_of_the_tolerance() -> None:
     assert not ControlCheck("x", 0.0, float("nan"), 10.0, 4.0, "N").passed
 
 
+def test_a_releases_figures_are_those_of_the_damped_cosine() -> None:
+    """P₀ from 90 % to the first zero, periods of 2π/ω_d, heights of e^(−πζn/√(1 − ζ²))."""
+    omega, zeta = 9.0, 0.12
+    wd = omega * math.sqrt(1.0 - zeta**2)
+    let_go = oscillator(omega, zeta)
+    checks = {c.name: c for c in dynamic_checks(7.0, "+", let_go, let_go)}
+    assert all(c.margin == 1.0 and c.pressure_Pa == 7.0 for c in checks.values())
+    zero = (math.pi - math.acos(zeta)) / wd
+    first = checks["first zero crossing, +"]
+    since = zero - let_go.time_s[np.argmax(let_go.deflection <= 0.09)]
+    assert first.reference == pytest.approx(since, abs=2e-4)
+    assert first.tolerance == pytest.approx(0.1 * since, abs=2e-5)
+    heights = np.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2) * np.arange(1, 20))
+    heights = heights[heights > 0.05]
+    assert checks["overshoots above 5 %, +"].reference == len(heights)
+    assert checks["overshoots above 5 %, +"].tolerance == 1.0
+    for n, height in enumerate(heights):
+        check = checks[f"overshoot {n + 1}, +"]
+        assert check.reference == pytest.approx(100.0 * height, rel=1e-4)
+        assert check.tolerance == pytest.approx(10.0 * heights[0], rel=1e-4)
+    periods = [c for name, c in checks.items() if name.startswith("period")]
+    assert len(periods) == len(heights) // 2
+    for n, check in enumerate(periods, start=1):
+        assert check.reference == pytest.approx(2.0 * math.pi / wd, rel=1e-5)
+        assert check.tolerance == pytest.approx(0.1 * (n + 1) * 2.0 * math.pi / wd, rel=1e-5)
+
+
+@pytest.mark.parametrize(("slower", "passed"), [(1.09, True), (0.91, True), (1.11, False)])
+def test_an_overdamped_fall_may_be_off_by_a_tenth(slower: float, passed: bool) -> None:
+    time = np.arange(0.0, 6.0, 1e-4)
+    felt, wanted = (Release(time, np.exp(-rate * time), 1.0) for rate in (2.0 / slower, 2.0))
+    fall, overshoot = dynamic_checks(0.0, "+", felt, wanted)
+    assert fall.reference == pytest.approx(math.log(9.0) / 2.0, rel=1e-6)
+    assert fall.tolerance == pytest.approx(0.1 * math.log(9.0) / 2.0, rel=1e-6)
+    assert fall.passed is passed
+    assert (overshoot.measured, overshoot.reference, overshoot.tolerance) == (0.0, 0.0, 5.0)
+
+
+def test_an_overdamped_control_may_overshoot_by_five_percent() -> None:
+    time = np.arange(0.0, 6.0, 1e-4)
+    wanted = Release(time, np.exp(-2.0 * time), 1.0)
+    for zeta, passed in ((0.73, True), (0.67, False)):  # 3.5 % and 5.9 %
+        *_, overshoot = dynamic_checks(0.0, "+", oscillator(9.0, zeta), wanted)
+        assert overshoot.passed is passed
+
+
+def test_a_release_that_never_swings_fails_the_crossing() -> None:
+    time = np.arange(0.0, 6.0, 1e-4)
+    checks = {
+        c.name: c
+        for c in dynamic_checks(
+            0.0, "+", Release(time, np.exp(-2.0 * time), 1.0), oscillator(9.0, 0.2)
+        )
+    }
+    assert checks["first zero crossing, +"].measured == float("inf")
+    assert checks["overshoot 1, +"].measured == 0.0
+    assert not checks["overshoots above 5 %, +"].passed
+
+
 LBF = 4.4482216
 
 # 14 CFR Part 60, table A2A, 2.a.1 to 2.a.3 as printed: breakout and force in lbf, surface in °.
@@ -219,6 +280,32 @@ def test_a_surface_may_be_off_by_two_degrees_and_a_spoiler_by_three(
             assert check.passed is passed
             assert check.tolerance == pytest.approx(degrees)
             assert check.name.startswith(surface or "surface")
+
+
+def test_forces_are_judged_from_3_to_93_percent_of_the_travel_where_they_are_worst() -> None:
+    data = bench().controls["column"]
+    wanted = four(lambda at: 10.0 + 1000.0 * at)
+    at = judged(data.travel, wanted, wanted)
+    for leg, side in zip(at, (1.0, 1.0, -1.0, -1.0), strict=True):
+        assert leg.deflection[[0, -1]] == pytest.approx(side * np.array([0.03, 0.93]) * TRAVEL)
+        assert leg.felt == pytest.approx(side * (10.0 + 1000.0 * side * leg.deflection))
+    # 8 % more everywhere: nearest to its limit, the 5 lbf, where it is last judged
+    felt = four(lambda at: 1.08 * (10.0 + 1000.0 * at))
+    last = 10.0 + 1000.0 * 0.93 * TRAVEL
+    for check in static_checks(data, "column", 0.0, felt, wanted)[2:]:
+        assert abs(check.reference) == pytest.approx(last)
+        assert check.margin == pytest.approx(1.0 - 0.08 * last / (5.0 * LBF), rel=1e-6)
+
+
+@pytest.mark.parametrize("cubic", [0.0, 4e3])
+def test_the_breakout_is_where_the_lines_straight_start_meets_neutral(cubic: float) -> None:
+    """A hardening spring, or a slope that ends at a tenth of the travel, does not shift it."""
+    hardening = four(lambda at: 12.0 + 800.0 * at + cubic * at**3)[0]
+    assert breakout(hardening, TRAVEL, TRAVEL) == pytest.approx(12.0, abs=0.15)
+    at = 0.1 * TRAVEL
+    broken = four(lambda x: 12.0 + 2000.0 * np.minimum(x, at) + 300.0 * np.maximum(x - at, 0.0))
+    for leg in broken:
+        assert breakout(leg, TRAVEL, at) == pytest.approx(12.0, abs=1e-6)
 
 
 FRICTION: dict[str, Any] = {"friction_N": 6.0, "breakout_N": 9.0}

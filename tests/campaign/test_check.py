@@ -19,11 +19,15 @@ from coupled.campaign.tolerances import sustained_force
 from coupled.campaign.verdict import judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import Expect, Figure, Standard
+from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
+from coupled.flight.pilot import PILOTS
 from coupled.flight.runfile import read_run
 from coupled.record.record import Record
 from coupled.resources import shipped_runs
 from coupled.schema import build
 from tests.support.commands import coupled, files
+from tests.support.rigs import G_STIFF, bench
 from tests.support.runs import PUSH
 
 
@@ -206,6 +210,48 @@ def test_a_small_pitch_input_is_one_of_half_to_two_degrees_a_second() -> None:
     wheel = replace(peaking(1.0), manoeuvre=read_run("roll-authority")[0])
     with pytest.raises(UnjudgedError, match="not for the wheel"):
         judge_standard("Part 60 2.b.4 rate", None, wheel, wheel)
+
+
+def test_a_rate_to_the_other_side_and_none_at_all_are_judged_alike() -> None:
+    def peaking(rate: float | None) -> Flight:
+        base = flight(RISE)
+        return replace(base, outcome=replace(base.outcome, peak_rate_rad_per_s=rate))
+
+    down = judge_standard("rate against rigid", None, peaking(-0.5), peaking(-0.4))
+    assert down.value == -0.5
+    assert (down.least, down.most) == pytest.approx((-0.48, -0.32))
+    still = judge_standard("rate against rigid", None, peaking(None), peaking(None))
+    allowed = np.radians(0.15)
+    assert (still.value, still.least, still.most) == pytest.approx((0.0, -allowed, allowed))
+
+
+def test_how_long_a_force_is_held_does_not_hang_on_when_the_record_starts() -> None:
+    early = held(50.0, 27.0, least_s=60.0)
+    data = early.record.data.copy()
+    data[:, 0] += 100.0
+    late = replace(early, record=replace(early.record, data=data))
+    one, other = (judge_standard("25.143(d) two hands", "column", f, None) for f in (early, late))
+    assert one == other
+    for rows in (1, 2):
+        short = replace(early, record=replace(early.record, data=data[:rows]))
+        figure = judge_standard("25.143(d) two hands", "column", short, None)
+        assert figure.value == pytest.approx(50.0 * LBF)
+    assert figure.note == ""
+
+
+def test_a_held_force_may_be_off_the_specified_one_by_a_tenth_or_five_pounds() -> None:
+    """A clamp on a rigid bench holds the specified force; 2.a allows it ±10 % or ±5 lbf."""
+    for deflection, allowed in ((0.05, 5.0 * LBF), (0.16, 0.1 * G_STIFF * 0.16)):
+        settings = {"kind": "clamp", "deflection_m": deflection}
+        clamp = build(PILOTS["clamp"], settings, "t", "pilot.column")
+        profile = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[3000.0])
+        held_there = Manoeuvre(configure(bench(), "rigid"), {"column": clamp}, 8.0, bench=profile)
+        flown = replace(flight(RISE), manoeuvre=held_there, record=fly(held_there))
+        figure = judge_standard("Part 60 2.a force", None, flown, None)
+        specified = G_STIFF * deflection
+        assert figure.value == pytest.approx(specified, rel=1e-3)
+        assert figure.least == pytest.approx(specified - allowed, rel=1e-3)
+        assert figure.most == pytest.approx(specified + allowed, rel=1e-3)
 
 
 def test_every_figure_of_a_comparison_may_be_expected() -> None:

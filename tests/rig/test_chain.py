@@ -11,9 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupled.flight.manoeuvre import configure
-from coupled.rig import equations, linkage, sensing
+from coupled.record.channels import ControlName
+from coupled.resources import shipped_rigs
+from coupled.rig import equations, linkage, modification, sensing
 from coupled.rig.equations import bend_loss, uncompensated_loss
 from coupled.rig.packing import pack
+from coupled.rig.parameters import Rigging
 from coupled.rig.replay import (
     drive_loader,
     replay_linkage,
@@ -22,6 +25,7 @@ from coupled.rig.replay import (
     replay_surface,
 )
 from coupled.rig.rig import Rig
+from coupled.rig.rigfile import read_rig
 from coupled.rig.statics import static_line, static_point
 from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
@@ -35,6 +39,13 @@ def test_schedule_interpolates_and_holds_its_ends() -> None:
     q = np.array([-10.0, 0.0, 1500.0, 3000.0, 9000.0])
     g = replay_schedule(bench(), "column", q)
     assert g == pytest.approx([560.0, 560.0, (560.0 + G_STIFF) / 2, G_STIFF, G_STIFF], rel=1e-12)
+
+
+def test_a_schedule_of_many_rows_is_straight_between_each_two() -> None:
+    q, g = [500.0, 1500.0, 2000.0, 4000.0], [560.0, 900.0, 2100.0, 1700.0]
+    rig = bench({f"{SCHEDULE}.dynamic_pressure_Pa": q, f"{SCHEDULE}.total_gradient_N_per_m": g})
+    asked = np.array([400.0, 500.0, 750.0, 1500.0, 1625.0, 1999.0, 2000.0, 3500.0, 4100.0])
+    assert replay_schedule(rig, "column", asked) == pytest.approx(np.interp(asked, q, g), rel=1e-12)
 
 
 def test_schedule_scale_and_slope() -> None:
@@ -52,6 +63,12 @@ def test_pressure_lag_is_first_order() -> None:
     g = replay_schedule(rig, "column", q)
     exact = 560.0 + (G_STIFF - 560.0) * (1.0 - np.exp(-t / 0.4))
     assert g == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_lagging_pressure_begins_where_the_first_frame_has_it() -> None:
+    rig = bench({f"{SCHEDULE}.pressure_lag_s": 0.4, f"{SCHEDULE}.pressure_scale": 1.5})
+    g = replay_schedule(rig, "column", np.full(50, 1000.0))
+    assert g == pytest.approx((560.0 + G_STIFF) / 2, rel=1e-12)
 
 
 # --- gradient modification: eqs. (9) to (12), appendix C -----------------------------------------
@@ -178,6 +195,33 @@ def test_f_mod_is_the_force_specified_less_that_of_the_loader(
     given = replay_product(rig, "column", computed, 0.0 * computed + first, 0.0 * computed + second)
     available = breakout + equations.basic_force(1750.0, computed)
     assert given == pytest.approx(equations.added_force(wanted, available), rel=1e-9, abs=1e-7)
+
+
+def test_the_slope_of_f_mod_is_its_derivative_on_both_segments() -> None:
+    (packed,) = pack(two_segments(9.0, "exact"))
+    s = packed["state"]["modification"]
+    modification.set_gradients(packed["parameters"]["modification"], s, G_STIFF, 1000.0)
+    at = s["break_computed"]
+    assert 0.01 < at < 0.05
+    for x in (0.01, 0.9 * at, 1.1 * at, 3.0 * at, -0.9 * at, -1.1 * at):
+        rise = modification.smooth_force(s, x + 1e-4) - modification.smooth_force(s, x - 1e-4)
+        assert modification.slope(s, x) == pytest.approx(rise / 2e-4, rel=1e-9)
+    assert modification.modifying_force(s, 0.0) == 0.0
+    modification.set_gradients(packed["parameters"]["modification"], s, G_STIFF, G_STIFF)
+    assert modification.slope(s, 0.001) == modification.slope(s, 1.0)
+
+
+def test_a_force_is_made_by_the_scale_that_the_host_assumes_over_the_real_one() -> None:
+    """v₂ = Ŝ₂·ΔF makes ΔF·Ŝ₂/S₂ of newtons, with S₂ a quarter more than assumed."""
+    computed = np.array([0.03, -0.05])
+    key = "controls.column.sensing.modifying_scale"
+    right, wrong = (
+        replay_product(
+            bench({"breakout_N": 9.0, key: scale}), "column", computed, 0 * computed + G_STIFF
+        )
+        for scale in (1.0, 1.25)
+    )
+    assert wrong == pytest.approx(right / 1.25, rel=1e-12)
 
 
 def test_appendix_c_as_printed_is_too_light_by_k_g_times_the_breakout() -> None:
@@ -329,6 +373,23 @@ def test_a_converter_is_within_half_a_step(value: float, bits: int) -> None:
     assert sensing.converted(got, step, 0.2) == pytest.approx(got, abs=1e-15)
 
 
+def test_a_converter_rounds_to_the_nearest_of_its_steps_and_holds_at_its_ends() -> None:
+    """Of 2ᴺ steps from −full scale on, the last is one step under full scale."""
+    found = [sensing.converted(0.1 * steps, 0.1, 0.8) for steps in (0.49, 0.51, -0.49, -0.51, 2.5)]
+    assert found == pytest.approx([0.0, 0.1, 0.0, -0.1, 0.3], abs=1e-15)
+    assert sensing.converted(5.0, 0.1, 0.8) == pytest.approx(0.7)
+    assert sensing.converted(-5.0, 0.1, 0.8) == pytest.approx(-0.8)
+    assert sensing.converted(0.123, 0.0, 0.0) == 0.123
+
+
+def test_what_is_read_is_the_scale_times_the_quantity_and_the_noise_on_it() -> None:
+    prefix = "controls.column.sensing"
+    rig = bench({f"{prefix}.deflection_scale": 1.1, f"{prefix}.force_scale": 0.9})
+    p = pack(rig)[0]["parameters"]["sensing"]
+    assert sensing.read_computed(p, 0.05, 1e-3) == pytest.approx(0.056, rel=1e-12)
+    assert sensing.read_force(p, -40.0, 0.5) == pytest.approx(-35.5, rel=1e-12)
+
+
 def test_scales_and_word_length_set_the_steps() -> None:
     prefix = "controls.column.sensing"
     rig = bench(
@@ -344,6 +405,9 @@ def test_scales_and_word_length_set_the_steps() -> None:
     assert p["force_step"] == pytest.approx(200.0 / 4096 / 0.25)
     assert p["product_step"] == pytest.approx(200.0 / 4096 / 0.2)
     assert p["gradient_range"] == pytest.approx(500.0 / 0.2)
+    assert p["gradient_step"] == pytest.approx(2.0 * 500.0 / 0.2 / 4096)
+    for of, full in (("computed", 100.0 / 500.0), ("force", 100.0 / 0.25), ("product", 500.0)):
+        assert p[f"{of}_range"] == pytest.approx(full)
 
 
 def command(changes: dict[str, Any], estimated: np.ndarray, q: float = 1000.0) -> np.ndarray:
@@ -354,6 +418,17 @@ def command(changes: dict[str, Any], estimated: np.ndarray, q: float = 1000.0) -
 def test_surface_command_sign_travel_and_clip() -> None:
     estimated = np.array([0.0, 0.0889, -0.1778, 0.5])
     assert command({}, estimated) == pytest.approx([0.0, -0.5, 1.0, -1.0])
+
+
+@pytest.mark.parametrize(("control", "sign"), [("column", -1), ("wheel", 1), ("pedals", -1)])
+def test_a_surface_has_jsbsims_sign_and_is_clipped_both_ways(
+    control: ControlName, sign: int
+) -> None:
+    rig = read_rig(shipped_rigs()["737"]).changed({f"controls.{control}.rigging": Rigging()})
+    travel = rig.controls[control].travel
+    estimated = travel * np.array([0.5, -0.25, 1.05, -1.05, 3.0, -3.0])
+    moved = replay_surface(rig, control, estimated, np.zeros(6))
+    assert moved == pytest.approx(sign * np.array([0.5, -0.25, 1.0, -1.0, 1.0, -1.0]))
 
 
 def test_the_command_is_clipped_before_the_cable_yields() -> None:
