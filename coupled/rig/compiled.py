@@ -20,6 +20,8 @@ import numba
 import numpy as np
 from numba import types
 from numba.core import config
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
 # Below this a decaying state is at rest; further down subnormal numbers slow the processor.
@@ -42,11 +44,31 @@ def entry(function: F) -> F:
     chosen = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
-        return cast(F, numba.njit(cache=True)(function))
+        dispatcher = numba.njit(function)
+        dispatcher._cache = _kept(function)
+        return cast(F, dispatcher)
     except RuntimeError:  # numba's, for a function without a place for its cache
         return cast(F, numba.njit(function))
     finally:
         config.CACHE_DIR = chosen
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    """Return a cache that loads machine code without what only a compilation needs.
+
+    numba first loads all that it knows of types and of linear algebra, which takes longer than
+    the rest of a start; machine code needs none of it but the functions of its memory.
+    """
+    cache: Any = FunctionCache(function)
+
+    def load_overload(kinds: Any, context: Any) -> Any:
+        rtsys.initialize(context)
+        with cache._guard_against_spurious_io_errors():
+            return cache._load_overload(kinds, context)
+        return None
+
+    cache.load_overload = load_overload
+    return cache
 
 
 def bound(kernel: F, *arguments: Any) -> F:
