@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SPEED
 from coupled.rig.parameters import Flight
