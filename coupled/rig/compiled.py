@@ -24,6 +24,8 @@ from numba.core.caching import FunctionCache
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
+from coupled.timing import timed
+
 # Below this a decaying state is at rest; further down subnormal numbers slow the processor.
 TINY = 1e-100
 
@@ -78,8 +80,9 @@ def bound(kernel: F, *arguments: Any) -> F:
     much as the physics. It takes arguments of just these types and no others.
     """
     dispatcher: Any = kernel
-    kinds = tuple(_type_of(argument) for argument in arguments)
-    dispatcher.compile(kinds)
+    with timed("kernels"):
+        kinds = tuple(_type_of(argument) for argument in arguments)
+        dispatcher.compile(kinds)
     return cast(F, dispatcher.get_overload(kinds))
 
 
@@ -110,16 +113,28 @@ def _type_of_array(dtype: np.dtype[Any], dimensions: int) -> Any:
 
 def _cache_folder(chosen: str, beside: Path) -> str:
     """Folder for this version of the physics, or numba's own choice if ours is read-only."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    for source in sorted({*here.glob("*.py"), *beside.glob("*.py")}):
-        digest.update(source.read_bytes())
-    folder = Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
+    folder = _folder_of_version(chosen, beside)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return chosen
     return str(folder) if os.access(folder, os.W_OK) else chosen
+
+
+def compiled_before(kernel: Any) -> bool:
+    """Tell whether an entry's machine code is on disk, so that no compilation is to come."""
+    cache = getattr(kernel, "_cache", None)
+    folder = Path(str(getattr(cache, "cache_path", "")))
+    return any(folder.glob(f"*.{kernel.py_func.__name__}-*.nbc"))
+
+
+@lru_cache(maxsize=8)
+def _folder_of_version(chosen: str, beside: Path) -> Path:
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted({*here.glob("*.py"), *beside.glob("*.py")}):
+        digest.update(source.read_bytes())
+    return Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
 
 
 def layout(declaration: type, **shapes: tuple[int, ...]) -> np.dtype[np.void]:
