@@ -74,7 +74,8 @@ print(compiled_before(step_frame_at))
 from coupled.flight.loop import fly
 from tests.support.runs import shortened
 fly(shortened("pull-up-c172p", 1, 2))
-print(compiled_before(step_frame_at), "numba.np.linalg" in sys.modules, "scipy.linalg" in sys.modules)
+needless = [name in sys.modules for name in ("numba.np.linalg", "scipy.linalg")]
+print(compiled_before(step_frame_at), *needless)
 """
 
 
