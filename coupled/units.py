@@ -1,5 +1,8 @@
 """Factors from the units of the field's edges to SI: multiply by them to get SI.
 
+All are exact by definition, and stand here as numbers: a library of constants takes longer to
+load than an aircraft. A test holds them equal to scipy's.
+
 The units that a user's own log may be in stand in a table of names, with their dimension,
 so that inches of force are refused and not multiplied.
 """
@@ -11,17 +14,16 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from scipy import constants
-
-FOOT_m: Final[float] = constants.foot
-INCH_m: Final[float] = constants.inch
-KNOT_m_per_s: Final[float] = constants.knot
-POUND_N: Final[float] = constants.lbf
-PSF_Pa: Final[float] = constants.lbf / constants.foot**2
-POUND_PER_INCH_N_per_m: Final[float] = constants.lbf / constants.inch
-INCH_PER_POUND_m_per_N: Final[float] = constants.inch / constants.lbf
+INCH_m: Final[float] = 0.0254
+FOOT_m: Final[float] = 12.0 * INCH_m
+KNOT_m_per_s: Final[float] = 1852.0 / 3600.0
+GRAVITY_m_per_s2: Final[float] = 9.80665  # standard
+POUND_N: Final[float] = 0.45359237 * GRAVITY_m_per_s2
+PSF_Pa: Final[float] = POUND_N / FOOT_m**2
+POUND_PER_INCH_N_per_m: Final[float] = POUND_N / INCH_m
+INCH_PER_POUND_m_per_N: Final[float] = INCH_m / POUND_N
 DEGREE_rad: Final[float] = math.pi / 180.0
-MILLISECOND_s: Final[float] = constants.milli
+MILLISECOND_s: Final[float] = 1e-3
 
 Dimension = tuple[int, int, int, int]  # powers of mass, length, time, angle
 
@@ -66,31 +68,31 @@ class Unit:
 _NAMED: Final[dict[str, Unit]] = {
     name: Unit(factor, dimension)
     for dimension, units in {
-        _NONE: {"1": 1.0, "%": constants.centi},
+        _NONE: {"1": 1.0, "%": 0.01},
         _FORCE: {
-            **{"N": 1.0, "daN": 10.0, "kN": constants.kilo},
+            **{"N": 1.0, "daN": 10.0, "kN": 1e3},
             **{"lbf": POUND_N, "lb": POUND_N, "ozf": POUND_N / 16.0},
-            **{"kgf": constants.kilogram_force, "kp": constants.kilogram_force},
+            **{"kgf": GRAVITY_m_per_s2, "kp": GRAVITY_m_per_s2},
         },
         _LENGTH: {
-            **{"m": 1.0, "mm": constants.milli, "cm": constants.centi, "km": constants.kilo},
+            **{"m": 1.0, "mm": 1e-3, "cm": 0.01, "km": 1e3},
             **{"in": INCH_m, "ft": FOOT_m},
         },
         _TIME: {
-            **{"s": 1.0, "ms": constants.milli, "us": constants.micro, "ns": constants.nano},
-            **{"min": constants.minute, "h": constants.hour},
+            **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+            **{"min": 60.0, "h": 3600.0},
         },
-        _ANGLE: {"rad": 1.0, "mrad": constants.milli, "deg": DEGREE_rad},
+        _ANGLE: {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE_rad},
         _PRESSURE: {
-            **{"Pa": 1.0, "hPa": constants.hecto, "kPa": constants.kilo},
-            **{"mbar": constants.hecto, "bar": constants.bar},
-            **{"psf": PSF_Pa, "psi": constants.psi},
+            **{"Pa": 1.0, "hPa": 100.0, "kPa": 1e3},
+            **{"mbar": 100.0, "bar": 1e5},
+            **{"psf": PSF_Pa, "psi": POUND_N / INCH_m**2},
         },
         _SPEED: {
             **{"kt": KNOT_m_per_s, "kts": KNOT_m_per_s, "knots": KNOT_m_per_s},
-            **{"mph": constants.mph, "fpm": FOOT_m / constants.minute},
+            **{"mph": 5280.0 * FOOT_m / 3600.0, "fpm": FOOT_m / 60.0},
         },
-        _ACCELERATION: {"g": constants.g},
+        _ACCELERATION: {"g": GRAVITY_m_per_s2},
     }.items()
     for name, factor in units.items()
 }

@@ -12,21 +12,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.channels import ATTITUDE, RATE, ControlName, channel
-from coupled.record.record import Record, pandas_frame
+from coupled.record.record import Record, frame_of, pandas_frame
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -135,7 +137,7 @@ class Comparison(Sequence[Flight]):
 
     def to_polars(self) -> pl.DataFrame:
         """Return the figures, a row a flight; units are in the columns' names, null for none."""
-        return pl.DataFrame(self.as_dict(), infer_schema_length=None)
+        return frame_of(self.as_dict())
 
     def to_pandas(self) -> Any:
         """Return the figures as a pandas DataFrame; raises InputError where pandas lacks."""

@@ -7,7 +7,9 @@ in part), 130 and 143 when it was interrupted, 141 when the reader of its output
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -25,8 +27,9 @@ from coupled.cli.process import (
     said_of,
     silence_streams,
 )
-from coupled.cli.terminal import ReaderGoneError, out, say_error
+from coupled.cli.terminal import ReaderGoneError, err, out, say_error
 from coupled.errors import InputError, shown
+from coupled.timing import parts
 
 app = typer.Typer(
     add_completion=False,
@@ -36,6 +39,8 @@ app = typer.Typer(
     help="Fly a JSBSim aircraft through a compliant control loader.",
     epilog="[dim]First steps: coupled compare · coupled runs · coupled fly pull-up-t37[/]",
 )
+
+_GARBAGE = 100_000  # a command is short: its garbage is looked for less often
 
 RunArgument = Annotated[
     str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
@@ -47,6 +52,7 @@ JsonOption = Annotated[
 
 def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""
+    gc.set_threshold(_GARBAGE)
     prepare_streams()
     with Stop() as stop:
         try:
@@ -86,13 +92,21 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _say_timing() -> None:
+    for part, seconds in parts().items():
+        err.print(f"{part:>16}  {seconds:6.3f} s of the processor", highlight=False)
+
+
 @app.callback()
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    timing: Annotated[bool, typer.Option("--timing", hidden=True)] = False,
 ) -> None:
     """Fly a JSBSim aircraft through a compliant control loader."""
+    if timing:
+        atexit.register(_say_timing)
     try:
         Path.cwd()
     except OSError:

@@ -25,6 +25,7 @@ from coupled.errors import InputError, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
+from coupled.timing import timed
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
@@ -61,7 +62,7 @@ def compare(
     with progress() as advance:
         flights = compare_flights(cases, advance)
     table = flights.as_dict()
-    with Outputs() as outputs:
+    with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
             from coupled.plots.flights import draw_comparison
             from coupled.plots.saving import save
@@ -122,7 +123,7 @@ def fly(
             lambda done, total: advance(manoeuvre.label, done, total),
         )
     record, figures = flight.record, flight.outcome.as_dict()
-    with Outputs() as outputs:
+    with timed("write"), Outputs() as outputs:
         write_record(record, outputs.at(path))
         keep_json(figures, json_file, outputs)
     if json_file != "-":

@@ -9,7 +9,7 @@ import typer
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
-from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target
 from coupled.outputs import Outputs
@@ -65,6 +65,9 @@ def stability(
     say_stale(data)
     asked = [(name, kind) for name in bent for kind in KINDS]
     every = []
+    err.print(
+        f"simulating {len(asked)} maps, some thousand motions of a control each", soft_wrap=True
+    )
     with progress() as advance:
         limits = [stability_limits(data, name) for name in bent]
         bob = bob_weight(data, file) if "column" in bent else None

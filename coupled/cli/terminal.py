@@ -72,12 +72,22 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
     """Show progress on the terminal while work goes on; nothing where there is none."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        task = bar.add_task("starting (the first start compiles the physics)", total=None)
+        task = bar.add_task(_starting() if err.is_terminal else "", total=None)
 
         def advance(label: str, done: int, total: int) -> None:
             bar.update(task, description=escape(label), completed=done, total=total)
 
         yield advance
+
+
+def _starting() -> str:
+    """Return what is said while a command loads; compiling takes longer than all the rest."""
+    from coupled.rig.compiled import compiled_before
+    from coupled.rig.frame import step_frame_at
+
+    if compiled_before(step_frame_at):
+        return "starting"
+    return "starting (the first start compiles the physics)"
 
 
 def check_json(target: str, others: list[Path]) -> None:

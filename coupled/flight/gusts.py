@@ -10,18 +10,16 @@ at the start, where the aircraft is trimmed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import bilinear, lfilter
 
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SPEED
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m
 
-Floats = NDArray[np.float64]
 GUST_DOWN = "atmosphere/gust-down-fps"  # beside any wind
 _BLOCK = 1024  # frames made at a time
 
@@ -30,17 +28,32 @@ def dryden(
     rms_m_per_s: float, length_m: float, speed_m_per_s: float, frame_s: float, seed: int
 ) -> Iterator[float]:
     """Yield the air's upward speed in m/s, a frame each, without end."""
-    lag = length_m / speed_m_per_s
-    gain = rms_m_per_s * np.sqrt(lag / np.pi)
-    rise, fall = gain * np.array([np.sqrt(3.0) * lag, 1.0]), [lag**2, 2.0 * lag, 1.0]
-    top, bottom = bilinear(rise, fall, 1.0 / frame_s)
+    top, bottom = dryden_filter(rms_m_per_s, length_m / speed_m_per_s, frame_s)
+    (b0, b1, b2), (_, a1, a2) = top, bottom
     rng = np.random.default_rng([seed, 97])
-    memory = np.zeros(2)
+    later = last = 0.0  # what the frames before leave, in the filter's transposed direct form
     while True:
         # Of unit density over 0 < ω < π/frame.
-        hiss = rng.normal(0.0, np.sqrt(np.pi / frame_s), _BLOCK)
-        block, memory = lfilter(top, bottom, hiss, zi=memory)
-        yield from block.tolist()
+        for hiss in rng.normal(0.0, np.sqrt(np.pi / frame_s), _BLOCK).tolist():
+            speed = later + b0 * hiss
+            later = last + b1 * hiss - a1 * speed
+            last = b2 * hiss - a2 * speed
+            yield speed
+
+
+def dryden_filter(
+    rms_m_per_s: float, lag_s: float, frame_s: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return numerator and denominator in z⁻¹ of the spectrum's H(s), with L/V = `lag_s`.
+
+    By the bilinear rule, s = (2/T)·(z − 1)/(z + 1), the denominator's first being 1.
+    """
+    turn = 2.0 / frame_s
+    gain = rms_m_per_s * math.sqrt(lag_s / math.pi)
+    zero, pole, back = math.sqrt(3.0) * lag_s * turn, 1.0 + lag_s * turn, 1.0 - lag_s * turn
+    scale = gain / pole**2
+    top = (scale * (1.0 + zero), scale * 2.0, scale * (1.0 - zero))
+    return top, (1.0, 2.0 * back / pole, (back / pole) ** 2)
 
 
 class Gusts(Wrapper):

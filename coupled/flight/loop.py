@@ -43,6 +43,7 @@ from coupled.rig.compiled import bound
 from coupled.rig.equations import specified_gradient
 from coupled.rig.frame import addresses, step_frame_at
 from coupled.rig.packing import pack
+from coupled.timing import timed
 
 Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
@@ -60,7 +61,8 @@ def fly(
     `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame.
     """
     rig, properties = manoeuvre.rig, manoeuvre.record_properties
-    airframe = make_airframe(manoeuvre, air_m_per_s)
+    with timed("trim"):
+        airframe = make_airframe(manoeuvre, air_m_per_s)
     frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
     actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
@@ -81,23 +83,24 @@ def fly(
     ended: EndedEarly | None = None
     done = 0
     try:
-        for k in range(frames):
-            motion = read()
-            # Not above it: near the ground, or not a number.
-            if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
-                ended = EndedEarly(why, k / rig.frame_rate)
-                break
-            if looks:
-                for state, look in looks:
-                    state["command"] = look(k / rig.frame_rate, motion)
-            load = motion[LOAD] if flown else 1.0
-            commands = rig_frame(place, k, motion, load)
-            if asked:
-                extra.append(airframe.extra())
-            step(commands)
-            done = k + 1
-            if not done & 63 and progress is not None:
-                progress(done, frames)
+        with timed("fly"):
+            for k in range(frames):
+                motion = read()
+                # Not above it: near the ground, or not a number.
+                if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
+                    ended = EndedEarly(why, k / rig.frame_rate)
+                    break
+                if looks:
+                    for state, look in looks:
+                        state["command"] = look(k / rig.frame_rate, motion)
+                load = motion[LOAD] if flown else 1.0
+                commands = rig_frame(place, k, motion, load)
+                if asked:
+                    extra.append(airframe.extra())
+                step(commands)
+                done = k + 1
+                if not done & 63 and progress is not None:
+                    progress(done, frames)
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
     data = data[:done]

@@ -5,14 +5,17 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.files import read_bytes, write_whole
 from coupled.schema import LARGEST
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Floats = NDArray[np.float64]
 
@@ -22,6 +25,8 @@ def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
 
     An empty cell is NaN where `gaps` are allowed, and a fault where not.
     """
+    import polars as pl
+
     content = io.BytesIO(read_bytes(path))
     try:
         if path.suffix.lower() == ".parquet":
@@ -38,6 +43,7 @@ def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
 
 def write_table(frame: pl.DataFrame, path: Path) -> None:
     """Write a table whole, as Parquet where the file's extension says so, else as CSV."""
+    import polars as pl
 
     def write(part: Path) -> None:
         with part.open("wb") as file:
@@ -59,6 +65,8 @@ def first_line(error: BaseException) -> str:
 
 def check_numeric(path: Path, name: str, column: pl.Series) -> None:
     """Refuse a column that holds neither numbers nor text: lists, dates, bytes, categories."""
+    import polars as pl
+
     kind = column.dtype
     if not (kind.is_numeric() or kind in (pl.String, pl.Boolean, pl.Null)):
         raise InputError(path, name, f"holds {kind}, no numbers")
@@ -77,6 +85,8 @@ def numbers(
     Text is read as numbers; an empty cell is NaN where `gaps` are allowed. `line` tells
     where a row, counted from 0, stands in the file; no number may exceed `largest`.
     """
+    import polars as pl
+
     check_numeric(path, name, column)
     if column.dtype == pl.String:
         column = column.str.strip_chars()

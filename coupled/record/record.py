@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
@@ -24,6 +23,8 @@ from coupled.record.channels import TIME
 from coupled.record.csvfile import read_columns, write_table
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from coupled.plots.histories import Figure
 
 Floats = NDArray[np.float64]
@@ -103,6 +104,8 @@ class Record:
 
     def to_polars(self) -> pl.DataFrame:
         """Return the rows as a polars DataFrame, a column a channel, SI."""
+        import polars as pl
+
         return pl.DataFrame(self.data, schema=list(self.channels), orient="row")
 
     def to_pandas(self) -> Any:
@@ -119,6 +122,13 @@ class Record:
         from coupled.plots.histories import draw_channels, draw_record
 
         return draw_channels(self, channels, title) if channels else draw_record(self, title)
+
+
+def frame_of(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
+    """Return rows of figures as a polars DataFrame, null for None."""
+    import polars as pl
+
+    return pl.DataFrame(rows, infer_schema_length=None)
 
 
 def pandas_frame(frame: pl.DataFrame) -> Any:
@@ -145,7 +155,7 @@ def check_suffix(path: Path) -> None:
 def write_record(record: Record, path: Path) -> None:
     """Write a record, and its manifest beside it: both, or neither."""
     check_suffix(path)
-    frame = pl.DataFrame(record.data, schema=list(record.channels), orient="row")
+    frame = record.to_polars()
     manifest = {**record.manifest, "format": FORMAT}
     with Outputs() as outputs:
         write_table(frame, outputs.at(path))

@@ -20,7 +20,11 @@ import numba
 import numpy as np
 from numba import types
 from numba.core import config
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
+
+from coupled.timing import timed
 
 # Below this a decaying state is at rest; further down subnormal numbers slow the processor.
 TINY = 1e-100
@@ -42,11 +46,31 @@ def entry(function: F) -> F:
     chosen = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
-        return cast(F, numba.njit(cache=True)(function))
+        dispatcher = numba.njit(function)
+        dispatcher._cache = _kept(function)
+        return cast(F, dispatcher)
     except RuntimeError:  # numba's, for a function without a place for its cache
         return cast(F, numba.njit(function))
     finally:
         config.CACHE_DIR = chosen
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    """Return a cache that loads machine code without what only a compilation needs.
+
+    numba first loads all that it knows of types and of linear algebra, which takes longer than
+    the rest of a start; machine code needs none of it but the functions of its memory.
+    """
+    cache: Any = FunctionCache(function)
+
+    def load_overload(kinds: Any, context: Any) -> Any:
+        rtsys.initialize(context)
+        with cache._guard_against_spurious_io_errors():
+            return cache._load_overload(kinds, context)
+        return None
+
+    cache.load_overload = load_overload
+    return cache
 
 
 def bound(kernel: F, *arguments: Any) -> F:
@@ -56,8 +80,9 @@ def bound(kernel: F, *arguments: Any) -> F:
     much as the physics. It takes arguments of just these types and no others.
     """
     dispatcher: Any = kernel
-    kinds = tuple(_type_of(argument) for argument in arguments)
-    dispatcher.compile(kinds)
+    with timed("kernels"):
+        kinds = tuple(_type_of(argument) for argument in arguments)
+        dispatcher.compile(kinds)
     return cast(F, dispatcher.get_overload(kinds))
 
 
@@ -88,16 +113,28 @@ def _type_of_array(dtype: np.dtype[Any], dimensions: int) -> Any:
 
 def _cache_folder(chosen: str, beside: Path) -> str:
     """Folder for this version of the physics, or numba's own choice if ours is read-only."""
-    here = Path(__file__).parent
-    digest = hashlib.sha256()
-    for source in sorted({*here.glob("*.py"), *beside.glob("*.py")}):
-        digest.update(source.read_bytes())
-    folder = Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
+    folder = _folder_of_version(chosen, beside)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return chosen
     return str(folder) if os.access(folder, os.W_OK) else chosen
+
+
+def compiled_before(kernel: Any) -> bool:
+    """Tell whether an entry's machine code is on disk, so that no compilation is to come."""
+    cache = getattr(kernel, "_cache", None)
+    folder = Path(str(getattr(cache, "cache_path", "")))
+    return any(folder.glob(f"*.{kernel.py_func.__name__}-*.nbc"))
+
+
+@lru_cache(maxsize=8)
+def _folder_of_version(chosen: str, beside: Path) -> Path:
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted({*here.glob("*.py"), *beside.glob("*.py")}):
+        digest.update(source.read_bytes())
+    return Path(chosen or here / "__pycache__") / f"kernels-{digest.hexdigest()[:16]}"
 
 
 def layout(declaration: type, **shapes: tuple[int, ...]) -> np.dtype[np.void]:

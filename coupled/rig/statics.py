@@ -2,7 +2,8 @@
 
 With breakout, two segments and a stiffening bend, along δc: the balance of the loader gives
 F(δc) = F_BO + F_L + k₃·δc³ + F_mod, which is eq. (9) solved for F; the structure δ = δc + bend(F).
-Friction is left out: it is a band about this line. `equations` has the linear case.
+Friction is left out: it is a band about this line. `equations` has the linear case. The line is
+drawn by the stages that fly, in one kernel that is kept on disk.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from coupled.rig.compensation import estimate
+from coupled.rig.compiled import entry, stage
+from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.equations import basic_force, specified_force
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
@@ -22,6 +24,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 
 Floats = NDArray[np.float64]
+loader_force = stage(basic_force)  # eq. (8)
 
 
 @dataclass(frozen=True)
@@ -41,41 +44,67 @@ class Statics:
 
 def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) -> Statics:
     """Return the static line at the given δc in d, which are not to be zero."""
-    (packed,) = pack(rig, only=control)
-    p, s = packed["parameters"], packed["state"]
-    first, second = gradients(p["schedule"], pressure_Pa)
-    set_gradients(p["modification"], s["modification"], first, second)
-    loader, side = p["loader"], np.sign(computed)
-    added = np.array([modifying_force(s["modification"], x) for x in computed])
-    force = (
-        loader["breakout"] * side
-        + basic_force(float(loader["basic_gradient"]), computed)
-        + loader["cubic"] * computed**3
-        + added
-    )
-    deflection = computed + np.array([bend(p["linkage"], f) for f in force])
-    read = p["sensing"]["read_scale"] * computed
-    force_read = p["sensing"]["force_scale"] * force
-    estimates = np.array(
-        [estimate(p["compensation"], x, f) for x, f in zip(read, force_read, strict=True)]
-    )
-    return Statics(
-        computed,
-        force,
-        deflection,
-        estimates,
-        specified_force(rig, control, pressure_Pa, deflection),
-    )
+    return _line(rig, control, pressure_Pa, pack(rig, only=control), computed)
 
 
 def static_point(rig: Rig, control: str, pressure_Pa: float, deflection: float) -> Statics:
     """Return the point of the static line at which the grip stands at δ in d (not zero)."""
+    packed = pack(rig, only=control)
+    computed = _computed_at(packed, float(pressure_Pa), float(deflection))
+    return _line(rig, control, pressure_Pa, packed, np.array([computed]))
 
-    def excess(computed: float) -> float:
-        line = static_line(rig, control, pressure_Pa, np.array([computed]))
-        return float(line.deflection[0]) - deflection
 
-    # δc has δ's sign and is no larger; a breakout may hold the loader at neutral.
-    tiny = deflection * 1e-9
-    computed = tiny if excess(tiny) * deflection > 0.0 else brentq(excess, tiny, deflection)
-    return static_line(rig, control, pressure_Pa, np.array([computed]))
+def _line(
+    rig: Rig, control: str, pressure_Pa: float, packed: ControlArray, computed: Floats
+) -> Statics:
+    out = np.empty((3, len(computed)))
+    _along(packed, float(pressure_Pa), np.ascontiguousarray(computed, dtype=np.float64), out)
+    force, deflection, estimates = out
+    wanted = specified_force(rig, control, pressure_Pa, deflection)
+    return Statics(computed, force, deflection, estimates, wanted)
+
+
+@stage
+def _force(p: ControlParameters, s: ControlState, computed: float) -> float:
+    """Return F in N at δc = `computed` d, which is not zero."""
+    breakout = p.loader.breakout if computed > 0.0 else -p.loader.breakout
+    spring = loader_force(p.loader.basic_gradient, computed) + p.loader.cubic * computed**3
+    return breakout + spring + modifying_force(s.modification, computed)
+
+
+@entry
+def _along(controls: ControlArray, pressure: float, computed: Floats, out: Floats) -> None:
+    """Write F in N, δ and δ̂ in d, shape (3, n), at each δc."""
+    p, s = controls[0].parameters, controls[0].state
+    first, second = gradients(p.schedule, pressure)
+    set_gradients(p.modification, s.modification, first, second)
+    for i in range(len(computed)):
+        x = computed[i]
+        force = _force(p, s, x)
+        out[0, i] = force
+        out[1, i] = x + bend(p.linkage, force)
+        read, force_read = p.sensing.read_scale * x, p.sensing.force_scale * force
+        out[2, i] = estimate(p.compensation, read, force_read)
+
+
+@entry
+def _computed_at(controls: ControlArray, pressure: float, deflection: float) -> float:
+    """Return the δc in d at which the grip stands at δ, to the last digit, by bisection.
+
+    δc has δ's sign and is no larger; a breakout may hold the loader at neutral.
+    """
+    p, s = controls[0].parameters, controls[0].state
+    first, second = gradients(p.schedule, pressure)
+    set_gradients(p.modification, s.modification, first, second)
+    size = abs(deflection)
+    near, far = 1e-9, 1.0  # shares of δ
+    middle = near
+    while True:
+        x = middle * deflection
+        beyond = abs(x + bend(p.linkage, _force(p, s, x))) > size
+        if beyond and middle == near:
+            return x
+        near, far = (near, middle) if beyond else (middle, far)
+        middle = 0.5 * (near + far)
+        if middle in (near, far):
+            return middle * deflection

@@ -64,3 +64,29 @@ def test_a_cache_folder_that_is_set_is_used(tmp_path: Path) -> None:
     done = replay(package, HOME=str(package / "nowhere.txt"), NUMBA_CACHE_DIR=str(chosen))
     assert (done.returncode, done.stderr) == (0, "")
     assert list(chosen.rglob("*.nbi"))
+
+
+START = """
+import sys
+from coupled.rig.compiled import compiled_before
+from coupled.rig.frame import step_frame_at
+print(compiled_before(step_frame_at))
+from coupled.flight.loop import fly
+from tests.support.runs import shortened
+fly(shortened("pull-up-c172p", 1, 2))
+needless = [name in sys.modules for name in ("numba.np.linalg", "scipy.linalg")]
+print(compiled_before(step_frame_at), *needless)
+"""
+
+
+def start(cache: Path) -> list[str]:
+    """Fly two frames with a cache of one's own; return what is printed."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-c", START]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def test_a_second_start_loads_no_compiler_and_no_linear_algebra(tmp_path: Path) -> None:
+    assert start(tmp_path)[:2] == ["False", "True"]
+    assert start(tmp_path) == ["True", "True", "False", "False"]

@@ -20,10 +20,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from coupled.authority.stability.linear import added_gradient
+from coupled.authority.stability.linear import added_gradient, exponential
 from coupled.authority.stability.planes import linear_rig
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
@@ -161,6 +160,6 @@ def _loader(linear: Rig, rate: float, frame_s: float) -> complex:
     held = np.zeros((3, 3))
     held[0, 1] = 1.0
     held[1] = -spring / loader.mass, -loader.damping / loader.mass, 1.0 / loader.mass
-    over = expm(held * frame_s)
+    over = exponential(held * frame_s)
     turned = np.exp(1j * rate * frame_s) * np.eye(2) - over[:2, :2]
     return complex(np.linalg.solve(turned, over[:2, 2])[0])

@@ -41,7 +41,7 @@ FIRM = 1.0  # K·k_h of a hand as stiff as the structure
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
 
 _SIMULATED_s = 4.0
-_COARSE, _FINE = (31, 25), (91, 73)  # cells of the simulation, points of the theory
+_COARSE, _FINE = (31, 25), (61, 49)  # cells of the simulation, points of the theory
 _LEFT, _RIGHT = 0.02, 1.2  # of K·G_T
 _HALVINGS = 9
 _VALUES: dict[Kind, tuple[float, float]] = {

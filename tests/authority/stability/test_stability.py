@@ -13,12 +13,14 @@ import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 from typer.testing import CliRunner
 
 from coupled.authority.stability import planes
 from coupled.authority.stability.aircraft import bob_weight
 from coupled.authority.stability.limits import gradient_range, stability_limits
 from coupled.authority.stability.linear import (
+    exponential,
     frame_map,
     growth,
     held_limit,
@@ -394,3 +396,14 @@ def test_what_cannot_be_mapped_is_one_line(
     assert says in str(ran.exception)
     assert "\n" not in str(ran.exception)
     assert files(tmp_path) == {"stiff.toml"}
+
+
+@given(
+    st.lists(st.floats(-1.0, 1.0), min_size=25, max_size=25),
+    st.floats(-3.0, 3.0),
+)
+def test_the_exponential_of_a_matrix_is_that_of_scipy(entries: list[float], decades: float) -> None:
+    matrix = np.reshape(entries, (5, 5)) * 10.0**decades - 10.0**decades * 5.0 * np.eye(5)
+    wanted = expm(matrix)
+    scale = max(1.0, 10.0**decades) * float(np.max(np.abs(wanted)))
+    assert exponential(matrix) == pytest.approx(wanted, abs=1e-11 * scale + 1e-300)
