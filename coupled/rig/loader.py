@@ -14,8 +14,6 @@ control inside its friction band does not creep.
 The hardening spring enters by its slope at the midpoint (one Newton step), which
 keeps the order. An F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the
 motion and half a substep after it (Strang's splitting), each exactly: of second order, too.
-
-m and c are those of the rig file, or go with the gradient (`inertia`).
 """
 
 from __future__ import annotations
@@ -58,7 +56,7 @@ class LoaderState(Protocol):
 
     computed: float  # δc, d
     rate: float  # δc', d/s
-    mass: float  # m as it now is, kg
+    mass: float  # m as it now is, kg: the file's, or by the gradient (`inertia`)
     damping: float  # c as it now is, N·s/d
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     delayed: float  # the pilot's force as the loader has it, N
