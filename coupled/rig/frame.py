@@ -119,17 +119,18 @@ def set_hand(
 
 
 @stage
-def _sample(p: ControlParameters, s: ControlState, left: int, begins: bool) -> None:
-    """Let the host's channels be sampled with so many substeps of the frame left."""
-    at_gauge = s.gauge.force if p.gauge.present else s.hand.force
-    sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, begins)
+def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
+    """Return the force that the loader takes for the hand's at the next node, N."""
+    if p.gauge.present:
+        force = gauge_force(p.gauge, s.gauge, force)
+    return lead_force(p.inertia, s.inertia, force) if p.inertia.rows > 0 else force
 
 
 @stage
-def _exchange(s: ControlState, due: bool) -> None:
-    """Exchange the product of this frame and the last where that is due."""
-    if due:
-        exchange_last(s.modification)
+def sample_channels(p: ControlParameters, s: ControlState, left: int, first: bool) -> None:
+    """Let the host's converters have δc and F, `left` substeps before the frame's end."""
+    at_gauge = s.gauge.force if p.gauge.present else s.hand.force
+    sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, first)
 
 
 @stage
@@ -151,15 +152,18 @@ def run_frame(
     # Asked once a frame, not at every node.
     stopped = p.reach.reach > 0.0
     scripted = only_scripted(p.hand) and not stopped
+    altered = p.gauge.present != 0 or p.inertia.rows > 0
     gauged, skewed, late = p.gauge.present != 0, p.sensing.skewed != 0, p.modification.late
     if stopped:
         set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
     last = first_node + p.clock.substeps
     if skewed:
-        _sample(p, s, p.clock.substeps, True)
-    _exchange(s, late > 0)
+        sample_channels(p, s, p.clock.substeps, True)
+    if late > 0:
+        exchange_last(s.modification)
     for node in range(first_node + 1, last + 1):
-        _exchange(s, late > 0 and node == first_node + 1 + late)
+        if late > 0 and node == first_node + 1 + late:
+            exchange_last(s.modification)
         move_muscle(p.hand, s.hand)
         # The hand's impedance acts as it stood at the last node; its script runs on.
         before = s.loader.computed
@@ -167,10 +171,8 @@ def run_frame(
         if stopped and seated(s.reach, p.linkage, before) != 0:
             acting = s.hand.asked  # of which the stop takes what it must
         ahead = acting + force[node] - force[node - 1]
-        if gauged:
-            ahead = gauge_force(p.gauge, s.gauge, ahead)
-        if p.inertia.rows > 0:
-            ahead = lead_force(p.inertia, s.inertia, ahead)
+        if altered:
+            ahead = force_given(p, s, ahead)
         ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
         move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
         position, grip = s.linkage.position, s.linkage.grip
@@ -185,8 +187,7 @@ def run_frame(
             rate = (held[node] - held[node - 1]) / h
             set_hand(p, s, force[node], held[node], rate)
         if skewed:
-            _sample(p, s, last - node, False)
-    _exchange(s, late >= p.clock.substeps)
+            sample_channels(p, s, last - node, False)
 
 
 @entry

@@ -15,8 +15,6 @@ event, but a force that depends on the way (`friction`).
 The hardening spring enters by its slope at the midpoint (one Newton step), which
 keeps the order. An F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the
 motion and half a substep after it (Strang's splitting), each exactly: of second order, too.
-
-m and c are those of the rig file, or go with the gradient (`inertia`).
 """
 
 from __future__ import annotations
@@ -59,7 +57,7 @@ class LoaderState(Protocol):
 
     computed: float  # δc, d
     rate: float  # δc', d/s
-    mass: float  # m as it now is, kg
+    mass: float  # m as it now is, kg: the file's, or by the gradient (`inertia`)
     damping: float  # c as it now is, N·s/d
     bent: float  # by how much a friction's contact has yielded, d
     external: float  # F_offset − b·(n_z − 1), N, held over the frame

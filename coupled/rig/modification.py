@@ -110,7 +110,7 @@ MODIFICATION = Declaration(
         "multiplied": _multiplied,
         "offset": lambda g: _analog(g) * g.control.loader.multiplier_offset,
         "drift": lambda g: _analog(g) * g.control.loader.multiplier_drift * g.frame_s,
-        "late": lambda g: round(g.control.sensing.gradient_skew / g.substep_s),
+        "late": lambda g: min(round(g.control.sensing.gradient_skew / g.substep_s), g.substeps - 1),
     },
     state=layout(ModificationState),
     fixed=(
