@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from coupled.rig import (
     compensation,
+    crossing,
     friction,
     hand,
     linkage,
@@ -54,6 +55,7 @@ class ControlParameters(Protocol):
     linkage: Annotated[linkage.LinkageParameters, linkage.LINKAGE]
     sensing: Annotated[sensing.SensingParameters, sensing.SENSING]
     compensation: Annotated[compensation.CompensationParameters, compensation.COMPENSATION]
+    crossing: Annotated[crossing.CrossingParameters, crossing.CROSSING]
     surface: Annotated[surface.SurfaceParameters, surface.SURFACE]
 
 
@@ -66,6 +68,7 @@ class ControlState(Protocol):
     modification: modification.ModificationState
     loader: loader.LoaderState
     linkage: linkage.LinkageState
+    crossing: crossing.CrossingState
     surface: surface.SurfaceState
 
 

@@ -13,7 +13,7 @@ from coupled.rig.compensation import estimate
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.hand import ask, hold, move_muscle, only_scripted
-from coupled.rig.linkage import deflection, move_linkage, transducer
+from coupled.rig.linkage import carry_bend, deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import ModificationState, modifying_force, set_gradients
 from coupled.rig.reach import bounds, free, seated, set_reach, stop_linkage, within_reach
@@ -71,7 +71,7 @@ def host_frame(
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
     set_gradients(p.modification, m, first, second)
     product = set_product(p, m, computed, computed_read)
-    estimated = estimate(p.compensation, computed_read, force_read)
+    estimated = estimate(p.compensation, computed_read, force_read) + s.crossing.estimated
     command = command_surface(p.surface, s.surface, estimated, pressure)
 
     out[0] = force_read
@@ -104,6 +104,49 @@ def set_hand(
 
 
 @stage
+def run_node(
+    p: ControlParameters, s: ControlState, force: Floats, held: Floats, node: int, scripted: bool
+) -> None:
+    """Run hand, loader and linkage over the substep that ends at a node.
+
+    `force` and `held` are the hand's script on the nodes of the whole flight, N and d;
+    `scripted` where it does no more than that.
+    """
+    h, stopped = p.clock.substep, p.reach.reach > 0.0
+    move_muscle(p.hand, s.hand)
+    # The hand's impedance acts as it stood at the last node; its script runs on.
+    before = s.loader.computed
+    acting = s.hand.force
+    if stopped and seated(s.reach, p.linkage, before) != 0:
+        acting = s.hand.asked  # of which the stop takes what it must
+    ahead = acting + force[node] - force[node - 1]
+    ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
+    move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
+    position, grip = s.linkage.position, s.linkage.grip
+    move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
+    if scripted:
+        s.hand.force = force[node] + s.hand.muscle
+    else:
+        if stopped:
+            stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
+        rate = (held[node] - held[node - 1]) / h
+        set_hand(p, s, force[node], held[node], rate)
+    if p.linkage.share > 0.0:
+        carry_bend(p.linkage, s.linkage, s.hand.force)
+
+
+@stage
+def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bool:
+    """Set what holds over a frame; return whether the hand does no more than its script."""
+    set_external(p.loader, s.loader, load_factor)
+    s.loader.stop = 0
+    stopped = p.reach.reach > 0.0
+    if stopped:
+        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
+    return only_scripted(p.hand) and not stopped
+
+
+@stage
 def run_frame(
     p: ControlParameters,
     s: ControlState,
@@ -116,33 +159,54 @@ def run_frame(
 
     `force` and `held` are the hand's script on the nodes of the whole flight, N and d.
     """
-    set_external(p.loader, s.loader, load_factor)
-    s.loader.stop = 0
-    h = p.clock.substep
-    # Asked once a frame, not at every node.
-    stopped = p.reach.reach > 0.0
-    scripted = only_scripted(p.hand) and not stopped
-    if stopped:
-        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
+    scripted = begin_frame(p, s, load_factor)  # asked once a frame, not at every node
     for node in range(first_node + 1, first_node + p.clock.substeps + 1):
-        move_muscle(p.hand, s.hand)
-        # The hand's impedance acts as it stood at the last node; its script runs on.
-        before = s.loader.computed
-        acting = s.hand.force
-        if stopped and seated(s.reach, p.linkage, before) != 0:
-            acting = s.hand.asked  # of which the stop takes what it must
-        ahead = acting + force[node] - force[node - 1]
-        ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
-        move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
-        position, grip = s.linkage.position, s.linkage.grip
-        move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
-        if scripted:
-            s.hand.force = force[node] + s.hand.muscle
-            continue
-        if stopped:
-            stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
-        rate = (held[node] - held[node - 1]) / h
-        set_hand(p, s, force[node], held[node], rate)
+        run_node(p, s, force, held, node, scripted)
+
+
+@stage
+def bend_by_others(controls: ControlArray, i: int) -> None:
+    """Set what the others' forces bend at control i: Σ_j K_ij·F_j."""
+    row, bent = controls[i].parameters.crossing.bends, 0.0
+    for j in range(len(controls)):
+        bent += row[j] * controls[j].state.hand.force
+    controls[i].state.linkage.others = bent
+
+
+@stage
+def read_others(controls: ControlArray, row: Floats) -> None:
+    """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row holds the noise."""
+    for j in range(len(controls)):
+        p, s = controls[j].parameters, controls[j].state
+        noise = row[1 + CHANNELS_PER_CONTROL * j]
+        s.crossing.read = read_force(p.sensing, s.hand.force, noise)
+    for i in range(len(controls)):
+        assumed, added = controls[i].parameters.crossing.assumed, 0.0
+        for j in range(len(controls)):
+            added += assumed[j] * controls[j].state.crossing.read
+        controls[i].state.crossing.estimated = added
+
+
+@stage
+def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
+    """Run all controls of one structure over frame k, node by node."""
+    substeps = controls[0].parameters.clock.substeps
+    for i in range(len(controls)):
+        begin_frame(controls[i].parameters, controls[i].state, load_factor)
+    for node in range(k * substeps + 1, (k + 1) * substeps + 1):
+        for i in range(len(controls)):
+            p, s = controls[i].parameters, controls[i].state
+            bend_by_others(controls, i)
+            run_node(
+                p,
+                s,
+                script[i, 0],
+                script[i, 1],
+                node,
+                only_scripted(p.hand) and p.reach.reach == 0.0,
+            )
+    for i in range(len(controls)):
+        bend_by_others(controls, i)
 
 
 @entry
@@ -166,27 +230,38 @@ def step_frame(
     first_command = second_command = third_command = 0.0
     row = record[k]
     pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
+    joined = controls[0].parameters.crossing.joined != 0
     # Here, not after the flight: a frame then leaves no object behind.
     for i in range(len(motion)):
         row[pressure_at + i] += motion[i]
+    if k == 0:
+        for i in range(len(controls)):
+            p, s = controls[i].parameters, controls[i].state
+            free(s.reach)
+            set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
+            start_delay(p.loader, s.loader, s.hand.force)
+            carry_bend(p.linkage, s.linkage, s.hand.force)
+    if joined:
+        for i in range(len(controls)):
+            bend_by_others(controls, i)
+        read_others(controls, row)
     for i in range(len(controls)):
         p, s = controls[i].parameters, controls[i].state
         force, held = script[i, 0], script[i, 1]
         node = k * p.clock.substeps
-        if k == 0:
-            free(s.reach)
-            set_hand(p, s, force[0], held[0], 0.0)
-            start_delay(p.loader, s.loader, s.hand.force)
         first = 1 + CHANNELS_PER_CONTROL * i
         out = row[first : first + CHANNELS_PER_CONTROL]
         command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)
-        run_frame(p, s, force, held, node, load_factor)
+        if not joined:
+            run_frame(p, s, force, held, node, load_factor)
         if i == 0:
             first_command = command
         elif i == 1:
             second_command = command
         else:
             third_command = command
+    if joined:
+        run_joined(controls, script, k, load_factor)
     return first_command, second_command, third_command
 
 
