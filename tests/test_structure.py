@@ -20,6 +20,7 @@ from coupled.record import channels
 from coupled.record.importing.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
 from coupled.rig.rig import Rig
+from coupled.rig.structure import Compliance, Structure
 from coupled.schema import Section, file_keys
 
 PACKAGE = Path(__file__).parents[1] / "coupled"
@@ -103,6 +104,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
+    sections += [Structure, Compliance]
     sections += [RunFile, PressureProfile, Wind, Gust, Turbulence, Event, Measure, Expect]
     sections += [SweepFile, Vary, Survive]
     sections += [*PILOTS.values(), LogMap, Layout, Clock, Channel]
@@ -112,7 +114,7 @@ def test_every_key_of_the_files_is_documented() -> None:
                 continue
             if key in ("gains", "calibration", "rigging", "noise", "measure"):
                 continue
-            if key in ("bench", "wind", "case", "expect", "kind", "vary"):
+            if key in ("structure", "assumed", "bench", "wind", "case", "expect", "kind", "vary"):
                 continue
             if key in ("gust", "turbulence", "event", "survive"):
                 continue

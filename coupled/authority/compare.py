@@ -194,7 +194,16 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     asked, reached = _asked_and_reached(rig, control, record, held)
     felt, specified = _felt_and_specified(rig, control, record, held)
     pressure = float(np.mean(record["dynamic_pressure_Pa"][held]))
-    point = static_point(rig, control, pressure, float(np.mean(deflection[held])))
+    others = (
+        {}
+        if rig.structure.stands_apart
+        else {
+            str(name): float(np.mean(record[channel(name, "force")][held]))
+            for name in rig.controls
+            if name != control
+        }
+    )
+    point = static_point(rig, control, pressure, float(np.mean(deflection[held])), others)
     breakout = side * rig.controls[control].loader.breakout
     return Outcome(
         manoeuvre.label,

@@ -16,8 +16,8 @@ the hand's least force instead of its greatest, and the mean of both sides is fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -49,7 +49,8 @@ NULLS = 6
 class CalibrationBench:
     """A rig on the bench, without its converters: what to hold, when, and when to read it.
 
-    `again`: ruler and scale are read a second time, after the voltmeter.
+    `again`: ruler and scale are read a second time, after the voltmeter. `crossed`: {another
+    control: the force held on it in N at each station}.
     """
 
     rig: Rig
@@ -58,6 +59,7 @@ class CalibrationBench:
     instruments: Instruments
     nulls: int = NULLS
     again: bool = True
+    crossed: Mapping[ControlName, Sequence[float]] = field(default_factory=dict)
 
 
 def take_readings(bench: CalibrationBench, seed: int) -> Readings:
@@ -69,6 +71,7 @@ def take_readings(bench: CalibrationBench, seed: int) -> Readings:
     scales = real_scales(bench.rig.controls[control])
     tools = bench.instruments
     read = _hold(rig, bench, forces, (1.0 + PAST * tools.hand) * forces, pressures, rng)
+    others = _bend_by_others(bench, read, rng)
     count, labels = len(forces), tuple(station.label for station in bench.stations)
     deflection = _reading(read[0], tools.ruler, tools.ruler_step, rng)
     force = _reading(read[1], tools.scale, tools.scale_step, rng)
@@ -83,7 +86,27 @@ def take_readings(bench: CalibrationBench, seed: int) -> Readings:
     null = _null(rig, bench, rng)
     columns = np.stack((deflection, force, v1, v3, *rise))
     null_rows = range(count + 2, count + 2 + null.shape[1])
-    return readings_of(range(2, count + 2), labels, columns, null_rows, null)
+    return readings_of(range(2, count + 2), labels, columns, null_rows, null, others)
+
+
+def _bend_by_others(
+    bench: CalibrationBench, read: Floats, rng: np.random.Generator
+) -> dict[str, Floats]:
+    """Add what the other hands' forces bend to δ at both looks; return their scales' readings.
+
+    Each other hand wanders from one look to the next, too; its scale is looked at with the first
+    scale's.
+    """
+    tools, structure = bench.instruments, bench.rig.structure
+    found = {}
+    for name, forces in bench.crossed.items():
+        held = np.array(forces, dtype=float)
+        row = structure.between([bench.control, name])[0, 1]
+        wandered = held * (1.0 + tools.hand * rng.standard_normal((3, len(held))))
+        read[0] += row * wandered[0]
+        read[5] += row * wandered[2]
+        found[str(name)] = _reading(wandered[1], tools.scale, tools.scale_step, rng)
+    return found
 
 
 def _without_converters(rig: Rig, control: ControlName) -> Rig:

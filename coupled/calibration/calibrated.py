@@ -65,7 +65,13 @@ def with_calibration(
         changes["calibration.s2_error_V_per_N"] = _error(s2)
     if hardware:
         changes[f"loader.bend_{d}_per_N"] = used
-    return rig.changed({f"{place}.{key}": value for key, value in changes.items()})
+    whole = {f"{place}.{key}": value for key, value in changes.items()}
+    for name, estimate in found.fit.others.items():
+        key = f"{control}_by_{name}_{d}_per_N"
+        whole[f"structure.assumed.{key}"] = estimate.value
+        if hardware:
+            whole[f"structure.{key}"] = estimate.value
+    return rig.changed(whole)
 
 
 def _error(figure: Estimate) -> float:

@@ -24,7 +24,6 @@ from coupled.parallel import executor
 from coupled.rig.parameters import Control
 
 Progress = Callable[[str, int, int], None]
-FIGURES = ("K", "S1", "S3", "S2")
 NEAR = 0.05
 _BLOCK = 25
 
@@ -60,7 +59,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class Trial:
-    """One bench, fitted, against the truth; figures K, S1, S3 and S2 by name.
+    """One bench, fitted, against the truth; K, S1, S3 and S2 by name, and K by others' forces.
 
     `held` whether each figure's interval holds the truth, None where it was not found;
     `bend_off` and `ordinary_off` K's relative errors; `deflection_off` and `felt_off` how far
@@ -100,7 +99,7 @@ def measure_coverage(
     felt = np.array([trial.felt_off for trial in trials]) <= FELT_WITHIN
     return Coverage(
         benches,
-        {figure: _share(trial.held[figure] for trial in trials) for figure in FIGURES},
+        {figure: _share(trial.held[figure] for trial in trials) for figure in trials[0].held},
         float(np.mean(np.abs(bend) <= NEAR)),
         float(np.mean(bend)),
         float(np.std(bend)),
@@ -130,12 +129,16 @@ def _trial(bench: CalibrationBench, seed: int) -> Trial:
     found = calibrate_control(readings, data, bench.control, bench.instruments, f"bench {seed}")
     true, bend = real_scales(data), data.loader.bend
     s2, plain = found.s2_chosen, found.plain.bend
+    others = list(found.fit.others)
+    row = bench.rig.structure.between([bench.control, *others])[0, 1:]
+    terms = dict(zip(others, row, strict=True))
     return Trial(
         {
             "K": found.line.bend.holds(bend),
             "S1": found.line.s1.holds(true.s1),
             "S3": found.s3.holds(true.s3),
             "S2": None if s2 is None else s2.holds(true.s2),
+            **{f"K by {name}": one.holds(terms[name]) for name, one in found.fit.others.items()},
         },
         found.line.bend.value / bend - 1.0,
         plain.value / bend - 1.0,

@@ -11,10 +11,14 @@ by Gauss-Newton; the derivative of r by (a, b, S₃) is made of the reading's ow
 (δ̂, F̂), the best guess of what was true. Ordinary least squares has the measured ones
 there instead, whence its bias. Only the ratios of the variances matter for the figures;
 their errors come from the residuals.
+
+Where forces are held on other controls of the same structure, each is one more true value to
+adjust and one more figure: r₁ = v₁ − a·δ − b·F − Σ_j c_j·F_j, and K_j = −c_j/a.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,16 +36,21 @@ FINEST = 1e-6  # of the largest voltage: no meter is better, and W stays regular
 
 @dataclass(frozen=True)
 class JointFit:
-    """S₁ and K (`line`) and S₃ in V/N, found together; `errors` are those of (a, b, S₃)."""
+    """S₁ and K (`line`) and S₃ in V/N, found together; `errors` are those of (a, b, S₃, c…).
+
+    `others`: {another control: K_j in d/N that a force on it bends here}.
+    """
 
     line: LineFit
     s3: Estimate
     errors: Sandwich
+    others: Mapping[str, Estimate]
 
     def estimate(self, value: float, by_s1: float, by_bend: float, by_s3: float) -> Estimate:
         """Return a figure made of S₁, K and S₃, whose derivatives by them are given."""
         a, b = self.line.s1.value, -self.line.bend.value * self.line.s1.value
-        slope = np.array([by_s1 + by_bend * b / a**2, -by_bend / a, by_s3])
+        slope = np.zeros(len(self.errors.back))
+        slope[:3] = by_s1 + by_bend * b / a**2, -by_bend / a, by_s3
         return self.errors.estimate(value, slope)
 
     @property
@@ -49,7 +58,7 @@ class JointFit:
         """The correlation of the errors of S₁, K and S₃, shape (3, 3); 0 where there are none."""
         a, b = self.line.s1.value, -self.line.bend.value * self.line.s1.value
         slopes = np.array([[1.0, 0.0, 0.0], [b / a**2, -1.0 / a, 0.0], [0.0, 0.0, 1.0]])
-        found = slopes @ self.errors.covariance @ slopes.T
+        found = slopes @ self.errors.covariance[:3, :3] @ slopes.T
         error = np.sqrt(np.diag(found))
         size = np.outer(error, error)
         return np.asarray(np.divide(found, size, out=np.eye(3), where=size > 0.0))
@@ -61,33 +70,48 @@ def errors_in_variables(readings: Readings, instruments: Instruments) -> JointFi
     Raises FloatingPointError where it does not settle.
     """
     force, v3 = readings.force, readings.v3
-    a, b = solve(np.column_stack((readings.deflection, force)), readings.v1)
-    figures = np.array([a, b, force @ v3 / (force @ force)])
+    columns = np.column_stack((readings.deflection, force, readings.others))
+    a, b, *c = solve(columns, readings.v1)
+    figures = np.array([a, b, force @ v3 / (force @ force), *c])
     for _ in range(MOST_STEPS):
         design, whitened = _whitened(figures, readings, instruments)
-        step = solve(design.reshape(-1, 3), whitened.ravel())
+        step = solve(design.reshape(-1, len(figures)), whitened.ravel())
         figures = figures + step
-        if np.all(np.abs(step) <= 1e-12 * np.abs(figures)):
+        if np.all(np.abs(step) <= _settled(figures, columns)):
             break
     else:
         raise FloatingPointError
-    a, b, s3 = (float(figure) for figure in figures)
+    a, b, s3, *c = (float(figure) for figure in figures)
     errors = sandwich(*_whitened(figures, readings, instruments))
-    residual = readings.v1 - a * readings.deflection - b * force
-    line = line_fit(a, b, errors, residual, error_variance(a, b, readings, instruments))
-    return JointFit(line, errors.estimate(s3, np.array([0.0, 0.0, 1.0])), errors)
+    residual = readings.v1 - columns @ np.array([a, b, *c])
+    line = line_fit(a, b, errors, residual, error_variance(a, b, readings, instruments, c))
+    unit = np.eye(len(figures))
+    others = {
+        name: errors.estimate(-at / a, (at / a * unit[0] - unit[3 + j]) / a)
+        for j, (name, at) in enumerate(zip(readings.other_names, c, strict=True))
+    }
+    return JointFit(line, errors.estimate(s3, unit[2]), errors, others)
+
+
+def _settled(figures: Floats, columns: Floats) -> Floats:
+    """Return the steps of the figures too small to matter; a c may truly be nought."""
+    least = 1e-12 * np.abs(figures)
+    size = np.max(np.abs(columns), axis=0, initial=1e-300)
+    least[3:] = np.maximum(least[3:], 1e-12 * abs(figures[0]) * size[0] / size[2:])
+    return np.asarray(least)
 
 
 def _whitened(
     figures: Floats, readings: Readings, instruments: Instruments
 ) -> tuple[Floats, Floats]:
-    """Return the whitened derivatives of r by (a, b, S₃), shape (n, 2, 3), and r, (n, 2)."""
-    a, b, s3 = figures
-    seen = np.column_stack((readings.deflection, readings.force))
+    """Return the whitened derivatives of r by (a, b, S₃, c…), shape (n, 2, p), and r, (n, 2)."""
+    a, b, s3, *c = figures
+    seen = np.column_stack((readings.deflection, readings.force, readings.others))
     volts = np.column_stack((readings.v1, readings.v3))
-    jacobian = np.array([[a, b], [0.0, s3]])
+    jacobian = np.array([[a, b, *c], [0.0, s3, *(0.0 for _ in c)]])
     own = reading_variances(readings, instruments)
-    carried = jacobian[None] * own[:, None, :2]
+    looked = np.column_stack((own[:, :2], instruments.force_variance(readings.others)))
+    carried = jacobian[None] * looked[:, None, :]
     root = np.linalg.cholesky(carried @ jacobian.T + own[:, 2:, None] * np.eye(2))
     residual = volts - seen @ jacobian.T
     whitened = np.linalg.solve(root, residual[:, :, None])
@@ -97,10 +121,11 @@ def _whitened(
 
 
 def _design(root: Floats, true: Floats) -> Floats:
-    """Return the derivatives of (v₁, v₃) by (a, b, S₃) at (δ, F), over the root of W."""
-    design = np.zeros((len(true), 2, 3))
-    design[:, 0, :2] = true
+    """Return the derivatives of (v₁, v₃) by (a, b, S₃, c…) at (δ, F, F_j…), over W's root."""
+    design = np.zeros((len(true), 2, 1 + true.shape[1]))
+    design[:, 0, :2] = true[:, :2]
     design[:, 1, 2] = true[:, 1]
+    design[:, 0, 3:] = true[:, 2:]
     return np.asarray(np.linalg.solve(root, design))
 
 
@@ -118,7 +143,7 @@ def reading_variances(readings: Readings, instruments: Instruments) -> Floats:
 
 
 def expected_design(
-    readings: Readings, instruments: Instruments, figures: tuple[float, float, float]
+    readings: Readings, instruments: Instruments, figures: Sequence[float]
 ) -> Floats:
-    """Return the whitened derivatives, shape (n, 2, 3), at readings that are true: for a plan."""
+    """Return the whitened derivatives, shape (n, 2, p), at readings that are true: for a plan."""
     return _whitened(np.array(figures), readings, instruments)[0]

@@ -2,10 +2,14 @@
 
 Ordinary least squares by the printed normal equations and by a QR factorisation of
 scaled columns. It takes δ and F as exact, which they are not: see errors_in_variables.
+Forces held on other controls of the same structure are further columns,
+
+    v₁ = S₁·(δ − K·F − Σ_j K_j·F_j) = a·δ + b·F + Σ_j c_j·F_j,    K_j = −c_j/a
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,17 +61,24 @@ def condition(deflection: Floats, force: Floats) -> float:
 def ordinary(readings: Readings, instruments: Instruments) -> LineFit:
     """Return the ordinary least-squares fit; its standard errors come from its residuals."""
     deflection, force, v1 = readings.deflection, readings.force, readings.v1
-    design = np.column_stack((deflection, force))
-    a, b = solve(design, v1)
-    residual = v1 - design @ np.array([a, b])
+    design = np.column_stack((deflection, force, readings.others))
+    found = solve(design, v1)
+    residual = v1 - design @ found
     errors = sandwich(design[:, None, :], residual[:, None])
-    return line_fit(a, b, errors, residual, error_variance(a, b, readings, instruments))
+    a, b, *c = (float(figure) for figure in found)
+    return line_fit(a, b, errors, residual, error_variance(a, b, readings, instruments, c))
 
 
-def error_variance(a: float, b: float, readings: Readings, instruments: Instruments) -> Floats:
-    """Return the variance of a·δ + b·F − v₁ that the instruments give each reading, V²."""
+def error_variance(
+    a: float, b: float, readings: Readings, instruments: Instruments, c: Sequence[float] = ()
+) -> Floats:
+    """Return the variance of a·δ + b·F + Σ c·F_j − v₁ that the instruments give a reading, V²."""
+    crossed = 0.0
+    if len(c):
+        crossed = instruments.force_variance(readings.others) @ np.square(np.array(c))
     return np.asarray(
-        a**2 * instruments.deflection_variance(readings.deflection, readings.deflection_looks)
+        crossed
+        + a**2 * instruments.deflection_variance(readings.deflection, readings.deflection_looks)
         + b**2 * instruments.force_variance(readings.force, readings.force_looks)
         + instruments.voltage_variance(readings.v1)
     )

@@ -21,7 +21,7 @@ from coupled.calibration.checks import swing_of
 from coupled.calibration.specification import specified_rig
 from coupled.calibration.sweeps import feel_pressures, release
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.equations import specified_gradient
+from coupled.rig.equations import specified_gradient, total_to_computed
 from coupled.rig.rig import Rig
 
 Row = tuple[float, float, float]  # G_T in N/d, the factor on m and c, T in s
@@ -64,7 +64,7 @@ def estimated_lead(mass: float, gradient: float, share: float) -> float:
 def _row(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Row:
     data = rig.controls[control]
     gradient = float(specified_gradient(data.schedule, pressure))
-    factor = 1.0 / (1.0 - data.compensation.bend * gradient)
+    factor = total_to_computed(gradient, data.compensation.bend) / gradient
     wanted = swing_of(release(specified, control, pressure, 1.0))
     if not wanted.peaks.size:
         return gradient, factor, 0.0

@@ -23,7 +23,7 @@ from coupled.calibration.estimate import Estimate, Instruments
 from coupled.calibration.readings import readings_of
 from coupled.calibration.sandwich import sandwich
 from coupled.errors import InputError
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import ControlName
 from coupled.rig.equations import bend_loss, specified_gradient, volts, volts_of_computed
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
@@ -276,17 +276,3 @@ def _deflection_half_width(rig: Rig, control: ControlName, rows: Floats, bend: f
         found = Estimate(1.0, float(np.sqrt(variance)), errors.freedom(slope))
         widths.append(found.half_width)
     return max(widths)
-
-
-def form(chosen: Sequence[tuple[Station, int]], control: str, looks: int = 2) -> str:
-    """Return a plan as a CSV to be filled in: where to hold, and empty cells to write into."""
-    unit = unit_of(control)
-    heads = [f"gradient_set,deflection_{unit},force_N,v1_V,v3_V"]
-    heads += [f"force_after_N,deflection_after_{unit}"] if looks == 2 else []
-    lines = [",".join([*heads, "v2_V,approach,remark"])]
-    empty = "," * (7 + 2 * (looks == 2))
-    for station, count in chosen:
-        where = f"hold at {station.deflection:.4g} {unit} and about {station.force:.3g} N"
-        where += f" with {station.pressure_Pa:.5g} Pa given to the host"
-        lines += [f"{station.label}{empty}{where}"] * count
-    return "\n".join(lines) + "\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,8 @@ class Readings:
     are means where ruler and scale were read again after the meter; `…_rise` is by how much
     the second look was more than the first, NaN where there was one. `null_…` are the rows of
     the null: v1 and v3 are as noted with v2 = 0, v2 what brought v1 back, `null_side` +1 where
-    it was approached outward, −1 inward.
+    it was approached outward, −1 inward. `others` are the forces held on other controls of the
+    same structure meanwhile, N, shape (readings, len(`other_names`)), each looked at once.
     """
 
     row: NDArray[np.int64]
@@ -35,6 +36,8 @@ class Readings:
     null_v2: Floats
     null_v3: Floats
     null_side: Floats
+    other_names: tuple[str, ...]
+    others: Floats
 
     @property
     def deflection_looks(self) -> Floats:
@@ -52,10 +55,10 @@ class Readings:
         kept = {
             name: values[null if name.startswith("null_") else keep]
             for name, values in self.__dict__.items()
-            if name != "label"
+            if name not in ("label", "other_names")
         }
         label = tuple(name for name, ours in zip(self.label, keep, strict=True) if ours)
-        return Readings(label=label, **kept)
+        return Readings(label=label, other_names=self.other_names, **kept)
 
 
 def readings_of(
@@ -64,12 +67,14 @@ def readings_of(
     columns: Floats,
     null_rows: Sequence[int],
     null: Floats,
+    others: Mapping[str, Floats] | None = None,
 ) -> Readings:
     """Return readings from their columns in SI.
 
     `columns`: δ, F, v₁, v₃ and both rises, shape (6, readings); `null`: v₁, v₂, v₃ and the
-    side, shape (4, nulls).
+    side, shape (4, nulls). `others`: {another control: the force held on it in N}.
     """
+    held = others or {}
     deflection, force, v1, v3, deflection_rise, force_rise = columns
     null_v1, null_v2, null_v3, null_side = null
     return Readings(
@@ -86,4 +91,6 @@ def readings_of(
         null_v2=null_v2,
         null_v3=null_v3,
         null_side=null_side,
+        other_names=tuple(held),
+        others=np.array(list(held.values()), float).reshape(len(held), len(rows)).T,
     )

@@ -5,7 +5,9 @@
 A ruler and a scale that were read again after the voltmeter have deflection_after_… and
 force_after_… as well; their means count. A row with v2_V was noted without the multiplier;
 v2 is the supply's voltage that then brought v1 back, `approach` the side it was approached
-from: out, or in, after going further. Its deflection and force may be left empty. Rows are
+from: out, or in, after going further. Its deflection and force may be left empty. Forces held
+on other controls of the same structure are further columns, force_on_wheel_N and the like, 0
+where nobody held it. Rows are
 numbered as a text editor does, the heads being row 1.
 """
 
@@ -15,6 +17,7 @@ import csv
 import io
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,7 @@ from numpy.typing import NDArray
 from coupled.calibration.readings import Readings, readings_of
 from coupled.errors import InputError, nearest
 from coupled.files import read_text, write_text
+from coupled.record.channels import CONTROL_NAMES
 from coupled.schema import LARGEST, SMALLEST
 from coupled.units import POUND_N, DEGREE_rad, INCH_m
 
@@ -33,6 +37,7 @@ LABEL, APPROACH, REMARK = "gradient_set", "approach", "remark"
 SIDES = {"out": 1.0, "in": -1.0}
 LENGTHS = {"deflection_m": 1.0, "deflection_mm": 1e-3, "deflection_in": INCH_m}
 ANGLES = {"deflection_rad": 1.0, "deflection_deg": DEGREE_rad}
+ON = "on "  # before the name of another control that a force is held on
 FORCES = {"force_N": 1.0, "force_lb": POUND_N}
 
 
@@ -78,6 +83,10 @@ def _units(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, f
     ours, other = (ANGLES, LENGTHS) if control == "wheel" else (LENGTHS, ANGLES)
     known = [LABEL, APPROACH, REMARK, *ours, *FORCES, "v1_V", "v2_V", "v3_V"]
     known += [_after(head) for head in [*ours, *FORCES]]
+    crossed = {
+        _on(name, head): name for name in CONTROL_NAMES if name != control for head in FORCES
+    }
+    known += crossed
     for head in heads:
         if heads.count(head) > 1:
             raise InputError(path, f"row 1: {head}", "duplicate column")
@@ -111,8 +120,23 @@ def _units(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, f
     if control != "wheel" and inches != pounds:
         problem = f"mixes units: {found['deflection'][0]} with {found['force'][0]}"
         raise InputError(path, "row 1", f"{problem}; give inches and pounds, or metres and newtons")
+    found |= _crossed(path, heads, crossed)
     if "v2_V" in heads:
         found["v2"] = ("v2_V", 1.0)
+    return found
+
+
+def _crossed(
+    path: Path, heads: list[str], crossed: Mapping[str, str]
+) -> dict[str, tuple[str, float]]:
+    """Return {quantity: (column, factor to SI)} of the forces on other controls."""
+    found: dict[str, tuple[str, float]] = {}
+    for head in [head for head in heads if head in crossed]:
+        quantity = f"{ON}{crossed[head]}"
+        if quantity in found:
+            problem = f"mixes units: {found[quantity][0]} and {head}; give one of them"
+            raise InputError(path, "row 1", problem)
+        found[quantity] = (head, FORCES[head.replace(f"_on_{crossed[head]}", "")])
     return found
 
 
@@ -121,16 +145,22 @@ def _after(column: str) -> str:
     return column.replace("_", "_after_", 1)
 
 
+def _on(control: str, column: str) -> str:
+    """Return the column of a force on another control."""
+    return column.replace("force", f"force_on_{control}")
+
+
 def _assembled(
     path: Path, rows: list[tuple[int, dict[str, str]]], units: dict[str, tuple[str, float]]
 ) -> Readings:
     taken: list[tuple[int, str, tuple[float, ...]]] = []
+    others = [quantity for quantity in units if quantity.startswith(ON)]
     nulls: list[tuple[int, tuple[float, ...]]] = []
     seen: dict[tuple[str, ...], int] = {}
     for number, cells in rows:
         null = "v2" in units and cells["v2_V"] != ""
         may_lack = {"v2", "deflection after", "force after"}
-        may_lack |= {"deflection", "force"} if null else set()
+        may_lack |= {"deflection", "force", *others} if null else set()
         value = {
             quantity: _number(path, number, column, cells[column]) * factor
             for quantity, (column, factor) in units.items()
@@ -152,15 +182,19 @@ def _assembled(
             means = [_mean(value, quantity) for quantity in ("deflection", "force")]
             (delta, rise), (force, force_rise) = means
             six = (delta, force, value["v1"], value["v3"], rise, force_rise)
-            taken.append((number, cells[LABEL], six))
+            held = tuple(value.get(quantity, 0.0) for quantity in others)
+            taken.append((number, cells[LABEL], six + held))
         elif any(quantity.split()[0] in ("deflection", "force") for quantity in value):
             raise InputError(path, f"row {number}", "has a deflection or a force without the other")
+    columns = np.array([one for *_, one in taken], float).reshape(-1, 6 + len(others)).T
+    crossed = {quantity[len(ON) :]: columns[6 + k] for k, quantity in enumerate(others)}
     return readings_of(
         [number for number, *_ in taken],
         [label for _, label, _ in taken],
-        np.array([six for *_, six in taken], float).reshape(-1, 6).T,
+        columns[:6],
         [number for number, _ in nulls],
         np.array([four for _, four in nulls], float).reshape(-1, 4).T,
+        crossed,
     )
 
 
@@ -203,6 +237,7 @@ def write_readings(path: Path, readings: Readings, control: str, inches: bool = 
     twice = not np.all(np.isnan(readings.deflection_rise))
     heads = [LABEL, *columns, "v1_V", "v3_V"]
     heads += [_after(columns[1]), _after(columns[0])] if twice else []
+    heads += [_on(name, columns[1]) for name in readings.other_names]
     lines = [",".join([*heads, "v2_V", APPROACH])]
     half = [np.nan_to_num(0.5 * rise) for rise in (readings.deflection_rise, readings.force_rise)]
     numbers = [
@@ -213,9 +248,10 @@ def write_readings(path: Path, readings: Readings, control: str, inches: bool = 
     ]
     if twice:
         numbers += [(readings.force + half[1]) / two, (readings.deflection + half[0]) / one]
+    numbers += [readings.others[:, k] / two for k in range(len(readings.other_names))]
     for label, *row in zip(readings.label, *numbers, strict=True):
         lines.append(",".join([label, *(_shown(x) for x in row), "", ""]))
-    gap = ",," if twice else ""
+    gap = (",," if twice else "") + "," * len(readings.other_names)
     words = {side: word for word, side in SIDES.items()}
     null = (readings.null_v3, readings.null_v2, readings.null_v1, readings.null_side)
     for v3, v2, v1, side in zip(*null, strict=True):

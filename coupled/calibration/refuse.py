@@ -14,6 +14,8 @@ from coupled.record.channels import unit_of
 from coupled.rig.parameters import Control
 
 FEWEST = 4  # a line of two unknowns, and something left to tell their errors by
+FEWEST_CROSSED = 2  # readings with a force on another control
+INSEPARABLE = 1e3  # condition of δ, F and the forces on others, each scaled
 FAR = 0.1  # of the largest: what lies nearer to neutral may have any sign
 BEYOND_TRAVEL = 1.5  # that much more travel than there is, and the unit is wrong
 SURELY = 0.999  # how sure it must be that the gradients differ
@@ -38,6 +40,7 @@ def refuse_poor(
             problem = f"every {quantity} is the same; S1 and K need readings that differ"
             raise InputError(file, rows, problem)
     _refuse_signs(readings, control, name, file)
+    _refuse_others(readings, file)
     if len(set(readings.label)) == 1:
         why = f"all readings are of one gradient set, {readings.label[0]!r}"
     elif not _gradients_differ(readings, instruments):
@@ -50,6 +53,22 @@ def refuse_poor(
         f"{why}: with one gradient v1 = (S1 - S1*K*G)*deflection, and S1 and K are inseparable"
     )
     raise InputError(file, rows, f"{problem}; {separating}")
+
+
+def _refuse_others(readings: Readings, file: Path | str) -> None:
+    """Refuse forces on other controls that were never held, or only with this one's own."""
+    for name, held in zip(readings.other_names, readings.others.T, strict=True):
+        if np.count_nonzero(held) < FEWEST_CROSSED:
+            problem = f"is not 0 in {np.count_nonzero(held)} rows; {FEWEST_CROSSED} at least"
+            raise InputError(file, f"force_on_{name}", f"{problem}, or leave the column out")
+    if not readings.other_names:
+        return
+    columns = np.column_stack((readings.deflection, readings.force, readings.others))
+    if np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) > INSEPARABLE:
+        names = " and ".join(readings.other_names)
+        problem = f"the forces on {names} go with this control's own, or with one another"
+        wanted = "hold them with either sign at one force on this control"
+        raise InputError(file, f"force_on_{readings.other_names[0]}", f"{problem}; {wanted}")
 
 
 def _refuse_signs(readings: Readings, control: Control, name: str, file: Path | str) -> None:

@@ -89,6 +89,11 @@ class CalibrationResult:
         a, b = self.printed
         table["normal_equations"] = {f"a_V_per_{d}": a, "b_V_per_N": b}
         table["condition"] = self.condition
+        if self.fit.others:
+            table["bend_by_others"] = {
+                f"{self.control}_by_{name}_{d}_per_N": one.as_dict()
+                for name, one in self.fit.others.items()
+            }
         table["s3_V_per_N"] = {
             "eq_13": self.s3_mean.as_dict(),
             "errors_in_variables": self.s3.as_dict(),

@@ -7,6 +7,7 @@ the same way: a force with swapped digits shows there and hardly in v₁.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,6 +21,7 @@ from coupled.calibration.readings import Readings
 Floats = NDArray[np.float64]
 FEWEST = 5  # readings below which no reading can be called far off
 MOST_PAIRS = 400
+MANY_SETS = 2000  # drawn where there are more figures than two
 LEAST_TURN = 0.3  # of the greatest angle between two readings' (δ, F)
 BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
 TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
@@ -66,9 +68,12 @@ def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]
     return suspects
 
 
-def robust_line(deflection: Floats, force: Floats, v1: Floats, spread: Floats) -> Floats:
-    """Return (a, b) by the biweight; `spread` are the readings' relative standard deviations."""
-    design = np.column_stack((deflection, force)) / spread[:, None]
+def robust_line(columns: Sequence[Floats], v1: Floats, spread: Floats) -> Floats:
+    """Return (a, b, c…) by the biweight for δ, F and the forces on other controls.
+
+    `spread` are the readings' relative standard deviations.
+    """
+    design = np.column_stack(columns) / spread[:, None]
     target = v1 / spread
     beta, scale = _most_agreed(design, target)
     for _ in range(50):
@@ -89,6 +94,8 @@ def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
     Only readings of gradients well apart make a line: two of one gradient would fit all of
     that gradient whatever the others are. The scale is that of the least median residual.
     """
+    if design.shape[1] > 2:
+        return _of_all(design, target)
     pairs = np.array(list(combinations(range(len(target)), 2)))
     unit = design / np.linalg.norm(design, axis=0)
     one, two = unit[pairs[:, 0]], unit[pairs[:, 1]]
@@ -97,7 +104,22 @@ def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
     pairs = pairs[turn >= LEAST_TURN * turn.max()]
     if len(pairs) > MOST_PAIRS:
         pairs = np.random.default_rng(0).choice(pairs, MOST_PAIRS, replace=False)
-    betas = np.linalg.solve(design[pairs], target[pairs][:, :, None])[:, :, 0]
+    return _best_of(design, target, pairs)
+
+
+def _of_all(design: Floats, target: Floats) -> tuple[Floats, float]:
+    """Do the same with as many readings at a time as there are figures, drawn by chance."""
+    rows, figures = design.shape
+    rng = np.random.default_rng(0)
+    sets = np.array([rng.choice(rows, figures, replace=False) for _ in range(MANY_SETS)])
+    unit = design / np.linalg.norm(design, axis=0)
+    size = np.abs(np.linalg.det(unit[sets]))
+    return _best_of(design, target, sets[size >= LEAST_TURN * size.max()])
+
+
+def _best_of(design: Floats, target: Floats, sets: NDArray[np.int64]) -> tuple[Floats, float]:
+    """Return which of these sets' lines most readings agree with, and their scale."""
+    betas = np.linalg.solve(design[sets], target[sets][:, :, None])[:, :, 0]
     residuals = np.abs(target - betas @ design.T)
     floor = 1e-12 * float(np.max(np.abs(target)))
     scale = _scale(residuals[np.argmin(np.median(residuals, axis=1))]) + floor
@@ -113,12 +135,13 @@ def _scale(residual: Floats) -> float:
 
 def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
     """Return how many deviations each v₁ is off the robust line."""
-    d, f, v = readings.deflection, readings.force, readings.v1
-    a, b = robust_line(d, f, v, np.ones_like(v))
-    spread = np.sqrt(error_variance(a, b, readings, instruments))
+    columns = (readings.deflection, readings.force, *readings.others.T)
+    v = readings.v1
+    a, b, *c = robust_line(columns, v, np.ones_like(v))
+    spread = np.sqrt(error_variance(float(a), float(b), readings, instruments, c))
     spread = np.maximum(spread, SLIP * np.max(np.abs(v)))
-    a, b = robust_line(d, f, v, spread)
-    return _deviations((v - a * d - b * f) / spread)
+    found = robust_line(columns, v, spread)
+    return _deviations((v - sum(x * one for x, one in zip(found, columns, strict=True))) / spread)
 
 
 def _off_the_ratio(

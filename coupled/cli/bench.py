@@ -12,6 +12,7 @@ from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
+    CrossedOption,
     ErrorOption,
     OnceOption,
     RigOption,
@@ -40,6 +41,7 @@ def bench(
     deflections: Annotated[int, typer.Option(help="Readings in each.", min=1, max=60)] = 5,
     nulls: Annotated[int, typer.Option(help="Nulls for S2.", min=0, max=50)] = 6,
     once: OnceOption = False,
+    crossed: CrossedOption = 0.0,
     precision: Annotated[
         float | None,
         typer.Option(
@@ -65,6 +67,7 @@ def bench(
 ) -> None:
     """Take readings at a simulated rig, as a person with ruler, scale and voltmeter does."""
     from coupled.calibration.bench import CalibrationBench, take_readings
+    from coupled.calibration.crossed import crossed_forces
     from coupled.calibration.estimate import perfect_instruments
     from coupled.calibration.plan import fewest, stations
     from coupled.calibration.readingsfile import write_readings
@@ -82,9 +85,9 @@ def bench(
     if precision is not None:
         planned = fewest(data, name, tools, precision / 100.0, strongest, 1 if once else 2)
         grid = [station for station, count in planned for _ in range(count)]
-    made = CalibrationBench(
-        data, name, grid, perfect_instruments() if perfect else tools, nulls, not once
-    )
+    tools = perfect_instruments() if perfect else tools
+    others = crossed_forces(data, name, len(grid), crossed)
+    made = CalibrationBench(data, name, grid, tools, nulls, not once, others)
     if repeat:
         _repeat(made, repeat, seed, json_file)
         return

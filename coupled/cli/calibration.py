@@ -12,6 +12,7 @@ from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
+    CrossedOption,
     ErrorOption,
     OnceOption,
     RigOption,
@@ -23,7 +24,7 @@ from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
-from coupled.record.channels import ControlName
+from coupled.record.channels import ControlName, unit_of
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Instruments
@@ -54,6 +55,7 @@ def calibrate(
     ] = 5.0,
     strongest: StrongestOption = 150.0,
     once: OnceOption = False,
+    crossed: CrossedOption = 0.0,
     figure: Annotated[
         Path | None, typer.Option(help="Draw readings and fit (figure 4): PNG, PDF or SVG.")
     ] = None,
@@ -66,7 +68,7 @@ def calibrate(
     if plan:
         if readings is not None or figure is not None:
             raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
-        wanted = (precision / 100.0, strongest, 1 if once else 2)
+        wanted = (precision / 100.0, strongest, 1 if once else 2, crossed)
         _plan((file, data, name), tools, wanted, (write, json_file))
         return
     if readings is None:
@@ -128,14 +130,16 @@ def _calibrate(
 def _plan(
     of_rig: tuple[Path, Rig, ControlName],
     tools: Instruments,
-    wanted: tuple[float, float, int],
+    wanted: tuple[float, float, int, float],
     targets: tuple[Path | None, str],
 ) -> None:
-    from coupled.calibration.plan import deflection_needs, fewest, form, precision, stations
+    from coupled.calibration.crossed import crossed_forces, crossed_precision
+    from coupled.calibration.form import form
+    from coupled.calibration.plan import deflection_needs, fewest, precision, stations
     from coupled.cli.tables.calibration import print_plan
 
     (file, rig, control), (write, json_file) = of_rig, targets
-    share, strongest, looks = wanted
+    share, strongest, looks, crossed = wanted
     if write is not None:
         if write.suffix.lower() != ".csv":
             raise InputError(write, "--write", "a form for readings ends in .csv")
@@ -150,7 +154,9 @@ def _plan(
     design = [s for s, count in chosen for _ in range(count)]
     reached = precision(rig, control, design, tools, looks)
     needs = deflection_needs(rig, control, design, tools, looks)
-    table = {
+    held = crossed_forces(rig, control, len(design), crossed)
+    terms = crossed_precision(rig, control, design, crossed, tools, looks) if held else {}
+    table: dict[str, object] = {
         "half_width": reached.half_width,
         "bend": reached.bend,
         "deflection": asdict(needs),
@@ -160,13 +166,18 @@ def _plan(
             for (few, many), grid in grids.items()
         ],
     }
+    if held:
+        table["bend_by_others_half_width"] = terms
     with Outputs() as outputs:
         if write is not None:
-            write_text(outputs.at(write), form(chosen, control, looks))
+            write_text(outputs.at(write), form(chosen, control, looks, held))
         keep_json(table, json_file, outputs)
     needs = deflection_needs(rig, control, design, tools, looks)
     if json_file != "-":
         print_plan(out, control, grids, chosen, reached, needs)
+        for name, half in terms.items():
+            d = unit_of(control)
+            say(f"with ±{crossed:g} N on the {name}: K by {name} to ±{half:.2g} {d}/N")
         if write is not None:
             say(f"form: {write}")
     print_json(table, json_file)

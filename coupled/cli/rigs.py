@@ -38,6 +38,12 @@ StrongestOption = Annotated[
 ]
 
 
+CrossedOption = Annotated[
+    float,
+    typer.Option("--crossed-N", help="Held with either sign on each other control, N.", min=0),
+]
+
+
 OnceOption = Annotated[
     bool,
     typer.Option("--once", help="Ruler and scale read once, not again after the voltmeter."),

@@ -21,6 +21,7 @@ from coupled.record.channels import ControlName, record_channels, unit_of
 from coupled.rig.equations import bend_loss, felt_gradient
 from coupled.rig.parameters import PLAIN_NAME, Control
 from coupled.rig.rig import Rig
+from coupled.rig.structure import Structure
 from coupled.schema import Given, Section, build, quantity
 
 Configuration = Literal[
@@ -221,8 +222,8 @@ class Manoeuvre:
 def configure(rig: Rig, configuration: Configuration) -> Rig:
     """Return the rig with its structure rigid, or bending with the named corrections on.
 
-    Rigid: K = 0 and the host's K̂ = 0. Otherwise the rig's own K and K̂. "calibrated low" is the
-    uncompensated rig whose host found S₁ at a low gradient, eq. (7a).
+    Rigid: K = 0 and the host's K̂ = 0, between controls too. Otherwise the rig's own K and K̂.
+    "calibrated low" is the uncompensated rig whose host found S₁ at a low gradient, eq. (7a).
     """
     changes: dict[str, Any] = {}
     for name, control in rig.controls.items():
@@ -230,6 +231,7 @@ def configure(rig: Rig, configuration: Configuration) -> Rig:
         if configuration == "rigid":
             d = unit_of(name)
             changes |= {f"{loader}.bend_{d}_per_N": 0.0, f"{host}.bend_{d}_per_N": 0.0}
+            changes |= {f"{loader}.bend_push_{d}_per_N": None, "structure": Structure()}
         changes[f"{host}.deflection"] = configuration in ("deflection only", "compensated")
         changes[f"{host}.gradient"] = configuration in ("gradient only", "compensated")
         if configuration == "calibrated low":

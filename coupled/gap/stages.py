@@ -69,6 +69,13 @@ class Reader:
         """Return a control's channel."""
         return self.record[channel(self.control, quantity)]
 
+    def others(self) -> dict[str, Floats]:
+        """Return the forces in N on other controls of a common structure, where recorded."""
+        if self.rig.structure.stands_apart:
+            return {}
+        held = {str(n): channel(n, "force") for n in self.rig.controls if n != self.control}
+        return {name: self.record[force] for name, force in held.items() if force in self.record}
+
     def missing(self) -> dict[str, list[str]]:
         """Return the channels that each stage would need and the record lacks."""
         needs = {
@@ -241,18 +248,17 @@ class Reader:
     def _linkage(self) -> list[Output]:
         computed, force = self.signal("computed"), self.signal("force")
         measured = self.signal("deflection")
-        levels, smooth, smooth_force = (
-            (white(computed), white(force)),
-            smoothed(computed),
-            smoothed(force),
-        )
+        levels = white(computed), white(force)
+        smooth, smooth_force = smoothed(computed), smoothed(force)
+
+        others = {name: smoothed(signal) for name, signal in self.others().items()}
 
         def driven(c: Floats, f: Floats) -> Predict:
             nodes = on_nodes(self.rig, c)
 
             def predict(rig: Rig) -> Floats:
                 scale = rig.controls[self.control].sensing.read_scale
-                return drive_linkage(rig, self.control, nodes / scale, f)
+                return drive_linkage(rig, self.control, nodes / scale, f, others)
 
             return predict
 
@@ -289,6 +295,6 @@ class Reader:
 def compensation_gap(reader: Reader) -> float:
     """Return the rms departure of the host's δ̂ from its own arithmetic, over δc's noise."""
     computed, force = reader.signal("computed"), reader.signal("force")
-    made = replay_compensation(reader.rig, reader.control, computed, force)
+    made = replay_compensation(reader.rig, reader.control, computed, force, reader.others())
     floor = max(white(computed), ROUNDING_SPAN * float(np.ptp(computed)))
     return float(np.sqrt(np.mean((reader.signal("estimate") - made) ** 2))) / floor

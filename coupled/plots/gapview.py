@@ -180,7 +180,7 @@ def _arithmetic(reader: Reader) -> Output:
     estimate = reader.signal("estimate")
 
     def predict(rig: Rig) -> Floats:
-        return replay_compensation(rig, reader.control, computed, force)
+        return replay_compensation(rig, reader.control, computed, force, reader.others())
 
     name, rate = channel(reader.control, "estimate"), reader.rig.frame_rate
     return Output("compensation", name, estimate, predict, white(computed), rate, reader.number)

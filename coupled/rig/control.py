@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from coupled.rig import (
     compensation,
+    crossing,
     friction,
     gauge,
     hand,
@@ -58,6 +59,7 @@ class ControlParameters(Protocol):
     linkage: Annotated[linkage.LinkageParameters, linkage.LINKAGE]
     sensing: Annotated[sensing.SensingParameters, sensing.SENSING]
     compensation: Annotated[compensation.CompensationParameters, compensation.COMPENSATION]
+    crossing: Annotated[crossing.CrossingParameters, crossing.CROSSING]
     surface: Annotated[surface.SurfaceParameters, surface.SURFACE]
 
 
@@ -73,6 +75,7 @@ class ControlState(Protocol):
     inertia: inertia.InertiaState
     linkage: linkage.LinkageState
     sensing: sensing.SensingState
+    crossing: crossing.CrossingState
     surface: surface.SurfaceState
 
 

@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
-from coupled.rig.gauge import gauge_force, move_gauge, start_gauge
-from coupled.rig.hand import ask, hold, move_muscle, only_scripted
-from coupled.rig.inertia import lead_force, set_inertia
-from coupled.rig.linkage import deflection, move_linkage, transducer
-from coupled.rig.loader import move_loader, set_external, start_delay
+from coupled.rig.gauge import start_gauge
+from coupled.rig.hand import only_scripted
+from coupled.rig.inertia import set_inertia
+from coupled.rig.linkage import carry_bend, deflection, transducer
+from coupled.rig.loader import start_delay
+from coupled.rig.mechanism import begin_frame, run_frame, run_node, set_hand
 from coupled.rig.modification import (
     ModificationState,
-    exchange_last,
     keep_last,
     modifying_force,
     set_gradients,
 )
-from coupled.rig.reach import bounds, free, seated, set_reach, stop_linkage, within_reach
+from coupled.rig.reach import free
 from coupled.rig.schedule import gradients, read_pressure
-from coupled.rig.sensing import converted, read_computed, read_force, sample
+from coupled.rig.sensing import converted, read_computed, read_force
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -56,6 +56,14 @@ def set_product(
 
 
 @stage
+def sampled_force(p: ControlParameters, s: ControlState) -> float:
+    """Return the force that the host's converter has at t_k: the gauge's, as sampled, N."""
+    if p.sensing.skewed:
+        return s.sensing.force
+    return s.gauge.force if p.gauge.present else s.hand.force
+
+
+@stage
 def host_frame(
     p: ControlParameters,
     s: ControlState,
@@ -74,11 +82,8 @@ def host_frame(
     m = s.modification
     ended = m.held if p.modification.digital else modifying_force(m, computed)
 
-    at_gauge = s.gauge.force if p.gauge.present else force
-    sampled_force, sampled = at_gauge, computed
-    if p.sensing.skewed:
-        sampled_force, sampled = s.sensing.force, s.sensing.computed
-    force_read = read_force(p.sensing, sampled_force, out[0])
+    sampled = s.sensing.computed if p.sensing.skewed else computed
+    force_read = read_force(p.sensing, sampled_force(p, s), out[0])
     computed_read = read_computed(p.sensing, sampled, out[1])
     if p.modification.late > 0:
         keep_last(m)
@@ -86,7 +91,7 @@ def host_frame(
     set_gradients(p.modification, m, first, second)
     set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
     product = set_product(p, m, computed, computed_read)
-    estimated = estimate(p.compensation, computed_read, force_read)
+    estimated = estimate(p.compensation, computed_read, force_read) + s.crossing.estimated
     command = command_surface(p.surface, s.surface, estimated, pressure)
 
     out[0] = force_read
@@ -103,91 +108,43 @@ def host_frame(
 
 
 @stage
-def set_hand(
-    p: ControlParameters, s: ControlState, script: float, held: float, held_rate: float
-) -> None:
-    """Set the hand's force at a node for a script in N, and a held deflection in d and its rate."""
-    h = p.clock.substep
-    striving = ask(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
-    force = s.hand.asked
-    if p.reach.reach > 0.0:
-        computed = s.loader.computed
-        force = within_reach(p.reach, s.reach, p.linkage, s.linkage, computed, force)
-        if force != s.hand.asked:
-            striving = 0.0  # at its stop a hand does not strive for ever more
-    hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
+def bend_by_others(controls: ControlArray, i: int) -> None:
+    """Set what the others' forces bend at control i: Σ_j K_ij·F_j."""
+    row, bent = controls[i].parameters.crossing.bends, 0.0
+    for j in range(len(controls)):
+        bent += row[j] * controls[j].state.hand.force
+    controls[i].state.linkage.others = bent
 
 
 @stage
-def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
-    """Return the force that the loader takes for the hand's at the next node, N."""
-    if p.gauge.present:
-        force = gauge_force(p.gauge, s.gauge, force)
-    return lead_force(p.inertia, s.inertia, force) if p.inertia.rows > 0 else force
+def read_others(controls: ControlArray, row: Floats) -> None:
+    """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row holds the noise."""
+    for j in range(len(controls)):
+        p, s = controls[j].parameters, controls[j].state
+        noise = row[1 + CHANNELS_PER_CONTROL * j]
+        s.crossing.read = read_force(p.sensing, sampled_force(p, s), noise)
+    for i in range(len(controls)):
+        assumed, added = controls[i].parameters.crossing.assumed, 0.0
+        for j in range(len(controls)):
+            added += assumed[j] * controls[j].state.crossing.read
+        controls[i].state.crossing.estimated = added
 
 
 @stage
-def sample_channels(p: ControlParameters, s: ControlState, left: int, first: bool) -> None:
-    """Let the host's converters have δc and F, `left` substeps before the frame's end."""
-    at_gauge = s.gauge.force if p.gauge.present else s.hand.force
-    sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, first)
-
-
-@stage
-def run_frame(
-    p: ControlParameters,
-    s: ControlState,
-    force: Floats,
-    held: Floats,
-    first_node: int,
-    load_factor: float,
-) -> None:
-    """Run hand, loader and linkage over a frame.
-
-    `force` and `held` are the hand's script on the nodes of the whole flight, N and d.
-    """
-    set_external(p.loader, s.loader, load_factor)
-    s.loader.stop = 0
-    h = p.clock.substep
-    # Asked once a frame, not at every node.
-    stopped = p.reach.reach > 0.0
-    scripted = only_scripted(p.hand) and not stopped
-    altered = p.gauge.present != 0 or p.inertia.rows > 0
-    gauged, skewed, late = p.gauge.present != 0, p.sensing.skewed != 0, p.modification.late
-    if stopped:
-        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
-    last = first_node + p.clock.substeps
-    if skewed:
-        sample_channels(p, s, p.clock.substeps, True)
-    if late > 0:
-        exchange_last(s.modification)
-    for node in range(first_node + 1, last + 1):
-        if late > 0 and node == first_node + 1 + late:
-            exchange_last(s.modification)
-        move_muscle(p.hand, s.hand)
-        # The hand's impedance acts as it stood at the last node; its script runs on.
-        before = s.loader.computed
-        acting = s.hand.force
-        if stopped and seated(s.reach, p.linkage, before) != 0:
-            acting = s.hand.asked  # of which the stop takes what it must
-        ahead = acting + force[node] - force[node - 1]
-        if altered:
-            ahead = force_given(p, s, ahead)
-        ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
-        move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
-        position, grip = s.linkage.position, s.linkage.grip
-        move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
-        if gauged:
-            move_gauge(p.gauge, s.gauge, p.linkage, s.linkage, s.loader.computed)
-        if scripted:
-            s.hand.force = force[node] + s.hand.muscle
-        else:
-            if stopped:
-                stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
-            rate = (held[node] - held[node - 1]) / h
-            set_hand(p, s, force[node], held[node], rate)
-        if skewed:
-            sample_channels(p, s, last - node, False)
+def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
+    """Run all controls of one structure over frame k, node by node."""
+    substeps = controls[0].parameters.clock.substeps
+    begun = k * substeps
+    for i in range(len(controls)):
+        begin_frame(controls[i].parameters, controls[i].state, load_factor)
+    for node in range(begun + 1, begun + substeps + 1):
+        for i in range(len(controls)):
+            p, s = controls[i].parameters, controls[i].state
+            bend_by_others(controls, i)
+            scripted = only_scripted(p.hand) and p.reach.reach == 0.0
+            run_node(p, s, script[i, 0], script[i, 1], begun, node, scripted)
+    for i in range(len(controls)):
+        bend_by_others(controls, i)
 
 
 @entry
@@ -211,28 +168,39 @@ def step_frame(
     first_command = second_command = third_command = 0.0
     row = record[k]
     pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
+    joined = controls[0].parameters.crossing.joined != 0
     # Here, not after the flight: a frame then leaves no object behind.
     for i in range(len(motion)):
         row[pressure_at + i] += motion[i]
+    if k == 0:
+        for i in range(len(controls)):
+            p, s = controls[i].parameters, controls[i].state
+            free(s.reach)
+            set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
+            start_delay(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
+            s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
+            carry_bend(p.linkage, s.linkage, s.hand.force)
+    if joined:
+        for i in range(len(controls)):
+            bend_by_others(controls, i)
+        read_others(controls, row)
     for i in range(len(controls)):
         p, s = controls[i].parameters, controls[i].state
         force, held = script[i, 0], script[i, 1]
         node = k * p.clock.substeps
-        if k == 0:
-            free(s.reach)
-            set_hand(p, s, force[0], held[0], 0.0)
-            start_delay(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
-            s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
         first = 1 + CHANNELS_PER_CONTROL * i
         out = row[first : first + CHANNELS_PER_CONTROL]
         command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)
-        run_frame(p, s, force, held, node, load_factor)
+        if not joined:
+            run_frame(p, s, force, held, node, load_factor)
         if i == 0:
             first_command = command
         elif i == 1:
             second_command = command
         else:
             third_command = command
+    if joined:
+        run_joined(controls, script, k, load_factor)
     return first_command, second_command, third_command
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import CONTROL, STAGES, ControlArray, ControlState
-from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame, run_frame, set_hand
+from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame
 from coupled.rig.gauge import start_gauge
 from coupled.rig.loader import start_delay
+from coupled.rig.mechanism import run_frame, set_hand
 from coupled.rig.packing import Hand, pack
 from coupled.rig.rig import Rig
 

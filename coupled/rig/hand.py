@@ -29,7 +29,7 @@ from typing import Protocol
 
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, first_order_gain
-from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
+from coupled.rig.linkage import LinkageParameters, LinkageState, bend_slope, deflection
 
 
 class HandParameters(Protocol):
@@ -110,7 +110,7 @@ def ask(
     if not has_impedance(p):
         s.asked = within_strength(p, s, wanted)
         return 0.0
-    slope, at = bend_slope(linkage_p, s.force), linkage.grip + bend(linkage_p, s.force)
+    slope, at = bend_slope(linkage_p, s.force), deflection(linkage_p, linkage, s.force)
     error = held - at
     rate_error = held_rate - linkage.rate
     asked = wanted + p.stiffness * error + p.damping * rate_error + s.integral
@@ -142,7 +142,7 @@ def hold(
         effort = s.effort + h * (held - p.lasting) / (p.strongest - p.lasting)
         s.effort = min(max(effort, 0.0), p.endurance)
     if p.mass > 0.0:
-        at = linkage.grip + bend(linkage_p, force)
+        at = deflection(linkage_p, linkage, force)
         s.moving = (at - s.at) / h
         s.at = at
 

@@ -3,6 +3,10 @@
     servo      x'' = ω²·(δc − x) − 2ζω·x',    |x'| ≤ rate limit
     backlash   the grip's side follows x once it has taken up the play
     bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit)
+    direction  K for a pull, another for a push; both meet at F = 0
+    hysteresis δ = x + (1 − s)·bend(F) + s·bend(P), P behind a play of full width w in the force:
+               over a cycle between ±A (A > w/2, one K) it takes s·K·w·(2A − w) of work
+    structure  + Σ K_ij·F_j of the other controls  (`structure`)
     arc        the transducer reads L·sin(δ/L)  eqs. (15) to (17)
 
 The servo is stepped exactly for a δc that runs straight over the substep, so it is
@@ -32,8 +36,11 @@ class LinkageParameters(Protocol):
     speed: NDArray[np.float64]  # and in the next x'
     rate_limit: float  # d/s; 0 for none
     play: float  # full width of the backlash, d
-    bend: float  # K of the structure, d/N
+    bend: float  # K of the structure, d/N, for a pull
+    push: float  # and for a push
     bend_limit: float  # where the bend saturates, d; 0 for never
+    share: float  # of the bend that follows the force through a play
+    width: float  # full width of that play, N
     arc_length: float  # L of the grip's arc, d; 0 where the transducer reads δ itself
 
 
@@ -43,6 +50,8 @@ class LinkageState(Protocol):
     position: float  # x, d
     rate: float  # x', d/s
     grip: float  # behind the play, before the bend, d
+    carried: float  # P, the force behind the bend's play, N
+    others: float  # what the other controls' forces bend here, d
 
 
 def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDArray[np.float64]:
@@ -73,6 +82,11 @@ def _servo(g: Given) -> NDArray[np.float64]:
     return _weights(omega, loader.servo_damping_ratio, g.substep_s)
 
 
+def _push(g: Given) -> float:
+    loader = g.control.loader
+    return loader.bend if loader.bend_push is None else loader.bend_push
+
+
 _weights = lru_cache(maxsize=64)(servo_weights)
 
 
@@ -83,6 +97,9 @@ LINKAGE = Declaration(
         "position": lambda g: _servo(g)[0],
         "speed": lambda g: _servo(g)[1],
         "rate_limit": lambda g: g.control.loader.servo_rate_limit,
+        "push": _push,
+        "share": lambda g: g.control.loader.bend_hysteresis_share,
+        "width": lambda g: g.control.loader.bend_hysteresis_width,
         "arc_length": lambda g: g.control.length if g.control.loader.arc_geometry else 0.0,
     },
     state=layout(LinkageState),
@@ -111,23 +128,41 @@ def move_linkage(
 @stage
 def bend(p: LinkageParameters, force: float) -> float:
     """Return the structure's bend in d under a force in N: K·F of eq. (1), or its saturation."""
+    compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
-        return p.bend_limit * math.tanh(p.bend * force / p.bend_limit)
-    return p.bend * force
+        return p.bend_limit * math.tanh(compliance * force / p.bend_limit)
+    return compliance * force
 
 
 @stage
 def bend_slope(p: LinkageParameters, force: float) -> float:
-    """Return the bend's derivative by force, d/N."""
+    """Return the bend's derivative by force, d/N.
+
+    With hysteresis that of a force which carries all of the bend with it: no force in the play
+    bends more, so a hand that takes this slope implicitly does not overshoot.
+    """
+    compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
-        return p.bend / math.cosh(p.bend * force / p.bend_limit) ** 2
-    return p.bend
+        return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
+    return compliance
+
+
+@stage
+def carry_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
+    """Let the force at a node, N, take the bend's hysteresis along."""
+    half = 0.5 * p.width
+    s.carried = min(max(s.carried, force - half), force + half)
 
 
 @stage
 def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
     """Return the true deflection δ at the grip in d under a force in N."""
-    return s.grip + bend(p, force)
+    bent = bend(p, force)
+    if p.share > 0.0:
+        half = 0.5 * p.width
+        carried = min(max(s.carried, force - half), force + half)
+        bent += p.share * (bend(p, carried) - bent)
+    return s.grip + bent + s.others
 
 
 @stage

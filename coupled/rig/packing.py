@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
+from coupled.record.channels import ControlName
 from coupled.rig.control import CONTROL, STAGES, ControlArray
 from coupled.rig.declaration import Given, Hand, first_order_gain
 from coupled.rig.rig import Rig
 from coupled.rig.surface import COMMAND_SIGN
 
 __all__ = ["COMMAND_SIGN", "Hand", "first_order_gain", "pack"]
+
+
+def crossed_bends(
+    rig: Rig, control: str, names: Sequence[str]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return K_ij and the host's K̂_ij of a control by forces on those named, d/N; its own 0."""
+    at, structure = list(names).index(control), rig.structure
+    corrected = rig.controls[cast(ControlName, control)].compensation.deflection
+    bends = structure.between(names)[at]
+    assumed = corrected * structure.assumed.between(names)[at]
+    return tuple(map(float, bends)), tuple(map(float, assumed))
 
 
 def pack(
@@ -28,7 +41,11 @@ def pack(
     frame_s = 1.0 / rig.frame_rate
     for p, (name, control) in zip(packed["parameters"], found.items(), strict=True):
         hand = (hands or {}).get(name, Hand())
-        given = Given(control, hand, frame_s, frame_s / rig.substeps, rig.substeps)
+        bends, assumed = crossed_bends(rig, name, list(found))
+        given = Given(
+            *(control, hand, frame_s, frame_s / rig.substeps, rig.substeps),
+            *(not rig.structure.stands_apart and len(found) > 1, bends, assumed),
+        )
         for stage, declared in STAGES.items():
             for parameter in declared.parameters.names or ():
                 p[stage][parameter] = declared.value(parameter, given)

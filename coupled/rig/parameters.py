@@ -42,7 +42,10 @@ class Loader(Section):
     servo_damping_ratio: float = quantity("", gt=0)
     servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)
     bend: float = quantity("{d}_per_N", 0.0, ge=0)
+    bend_push: float | None = quantity("{d}_per_N", None, ge=0)
     bend_limit: float = quantity("{d}", 0.0, ge=0)
+    bend_hysteresis_share: float = quantity("", 0.0, ge=0, lt=1)
+    bend_hysteresis_width: float = quantity("N", 0.0, ge=0)
     play: float = quantity("{d}", 0.0, ge=0)
     arc_geometry: bool = False
 

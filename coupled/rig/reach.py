@@ -60,12 +60,15 @@ REACH = Declaration(
 @stage
 def unbent(p: LinkageParameters, by: float) -> float:
     """Return the force in N that bends the structure by so much, d: `bend` solved for F, K > 0."""
+    compliance = p.bend if by >= 0.0 else p.push
+    if compliance == 0.0:
+        return _NO_FORCE if by > 0.0 else -_NO_FORCE
     if p.bend_limit > 0.0:
         share = by / p.bend_limit
         if abs(share) >= 1.0:
             return _NO_FORCE if by > 0.0 else -_NO_FORCE
-        return p.bend_limit / p.bend * math.atanh(share)
-    return by / p.bend
+        return p.bend_limit / compliance * math.atanh(share)
+    return by / compliance
 
 
 @stage
@@ -177,7 +180,7 @@ def within_reach(
 ) -> float:
     """Return the force of one asked for, N, that the stop leaves on the grip."""
     if linkage_p.bend > 0.0:
-        at = linkage.grip
+        at = linkage.grip + linkage.others
         return max(min(asked, unbent(linkage_p, p.reach - at)), unbent(linkage_p, -p.reach - at))
     side = seated(stop, linkage_p, computed)
     if side == 0:

@@ -7,6 +7,7 @@ nobody. Signals are given at the frames; between them what is continuous in the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
 from coupled.rig.inertia import lead_force, set_inertia
-from coupled.rig.linkage import deflection, move_linkage, transducer
+from coupled.rig.linkage import carry_bend, deflection, move_linkage, transducer
 from coupled.rig.loader import move_loader, set_external, start_delay
 from coupled.rig.modification import set_gradients
-from coupled.rig.packing import pack
+from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.surface import command_surface
@@ -95,23 +96,59 @@ def replay_product(
     return _product(p, s, computed, both, np.empty_like(computed))
 
 
-def replay_linkage(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
-    """Return what the transducer at the grip reads, d, for δc in d and F in N."""
-    return drive_linkage(rig, control, on_nodes(rig, computed), force_N)
+def replay_linkage(
+    rig: Rig,
+    control: str,
+    computed: Floats,
+    force_N: Floats,
+    others_N: Mapping[str, Floats] | None = None,
+) -> Floats:
+    """Return what the transducer at the grip reads, d, for δc in d and F in N.
+
+    `others_N` are the forces on other controls of the same structure, at each frame.
+    """
+    return drive_linkage(rig, control, on_nodes(rig, computed), force_N, others_N)
 
 
-def drive_linkage(rig: Rig, control: str, nodes: Floats, force_N: Floats) -> Floats:
+def drive_linkage(
+    rig: Rig,
+    control: str,
+    nodes: Floats,
+    force_N: Floats,
+    others_N: Mapping[str, Floats] | None = None,
+) -> Floats:
     """Do as `replay_linkage`, with δc given on the loader's nodes."""
     p, s = _one(rig, control)
     h = 1.0 / (rig.frame_rate * rig.substeps)
     s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = nodes[0]
-    return _linkage(p, s, nodes, force_N, rig.substeps, h, np.empty_like(force_N))
+    bent = _by_others(rig, control, others_N or {}, 0, force_N)
+    return _linkage(p, s, nodes, force_N, bent, rig.substeps, h, np.empty_like(force_N))
 
 
-def replay_compensation(rig: Rig, control: str, computed: Floats, force_N: Floats) -> Floats:
-    """Return δ̂ in d for δc in d and F in N as the host read them."""
+def replay_compensation(
+    rig: Rig,
+    control: str,
+    computed: Floats,
+    force_N: Floats,
+    others_N: Mapping[str, Floats] | None = None,
+) -> Floats:
+    """Return δ̂ in d for δc in d and F in N as the host read them, and the others' forces."""
     p, _ = _one(rig, control)
-    return _compensation(p, computed, force_N, np.empty_like(force_N))
+    made = _compensation(p, computed, force_N, np.empty_like(force_N))
+    return made + _by_others(rig, control, others_N or {}, 1, force_N)
+
+
+def _by_others(
+    rig: Rig, control: str, others_N: Mapping[str, Floats], assumed: int, like: Floats
+) -> Floats:
+    """Return what the others' forces bend at each frame, d, or what the host takes that for."""
+    names = [str(name) for name in rig.controls]
+    row = crossed_bends(rig, control, names)[assumed]
+    bent = np.zeros_like(like)
+    for name, bend in zip(names, row, strict=True):
+        if bend != 0.0 and name in others_N:
+            bent += bend * others_N[name]
+    return bent
 
 
 def replay_surface(rig: Rig, control: str, estimated: Floats, pressure_Pa: Floats) -> Floats:
@@ -191,12 +228,15 @@ def _linkage(
     states: Any,
     computed: Floats,
     force: Floats,
+    others: Floats,
     substeps: int,
     h: float,
     out: Floats,
 ) -> Floats:
     p, s = parameters[0].linkage, states[0].linkage
     for k in range(len(force)):
+        carry_bend(p, s, force[k])
+        s.others = others[k]
         out[k] = transducer(p, deflection(p, s, force[k]))
         if k + 1 < len(force):
             for node in range(k * substeps, (k + 1) * substeps):

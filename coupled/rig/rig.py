@@ -28,6 +28,7 @@ from coupled.rig.parameters import (
     Control,
     Flight,
 )
+from coupled.rig.structure import Structure, check_structure
 from coupled.schema import Section, build, changed, grouped, known_keys, quantity
 
 
@@ -53,6 +54,7 @@ class Rig(Section):
     controls: dict[ControlName, Control]
     flight: Flight | None = None
     noise: dict[str, float] = {}
+    structure: Structure = Structure()
 
     @property
     def substeps(self) -> int:
@@ -76,7 +78,7 @@ class Rig(Section):
         return checked(whole, self.name)
 
     def only(self, control: str) -> Rig:
-        """Return the rig with one control only, no aircraft and no noise.
+        """Return the rig with one control only, no aircraft, no noise and no common structure.
 
         Raises InputError where the rig has no such control.
         """
@@ -84,7 +86,8 @@ class Rig(Section):
             problem = f"the rig has no {control}; {nearest(control, self.controls)}"
             raise InputError(self.name, "controls", problem)
         kept = {name: data for name, data in self.controls.items() if name == control}
-        return changed(self, {"controls": kept, "flight": None, "noise": {}}, self.name)
+        alone = {"controls": kept, "flight": None, "noise": {}, "structure": Structure()}
+        return changed(self, alone, self.name)
 
 
 def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control]:
@@ -117,6 +120,7 @@ def checked(rig: Rig, file: object) -> Rig:
     """Return the rig; raise InputError for what the physics cannot give, naming `file`."""
     for name, control in rig.controls.items():
         _check_control(rig, name, control, file)
+    check_structure(rig.structure, {str(n): c for n, c in rig.controls.items()}, file)
     _check_noise(rig, file)
     return rig
 
@@ -214,6 +218,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
         )
     bends = {
         f"{path}.loader.bend_{d}_per_N": control.loader.bend,
+        f"{path}.loader.bend_push_{d}_per_N": control.loader.bend_push or 0.0,
         f"{path}.compensation.bend_{d}_per_N": control.compensation.bend,
     }
     for table_key, gradient in tables.items():

@@ -22,6 +22,7 @@ def rig_text(rig: Rig, remark: str = "") -> str:
         lines += ["", "[flight]", *_values(rig.flight, "m")]
         lines += _mapping("flight.properties", rig.flight.properties)
     lines += _mapping("noise", rig.noise)
+    lines += _table("structure", rig.structure, "m")
     for name, control in rig.controls.items():
         lines += _table(f"controls.{name}", control, unit_of(name))
     return "\n".join(lines).lstrip("\n") + "\n"

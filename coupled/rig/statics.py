@@ -2,12 +2,15 @@
 
 With breakout, two segments and a stiffening bend, along δc: the balance of the loader gives
 F(δc) = F_BO + F_L + k₃·δc³ + F_mod, which is eq. (9) solved for F; the structure δ = δc + bend(F).
-Friction is left out: it is a band about this line. `equations` has the linear case. The line is
-drawn by the stages that fly, in one kernel that is kept on disk.
+Friction is left out: it is a band about this line, and so is the bend's hysteresis, whose
+middle is here. `equations` has the linear case. Forces that other controls' pilots hold bend a
+common structure: δ = δc + bend(F) + Σ_j K_ij·F_j, and δ̂ has the host's K̂_ij·F_j in it. The line
+is drawn by the stages that fly, in one kernel that is kept on disk.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +22,7 @@ from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.equations import basic_force, specified_force
 from coupled.rig.linkage import bend
 from coupled.rig.modification import modifying_force, set_gradients
-from coupled.rig.packing import pack
+from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
 
@@ -42,23 +45,59 @@ class Statics:
     specified: Floats
 
 
-def static_line(rig: Rig, control: str, pressure_Pa: float, computed: Floats) -> Statics:
-    """Return the static line at the given δc in d, which are not to be zero."""
-    return _line(rig, control, pressure_Pa, pack(rig, only=control), computed)
+def crossed(rig: Rig, control: str, others_N: Mapping[str, float]) -> tuple[float, float]:
+    """Return what the others' forces bend at a control, and what its host adds for them, d."""
+    names = [str(name) for name in rig.controls]
+    bends, assumed = crossed_bends(rig, control, names)
+    force = np.array([others_N.get(name, 0.0) for name in names])
+    scale = np.array([data.sensing.force_scale for data in rig.controls.values()])
+    return float(bends @ force), float(assumed @ (scale * force))
 
 
-def static_point(rig: Rig, control: str, pressure_Pa: float, deflection: float) -> Statics:
-    """Return the point of the static line at which the grip stands at δ in d (not zero)."""
+def static_line(
+    rig: Rig,
+    control: str,
+    pressure_Pa: float,
+    computed: Floats,
+    others_N: Mapping[str, float] | None = None,
+) -> Statics:
+    """Return the static line at the given δc in d, which are not to be zero.
+
+    `others_N` are the forces held on other controls, {control: N}.
+    """
+    others = crossed(rig, control, others_N or {})
+    return _line(rig, control, pressure_Pa, pack(rig, only=control), computed, others)
+
+
+def static_point(
+    rig: Rig,
+    control: str,
+    pressure_Pa: float,
+    deflection: float,
+    others_N: Mapping[str, float] | None = None,
+) -> Statics:
+    """Return the point of the static line at which the grip stands at δ in d (not zero).
+
+    Not where the others' forces alone bring it: there this control has no force.
+    """
     packed = pack(rig, only=control)
-    computed = _computed_at(packed, float(pressure_Pa), float(deflection))
-    return _line(rig, control, pressure_Pa, packed, np.array([computed]))
+    others = crossed(rig, control, others_N or {})
+    computed = _computed_at(packed, float(pressure_Pa), float(deflection) - others[0])
+    return _line(rig, control, pressure_Pa, packed, np.array([computed]), others)
 
 
 def _line(
-    rig: Rig, control: str, pressure_Pa: float, packed: ControlArray, computed: Floats
+    rig: Rig,
+    control: str,
+    pressure_Pa: float,
+    packed: ControlArray,
+    computed: Floats,
+    others: tuple[float, float],
 ) -> Statics:
     out = np.empty((3, len(computed)))
     _along(packed, float(pressure_Pa), np.ascontiguousarray(computed, dtype=np.float64), out)
+    out[1] += others[0]
+    out[2] += others[1]
     force, deflection, estimates = out
     wanted = specified_force(rig, control, pressure_Pa, deflection)
     return Statics(computed, force, deflection, estimates, wanted)

@@ -11,10 +11,10 @@ from coupled.calibration.bench import CalibrationBench
 from coupled.calibration.coverage import measure_coverage
 from coupled.calibration.errors_in_variables import errors_in_variables
 from coupled.calibration.estimate import usual_instruments
+from coupled.calibration.form import form
 from coupled.calibration.plan import (
     deflection_needs,
     fewest,
-    form,
     gradient_sets,
     precision,
     stations,

@@ -74,7 +74,8 @@ def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) 
     made_by = {}
     for some in ((), ("bend",), ("backlash",), ("bend", "backlash")):
         rig = apply(nominal, "column", [BY_NAME[name] for name in some], flat)
-        made_by[some] = replay_linkage(rig, "column", *(record[name] for name in DRIVES))
+        computed, force = (record[name] for name in DRIVES)
+        made_by[some] = replay_linkage(rig, "column", computed, force)
     [output] = [output for output in found.outputs if output.stage == "linkage"]
     held = output.rows("held")
     power = {

@@ -24,6 +24,7 @@ SCHEDULE, HOST, SENSING = (f"controls.column.{s}" for s in ("schedule", "compens
 RIG = bench(
     {
         "arc_geometry": True,
+        "bend_push_m_per_N": 1e-4,
         "breakaway_N": 1.0,
         f"{SCHEDULE}.second_gradient_N_per_m": [300.0, 900.0],
         f"{SCHEDULE}.break_deflection_m": 0.05,

@@ -31,6 +31,7 @@ from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
+from coupled.rig.structure import Structure
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
@@ -124,6 +125,7 @@ def linear_rig(
         "loader.offset_N": 0.0,
         f"loader.servo_rate_limit_{d}_per_s": 0.0,
         f"loader.bend_limit_{d}": 0.0,
+        "loader.bend_hysteresis_share": 0.0,
         "loader.bob_weight_N_per_g": 0.0,
         "loader.multiplier_offset_N": 0.0,
         "loader.multiplier_drift_N_per_s": 0.0,
@@ -145,8 +147,10 @@ def linear_rig(
     given[f"schedule.second_gradient_N_per_{d}"] = None
     for key in ("mass_factor", "damping_factor"):
         given[f"compensation.{key}"] = None
+    given[f"loader.bend_push_{d}_per_N"] = None
     alone = {name: changed(control, given, rig.name, f"controls.{name}", d)}
     whole: dict[str, Any] = {"controls": alone, "flight": None, "noise": {}}
+    whole["structure"] = Structure()
     if question.frame_s is not None:
         whole["frame_rate_Hz"] = 1.0 / question.frame_s
     return changed(rig, whole, rig.name)

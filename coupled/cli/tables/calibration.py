@@ -43,6 +43,8 @@ def print_calibration(console: Console, found: CalibrationResult) -> None:
     _row(table, "  ordinary least squares", found.plain.bend.scaled(factor))
     error = factor * found.plain.bend.error
     table.add_row("  normal equations, appendix A", _number(-b / a * factor, error), "", "")
+    for name, estimate in found.fit.others.items():
+        _row(table, f"K by {name}, {d}/N", estimate)
     _row(table, "S3, V/N", found.s3)
     _row(table, "  mean of v3/F, eq. (13)", found.s3_mean)
     for i, (way, estimate) in enumerate(found.s2.items()):

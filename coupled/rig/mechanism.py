@@ -1,0 +1,133 @@
+"""What runs on over a frame: one control's hand, gauge, loader and linkage, node by node.
+
+The order of a substep is that of the signal chain: the hand's force at the new node, the gauge, the
+loader, the linkage, and what the hand then finds at the grip.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import stage
+from coupled.rig.control import ControlParameters, ControlState
+from coupled.rig.gauge import gauge_force, move_gauge
+from coupled.rig.hand import ask, hold, move_muscle, only_scripted
+from coupled.rig.inertia import lead_force
+from coupled.rig.linkage import carry_bend, move_linkage
+from coupled.rig.loader import move_loader, set_external
+from coupled.rig.modification import exchange_last
+from coupled.rig.reach import bounds, seated, set_reach, stop_linkage, within_reach
+from coupled.rig.sensing import sample
+
+Floats = NDArray[np.float64]
+
+
+@stage
+def set_hand(
+    p: ControlParameters, s: ControlState, script: float, held: float, held_rate: float
+) -> None:
+    """Set the hand's force at a node for a script in N, and a held deflection in d and its rate."""
+    h = p.clock.substep
+    striving = ask(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
+    force = s.hand.asked
+    if p.reach.reach > 0.0:
+        computed = s.loader.computed
+        force = within_reach(p.reach, s.reach, p.linkage, s.linkage, computed, force)
+        if force != s.hand.asked:
+            striving = 0.0  # at its stop a hand does not strive for ever more
+    hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
+
+
+@stage
+def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
+    """Return the force that the loader takes for the hand's at the next node, N."""
+    if p.gauge.present:
+        force = gauge_force(p.gauge, s.gauge, force)
+    return lead_force(p.inertia, s.inertia, force) if p.inertia.rows > 0 else force
+
+
+@stage
+def sample_channels(p: ControlParameters, s: ControlState, left: int, first: bool) -> None:
+    """Let the host's converters have δc and F, `left` substeps before the frame's end."""
+    at_gauge = s.gauge.force if p.gauge.present else s.hand.force
+    sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, first)
+
+
+@stage
+def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bool:
+    """Set what holds over a frame; return whether the hand does no more than its script."""
+    set_external(p.loader, s.loader, load_factor)
+    s.loader.stop = 0
+    stopped = p.reach.reach > 0.0
+    if stopped:
+        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
+    if p.sensing.skewed:
+        sample_channels(p, s, p.clock.substeps, True)
+    if p.modification.late > 0:
+        exchange_last(s.modification)
+    return only_scripted(p.hand) and not stopped
+
+
+@stage
+def run_node(
+    p: ControlParameters,
+    s: ControlState,
+    force: Floats,
+    held: Floats,
+    first_node: int,
+    node: int,
+    scripted: bool,
+) -> None:
+    """Run hand, loader and linkage over the substep that ends at a node.
+
+    `force` and `held` are the hand's script on the nodes of the whole flight, N and d; the frame
+    began at `first_node`; `scripted` where the hand does no more than its script.
+    """
+    h, stopped, late = p.clock.substep, p.reach.reach > 0.0, p.modification.late
+    if late > 0 and node == first_node + 1 + late:
+        exchange_last(s.modification)
+    move_muscle(p.hand, s.hand)
+    # The hand's impedance acts as it stood at the last node; its script runs on.
+    before = s.loader.computed
+    acting = s.hand.force
+    if stopped and seated(s.reach, p.linkage, before) != 0:
+        acting = s.hand.asked  # of which the stop takes what it must
+    ahead = acting + force[node] - force[node - 1]
+    if p.gauge.present != 0 or p.inertia.rows > 0:
+        ahead = force_given(p, s, ahead)
+    ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
+    move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
+    position, grip = s.linkage.position, s.linkage.grip
+    move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)
+    if p.gauge.present:
+        move_gauge(p.gauge, s.gauge, p.linkage, s.linkage, s.loader.computed)
+    if scripted:
+        s.hand.force = force[node] + s.hand.muscle
+    else:
+        if stopped:
+            stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
+        rate = (held[node] - held[node - 1]) / h
+        set_hand(p, s, force[node], held[node], rate)
+    if p.linkage.share > 0.0:
+        carry_bend(p.linkage, s.linkage, s.hand.force)
+    if p.sensing.skewed:
+        sample_channels(p, s, first_node + p.clock.substeps - node, False)
+
+
+@stage
+def run_frame(
+    p: ControlParameters,
+    s: ControlState,
+    force: Floats,
+    held: Floats,
+    first_node: int,
+    load_factor: float,
+) -> None:
+    """Run hand, loader and linkage over a frame.
+
+    `force` and `held` are the hand's script on the nodes of the whole flight, N and d.
+    """
+    scripted = begin_frame(p, s, load_factor)  # asked once a frame, not at every node
+    for node in range(first_node + 1, first_node + p.clock.substeps + 1):
+        run_node(p, s, force, held, first_node, node, scripted)

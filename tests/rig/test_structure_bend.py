@@ -1,0 +1,411 @@
+"""K with direction: pull and push, hysteresis, and forces that bend at other controls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import coupled
+from coupled.errors import InputError
+from coupled.flight.manoeuvre import configure
+from coupled.rig import linkage
+from coupled.rig.declaration import Hand
+from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
+from coupled.rig.packing import pack
+from coupled.rig.replay import replay_compensation, replay_linkage
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import rig_from_table
+from coupled.rig.rigwrite import rig_text
+from coupled.rig.statics import static_line, static_point
+from coupled.rig.structure import felt_forces, lost_deflections, whole
+from coupled.schema import loads_toml
+from tests.support.joined import BETWEEN, FULL, RADIUS, STRUCTURE, joined
+from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
+
+Floats = np.ndarray
+
+# --- pull and push -------------------------------------------------------------------------------
+
+
+def bent(changes: dict[str, Any], force: Floats) -> Floats:
+    """Return what the grip shows with the loader at neutral, d."""
+    rig = bench({"bend_m_per_N": 1e-4, **changes})
+    return replay_linkage(rig, "column", np.zeros_like(force), force)
+
+
+def test_a_bend_may_differ_for_pull_and_push_and_is_continuous_between() -> None:
+    force = np.array([-200.0, -100.0, -1e-9, 0.0, 1e-9, 100.0, 200.0])
+    seen = bent({"bend_push_m_per_N": 3e-5}, force)
+    assert seen == pytest.approx(np.where(force > 0.0, 1e-4, 3e-5) * force, rel=1e-12)
+    stiffening = bent({"bend_push_m_per_N": 3e-5, "bend_limit_m": 0.01}, force)
+    small = np.where(force > 0.0, 1e-4, 3e-5) * force / 0.01
+    assert stiffening == pytest.approx(0.01 * np.tanh(small), rel=1e-12)
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.02])
+def test_the_slope_is_that_of_the_side(limit: float) -> None:
+    rig = bench({"bend_m_per_N": 1e-4, "bend_push_m_per_N": 3e-5, "bend_limit_m": limit})
+    p = pack(rig)[0]["parameters"]["linkage"]
+    for force in (-150.0, 150.0):
+        ahead = (linkage.bend(p, force + 0.01) - linkage.bend(p, force - 0.01)) / 0.02
+        assert linkage.bend_slope(p, force) == pytest.approx(ahead, rel=1e-6)
+
+
+def test_a_push_bend_that_no_gradient_allows_is_refused() -> None:
+    with pytest.raises(InputError, match=r"loader\.bend_push_m_per_N: K·G_T"):
+        bench({"bend_push_m_per_N": 1.01 / G_STIFF})
+
+
+# --- hysteresis ----------------------------------------------------------------------------------
+
+
+@given(
+    share=st.floats(0.05, 0.95),
+    width=st.floats(1.0, 40.0),
+    amplitude=st.floats(25.0, 300.0),
+)
+def test_the_work_that_hysteresis_takes_in_a_cycle(
+    share: float, width: float, amplitude: float
+) -> None:
+    """∮F·dδ = s·K·w·(2A − w): P follows F ± w/2, a parallelogram w wide and 2A − w high."""
+    phase = np.linspace(0.0, 4.0 * np.pi, 4001)
+    force = amplitude * np.sin(phase)
+    changes = {"bend_hysteresis_share": share, "bend_hysteresis_width_N": width}
+    seen = bent(changes, force)[2000:]
+    held = force[2000:]
+    work = float(np.sum(0.5 * (held[1:] + held[:-1]) * np.diff(seen)))
+    assert work == pytest.approx(share * 1e-4 * width * (2.0 * amplitude - width), rel=2e-3)
+
+
+def test_hysteresis_within_its_width_bends_less_and_takes_no_work() -> None:
+    force = 4.9 * np.sin(np.linspace(0.0, 20.0, 2001))
+    seen = bent({"bend_hysteresis_share": 0.4, "bend_hysteresis_width_N": 10.0}, force)
+    assert seen == pytest.approx(0.6 * 1e-4 * force, abs=1e-12)
+
+
+@given(share=amounts(0.95), width=amounts(50.0))
+def test_hysteresis_stays_within_its_band_and_never_jumps(share: float, width: float) -> None:
+    rng = np.random.default_rng(3)
+    force = np.cumsum(rng.normal(0.0, 5.0, 500))
+    seen = bent({"bend_hysteresis_share": share, "bend_hysteresis_width_N": width}, force)
+    assert np.all(np.abs(seen - 1e-4 * force) <= 0.5 * share * 1e-4 * width + 1e-12)
+    assert np.all(np.abs(np.diff(seen)) <= 1e-4 * np.abs(np.diff(force)) + 1e-9)
+
+
+def held_by(rig: Rig, target: float, hand: Hand, seconds: float = 1.0) -> Floats:
+    """Return the record of a clamp that takes the grip to ±target, two frames a row."""
+    packed = pack(rig, {"column": hand})
+    frames = round(seconds * rig.frame_rate)
+    nodes = np.arange(frames * rig.substeps + 1) / (frames * rig.substeps)
+    script = np.zeros((1, 2, len(nodes)))
+    script[0, 1] = target * np.sin(2.0 * np.pi * nodes)
+    record = np.zeros((frames, 2 + CHANNELS_PER_CONTROL))
+    for k in range(frames):
+        step_frame(packed, script, record, k, (0.0,), 1.0)
+    asked = script[0, 1, :: rig.substeps][:frames]
+    return np.column_stack((asked, record[:, 3], record[:, 1]))
+
+
+STILL = {"mass_kg": 1e12, "damping_N_s_per_m": 1e12}  # a loader that no force moves
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e9])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"bend_push_m_per_N": 2e-5},
+        {"bend_push_m_per_N": 4e-4},
+        {"bend_hysteresis_share": 0.5, "bend_hysteresis_width_N": 8.0},
+        {"bend_hysteresis_share": 0.9, "bend_hysteresis_width_N": 2.0, "bend_push_m_per_N": 3e-5},
+    ],
+)
+def test_a_stiff_clamp_bends_the_structure_without_chatter(
+    changes: dict[str, Any], stiffness: float
+) -> None:
+    """The loader stands still: the hand's implicit slope alone decides, at any stiffness."""
+    rig = bench({"bend_m_per_N": 1e-4, **STILL, **changes})
+    asked, seen, force = held_by(rig, 0.005, Hand(stiffness=stiffness), 4.0).T
+    assert seen == pytest.approx(asked - force / stiffness, abs=1e-4)
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(force))))
+    assert turns <= 4  # at the peaks of what is asked, and where the play takes hold
+
+
+def test_a_clamp_on_a_moving_loader_is_as_stable_as_with_a_plain_bend() -> None:
+    changes = {"bend_push_m_per_N": 5e-5, "bend_hysteresis_share": 0.5}
+    changes |= {"bend_hysteresis_width_N": 8.0}
+    plain, uneven = (
+        held_by(
+            bench({"bend_m_per_N": 1e-4, **more}), 0.05, Hand(stiffness=1e4, damping=200.0), 4.0
+        )
+        for more in ({}, changes)
+    )
+    off = [float(np.max(np.abs(one[20:, 1] - one[20:, 0]))) for one in (plain, uneven)]
+    assert off[1] < 1.2 * off[0]
+
+
+def test_a_plain_bend_is_the_same_to_the_last_bit() -> None:
+    force = np.linspace(-300.0, 300.0, 301)
+    plain = bent({}, force)
+    same = {"bend_push_m_per_N": 1e-4, "bend_hysteresis_width_N": 10.0}
+    assert np.array_equal(plain, bent(same, force))
+    assert np.array_equal(plain, 1e-4 * force)
+
+
+# --- a common structure --------------------------------------------------------------------------
+
+
+def rig_with(structure: dict[str, Any], changes: dict[str, Any]) -> Rig:
+    """Return the joined bench with another structure, changed at once with the rest."""
+    return joined({**changes, "structure": structure})
+
+
+def settled(rig: Rig, column_N: float, wheel_N: float, pressure: float = 3000.0) -> Floats:
+    """Return the last row's channels, shape (2, 9), after 6 s of forces held."""
+    packed, frames = pack(rig), round(6.0 * rig.frame_rate)
+    script = np.zeros((2, 2, frames * rig.substeps + 1))
+    script[:, 0] = np.array([[column_N], [wheel_N]])
+    record = np.zeros((frames, 2 + 2 * CHANNELS_PER_CONTROL))
+    for k in range(frames):
+        step_frame(packed, script, record, k, (pressure,), 1.0)
+    return record[-1, 1:-1].reshape(2, CHANNELS_PER_CONTROL)
+
+
+def test_every_force_bends_at_every_control() -> None:
+    rig = joined()
+    (column, wheel) = settled(rig, 150.0, 60.0)
+    assert column[2] - column[1] == pytest.approx(K_REPORT * 150.0 + BETWEEN * 60.0, rel=1e-9)
+    assert wheel[2] - wheel[1] == pytest.approx(8e-4 * 60.0 + BETWEEN / RADIUS * 150.0, rel=1e-9)
+
+
+def test_the_structure_follows_the_force_without_delay() -> None:
+    """At every frame, also while both forces move, to the last bit of the sum."""
+    rig = joined()
+    packed, frames = pack(rig), 100
+    times = np.arange(frames * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
+    script = np.zeros((2, 2, len(times)))
+    script[0, 0], script[1, 0] = 100.0 * np.sin(5.0 * times), 50.0 * np.cos(7.0 * times)
+    record = np.zeros((frames, 2 + 2 * CHANNELS_PER_CONTROL))
+    for k in range(frames):
+        step_frame(packed, script, record, k, (0.0,), 1.0)
+    alone = rig.changed({"structure.column_by_wheel_m_per_N": 0.0, "structure.reciprocal": False})
+    other = pack(alone)
+    apart = np.zeros_like(record)
+    for k in range(frames):
+        step_frame(other, script, apart, k, (0.0,), 1.0)
+    wheel = record[:, 1 + CHANNELS_PER_CONTROL]
+    assert record[:, 3] - apart[:, 3] == pytest.approx(BETWEEN * wheel, abs=1e-15)
+
+
+def test_a_structure_without_terms_changes_no_bit() -> None:
+    """Joined or not, the same numbers: the order of the nodes does not matter without terms."""
+    rig = joined(structure={"column_by_wheel_m_per_N": 1e-300 * 0.0})
+    assumed = joined(structure={}, assumed={"column_by_wheel_m_per_N": 1e-5}).changed(
+        {"controls.column.compensation.deflection": False}
+    )
+    plain = rig.changed({"controls.column.compensation.deflection": False})
+    assert np.array_equal(settled(plain, 150.0, 60.0), settled(assumed, 150.0, 60.0))
+
+
+@pytest.mark.parametrize(
+    ("assumed", "left"), [({}, BETWEEN), ({"column_by_wheel_m_per_N": 2e-5}, 1e-5), (FULL, 0.0)]
+)
+def test_the_host_adds_what_it_assumes_of_the_others(assumed: dict[str, Any], left: float) -> None:
+    rig = joined(assumed=assumed)
+    column, _ = settled(rig, 150.0, 60.0)
+    assert column[2] - column[3] == pytest.approx(left * 60.0, abs=1e-12)
+    off = joined({"controls.column.compensation.deflection": False}, assumed=assumed)
+    column, _ = settled(off, 150.0, 60.0)
+    assert column[3] == pytest.approx(column[1], rel=1e-12)
+
+
+def test_the_host_adds_the_force_as_it_reads_it() -> None:
+    rig = joined({"controls.wheel.sensing.force_scale": 1.1}, assumed=FULL)
+    column, _ = settled(rig, 150.0, 60.0)
+    assert column[3] - column[2] == pytest.approx(0.1 * BETWEEN * 60.0, rel=1e-6)
+
+
+def test_losses_of_joined_controls_are_those_of_eq_7a_for_a_matrix() -> None:
+    """A bench flown against K·G·δ, with what each loader holds."""
+    rig = joined(
+        {
+            "controls.column.compensation.deflection": False,
+            "controls.wheel.compensation.deflection": False,
+        }
+    )
+    column, wheel = settled(rig, 150.0, 60.0)
+    seen = np.array([column[2], wheel[2]])
+    felt = np.array([150.0, 60.0]) / seen
+    lost = seen - np.array([column[3], wheel[3]])
+    controls = {str(name): control for name, control in rig.controls.items()}
+    wanted = lost_deflections(whole(controls, rig.structure), felt, seen)
+    assert lost == pytest.approx(wanted, rel=1e-9)
+
+
+def test_felt_forces_of_joined_controls() -> None:
+    """F = (1 + g·K)⁻¹·g·δ: with the diagonal known, G·(δ − Σ K_ij·F_j)."""
+    rig = joined()
+    column, wheel = settled(rig, 150.0, 60.0)
+    controls = {str(name): control for name, control in rig.controls.items()}
+    gradient = np.array([G_STIFF, 90.0])
+    bends = whole(controls, rig.structure)
+    on_computed = gradient / (1.0 - np.diag(bends) * gradient)
+    seen = np.array([column[2], wheel[2]])
+    assert felt_forces(bends, on_computed, seen) == pytest.approx([150.0, 60.0], rel=1e-6)
+    shifted = gradient[0] * (seen[0] - BETWEEN * 60.0)
+    assert shifted == pytest.approx(150.0, rel=1e-6)
+    # And without terms it is the gradient itself.
+    alone = np.diag(np.diag(bends))
+    assert felt_forces(alone, on_computed, seen) == pytest.approx(gradient * seen, rel=1e-12)
+
+
+def test_the_static_line_holds_with_forces_on_the_others() -> None:
+    rig = joined(assumed={"column_by_wheel_m_per_N": 2e-5})
+    column, _ = settled(rig, 150.0, 60.0)
+    line = static_line(rig, "column", 3000.0, np.array([column[1]]), {"wheel": 60.0})
+    assert line.force[0] == pytest.approx(150.0, rel=1e-6)
+    assert line.deflection[0] == pytest.approx(column[2], rel=1e-9)
+    assert line.estimate[0] == pytest.approx(column[3], rel=1e-9)
+    point = static_point(rig, "column", 3000.0, column[2], {"wheel": 60.0})
+    assert point.computed[0] == pytest.approx(column[1], rel=1e-9)
+    opposite = static_point(rig, "column", 3000.0, 0.001, {"wheel": 60.0})
+    assert opposite.deflection[0] == pytest.approx(0.001, rel=1e-9)
+    assert opposite.force[0] < 0.0
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e7, 1e10])
+def test_two_stiff_clamps_on_one_structure_are_stable(stiffness: float) -> None:
+    """Between loaders that stand still, at 0.95 of what positive definiteness allows: F = K⁻¹·δ."""
+    most = 0.95 * float(np.sqrt(K_REPORT * 8e-4 * RADIUS))
+    between = {
+        "column_by_wheel_m_per_N": most,
+        "wheel_by_column_rad_per_N": most / RADIUS,
+        "reciprocal": True,
+    }
+    still = {
+        f"controls.{name}.loader.{key}{end}": 1e12
+        for name, d in (("column", "m"), ("wheel", "rad"))
+        for key, end in (("mass", "_kg"), ("damping", f"_N_s_per_{d}"))
+    }
+    soft = {"controls.column.schedule.total_gradient_N_per_m": [560.0, 560.0]}
+    soft |= {"controls.wheel.schedule.total_gradient_N_per_rad": [30.0, 30.0]}
+    rig = rig_with(between, {**still, **soft})
+    hand = Hand(stiffness=stiffness)
+    packed, frames = pack(rig, {"column": hand, "wheel": hand}), 300
+    script = np.zeros((2, 2, frames * rig.substeps + 1))
+    ramp = np.minimum(np.linspace(0.0, 3.0, script.shape[2]), 1.0)
+    script[:, 1] = np.array([[0.005], [0.04]]) * ramp
+    record = np.zeros((frames, 2 + 2 * CHANNELS_PER_CONTROL))
+    for k in range(frames):
+        step_frame(packed, script, record, k, (0.0,), 1.0)
+    controls = {str(name): control for name, control in rig.controls.items()}
+    bends = whole(controls, rig.structure) + np.eye(2) / stiffness
+    wanted = np.linalg.solve(bends, [0.005, 0.04])
+    assert record[-1, [1, 1 + CHANNELS_PER_CONTROL]] == pytest.approx(wanted, rel=1e-5)
+
+
+def test_clamps_on_moving_loaders_settle() -> None:
+    """Hands of 10 kN/m on loaders that move, at half of what positive definiteness allows."""
+    most = 0.5 * float(np.sqrt(K_REPORT * 8e-4 * RADIUS))
+    rig = rig_with(
+        {"column_by_wheel_m_per_N": most, "wheel_by_column_rad_per_N": most / RADIUS},
+        {"controls.column.schedule.total_gradient_N_per_m": [560.0, 560.0]},
+    )
+    hands = {
+        "column": Hand(stiffness=1e4, damping=100.0),
+        "wheel": Hand(stiffness=1e3, damping=10.0),
+    }
+    packed, frames = pack(rig, hands), 600
+    script = np.zeros((2, 2, frames * rig.substeps + 1))
+    script[:, 1] = np.array([[0.05], [0.4]]) * np.minimum(np.linspace(0.0, 6.0, script.shape[2]), 1)
+    record = np.zeros((frames, 2 + 2 * CHANNELS_PER_CONTROL))
+    for k in range(frames):
+        step_frame(packed, script, record, k, (0.0,), 1.0)
+    assert np.ptp(record[-50:, [1, 1 + CHANNELS_PER_CONTROL]], axis=0) == pytest.approx(0, abs=1e-3)
+
+
+def test_a_record_of_joined_controls_shows_a_linkage_gap_to_a_diagonal_rig() -> None:
+    rig = joined()
+    column, _ = settled(rig, 150.0, 60.0)
+    held = {name: np.full(400, value) for name, value in (("c", column[1]), ("f", 150.0))}
+    others = {"wheel": np.full(400, 60.0)}
+    seen = replay_linkage(rig, "column", held["c"], held["f"], others)
+    assert seen[-1] == pytest.approx(column[2], rel=1e-9)
+    apart = rig.changed({"structure": type(rig.structure)()})
+    assert column[2] - replay_linkage(apart, "column", held["c"], held["f"], others)[-1] == (
+        pytest.approx(BETWEEN * 60.0, rel=1e-9)
+    )
+    host = joined(assumed=FULL)
+    estimate = replay_compensation(host, "column", held["c"], held["f"], others)
+    assert estimate[-1] == pytest.approx(column[2], rel=1e-9)
+
+
+# --- what cannot be ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("structure", "problem"),
+    [
+        (
+            {"column_by_pedals_m_per_N": 1e-5},
+            r"structure\.column_by_pedals_m_per_N: the rig has no",
+        ),
+        (
+            {"column_by_wheel_m_per_N": 1e-4, "wheel_by_column_rad_per_N": 8e-4},
+            r"structure: the compliance of column, wheel is not positive definite",
+        ),
+        (
+            {**STRUCTURE, "wheel_by_column_rad_per_N": 1.5e-4},
+            r"structure\.wheel_by_column_rad_per_N: is 0\.00015; .* reciprocal: 0\.00012",
+        ),
+        ({"column_by_wheel_rad_per_N": 1e-5}, "wrong unit: give column_by_wheel_m_per_N"),
+    ],
+)
+def test_a_structure_that_cannot_be_is_refused_by_name(
+    structure: dict[str, Any], problem: str
+) -> None:
+    with pytest.raises(InputError, match=problem):
+        joined(structure=structure)
+
+
+def test_reciprocity_is_checked_only_where_asked_for() -> None:
+    free = {**STRUCTURE, "wheel_by_column_rad_per_N": 1.5e-4, "reciprocal": False}
+    assert joined(structure=free).structure.wheel_by_column == 1.5e-4
+
+
+def test_gradients_are_bounded_by_the_eigenvalue() -> None:
+    """K·G_T of each control is below 1, and their structure still refuses both together."""
+    stiff = {"controls.wheel.schedule.total_gradient_N_per_rad": [30.0, 1.0]}
+    at = 0.9 / K_REPORT
+    changes = {"controls.column.schedule.total_gradient_N_per_m": [560.0, at], **stiff}
+    assert joined(changes).controls["column"].schedule.total_gradient[-1] == at
+    both = {**changes, "controls.wheel.schedule.total_gradient_N_per_rad": [30.0, 0.9 / 8e-4]}
+    rigid = joined({"structure": {}})
+    assert rigid.changed(both).structure.stands_apart
+    with pytest.raises(InputError, match=r"structure: K·G_T has the eigenvalue 1\.\d+ at 3000 Pa"):
+        joined(both)
+
+
+def test_a_stiffening_bend_does_not_join() -> None:
+    with pytest.raises(InputError, match=r"loader\.bend_limit_m: a structure that joins"):
+        joined({"controls.column.loader.bend_limit_m": 0.02})
+
+
+def test_a_structure_is_written_as_it_is_read() -> None:
+    rig = joined(assumed=FULL)
+    assert rig_from_table(loads_toml(rig_text(rig), "again"), "again") == rig
+    assert "[structure.assumed]" in rig_text(rig)
+    assert "structure" not in rig_text(bench())
+
+
+def test_the_rigid_configuration_has_no_structure() -> None:
+    rigid = configure(joined({"controls.column.loader.bend_push_m_per_N": 9e-5}), "rigid")
+    assert rigid.structure.stands_apart
+    column, _ = settled(rigid, -150.0, 60.0)
+    assert column[2] == pytest.approx(column[1], rel=1e-12)
+    assert joined().only("column").structure.stands_apart
+    assert coupled.load_rig("t37").structure.stands_apart
