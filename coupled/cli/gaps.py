@@ -77,15 +77,18 @@ def diagnose(
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name)
+    worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
     with Outputs() as outputs:
-        if improve is not None:
+        if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:
             _draw(outputs.folder(plots), whole)
         keep_json(table, json_file, outputs)
     if json_file != "-":
-        _print(whole, power, improve, drawn)
+        _print(whole, power, None if worse else improve, drawn)
+        if worse:
+            say(f"not written: {improve}. With it the flight stays further from the record")
     print_json(table, json_file)
 
 
@@ -140,11 +143,17 @@ def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
+    from coupled.gap.summary import change, plain
     from coupled.rig.rigwrite import rig_text
 
     names = ", ".join(shown(Path(name).name) for name in records)
-    remark = f"{shown(rig_file.name)} with what was found in {names}:\n"
-    write_text(path, rig_text(whole.improved, remark + whole.summary))
+    remark = f"{shown(rig_file.name)} with what was found in {names}:\n{whole.summary}\n"
+    for effect in whole.effects:
+        remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
+    for setting in whole.settings:
+        moved = f"{100 * (setting.factor - 1):+.2f} %, within what it is set to"
+        remark += f"changed: {plain(setting.name)} {moved}\n"
+    write_text(path, rig_text(whole.improved, remark))
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:

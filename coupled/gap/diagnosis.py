@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from coupled.gap.choose import Choice
-from coupled.gap.flown import ChannelAgain, closed_loop
+from coupled.gap.flown import ChannelAgain, closed_loop, nearer
 from coupled.gap.output import Output
 from coupled.gap.power import EffectPower, power
 from coupled.gap.proposal import ProposedTest, in_one_line, next_tests
@@ -47,6 +47,11 @@ class Diagnosis(Findings):
         if not self.choice.steps:
             return None
         return closed_loop(self.nominal, self.improved, self.control, self.first)
+
+    @property
+    def improves(self) -> bool:
+        """Whether the improved rig flies no further from the record than the one as filed."""
+        return self.closed_loop is None or nearer(self.closed_loop)
 
     @cached_property
     def next_tests(self) -> tuple[ProposedTest, ...]:

@@ -17,7 +17,7 @@ from coupled.flight.pilot.base import Start
 from coupled.gap.air import vertical_air
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import surface_channel
-from coupled.gap.thresholds import PROFILE_EVERY
+from coupled.gap.thresholds import PROFILE_EVERY, SAME_FLIGHT
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -48,6 +48,12 @@ class ChannelAgain:
         known = {"before_s": self.before_s, "after_s": self.after_s}
         found = {"before": self.before, "after": self.after}
         return found | {name: value for name, value in known.items() if value is not None}
+
+
+def nearer(channels: Sequence[ChannelAgain]) -> bool:
+    """Tell whether the improved rig flies no further from the record, on the geometric mean."""
+    ratios = [one.after / one.before for one in channels if one.before > 0.0]
+    return not ratios or float(np.mean(np.log(np.maximum(ratios, 1e-12)))) <= SAME_FLIGHT
 
 
 class Recorded(Pilot):

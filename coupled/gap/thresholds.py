@@ -111,6 +111,7 @@ SETTING_NUDGE = 1.01  # chosen: factor by which a setting's signature is taken
 TEST_s = 15.0  # chosen: length of a test
 TEST_EDGE_s = 0.25  # chosen: in which a hand can begin or end a push
 SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
+SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 
 # What the summary says (`summary`).

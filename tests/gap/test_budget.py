@@ -12,6 +12,7 @@ from coupled.gap import diagnose as diagnosing
 from coupled.gap.budget import NOISE, UNEXPLAINED
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import apply
+from coupled.gap.flown import ChannelAgain, nearer
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.rig.replay import replay_linkage
 from tests.support.gaps import made, nominal_rig
@@ -115,3 +116,12 @@ def test_no_gap_has_no_budget(tmp_path: Path) -> None:
     assert found.verdict == "no_gap"
     assert found.budget == ()
     assert found.as_dict()["budget"] == {}
+
+
+def test_a_rig_that_flies_further_from_the_record_is_not_offered() -> None:
+    same = ChannelAgain("column_deflection_m", 1e-4, 1e-4)
+    better = ChannelAgain("pitch_rate_rad_per_s", 1e-2, 1e-3)
+    worse = ChannelAgain("load_factor", 1e-2, 0.2)
+    assert nearer([]) and nearer([same]) and nearer([same, better])
+    assert not nearer([same, worse])
+    assert not nearer([better, worse])

@@ -211,6 +211,7 @@ def test_diagnose_on_the_command_line(tmp_path: Path) -> None:
         tmp_path, "diagnose", "r.csv", "--rig", "report-column", "--improve", "new.toml"
     )
     assert better.returncode == 0, better.stderr
+    assert "# changed: loader.play_m 0 → " in (tmp_path / "new.toml").read_text(encoding="utf-8")
     assert read_rig(tmp_path / "new.toml").controls["column"].loader.play == pytest.approx(
         1e-3, rel=0.05
     )
