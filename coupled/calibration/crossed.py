@@ -1,6 +1,6 @@
 """Which forces to hold on other controls, and how well they tell what these bend here.
 
-With K_j = −c_j/a of the fit, and c_j told by readings at which F_j is held with either sign
+With K_j = −c_j/a of the fit, and c_j known by readings at which F_j is held with either sign
 while this control's own force is as it is: its error is nearly that of the ruler,
 
     u(K_j) ≈ √(u_δ² + (u_v₁/S₁)²)/(F_j·√n),    n readings with ±F_j

@@ -185,7 +185,10 @@ def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, see
     sigma = np.array([levels.get(channel, 0.0) for channel in channels])
     if not sigma.any():
         return np.zeros((frames, len(channels)))
-    hiss = np.random.default_rng(seed).standard_normal((frames, len(channels)))
+    # The hand's own force has none and takes no draw: a seed's noise is that of older records.
+    drawn = np.array([not channel.endswith("_hand_force_N") for channel in channels])
+    hiss = np.zeros((frames, len(channels)))
+    hiss[:, drawn] = np.random.default_rng(seed).standard_normal((frames, int(drawn.sum())))
     hiss *= sigma
     return hiss
 

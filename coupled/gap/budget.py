@@ -166,4 +166,6 @@ class _Weights:
         power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
         floor = min(float(noise[pick] @ frames / frames.sum()), float(power[-1]))
         named = self._of @ power
+        if power[0] <= 0.0:  # stretches without any residual: nothing but noise, of size zero
+            return np.array([*(0.0 * named), 0.0, 1.0])
         return np.asarray(np.array([*named, power[-1] - floor, floor]) / power[0])

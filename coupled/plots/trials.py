@@ -43,5 +43,5 @@ def _points(axes: Axes, at: list[float], rows: Sequence[Share], color: str, labe
     shares, low, high = (
         np.array([(row.share, row.low, row.high) for row in rows], dtype=float).reshape(-1, 3).T
     )
-    bars = [shares - low, high - shares]
-    axes.errorbar(at, shares, bars, fmt="o-", color=color, capsize=3, label=label)
+    axes.plot(at, shares, "o-", color=color, label=label)
+    axes.vlines(at, low, high, color=color)

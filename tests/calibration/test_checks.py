@@ -409,6 +409,7 @@ FAULTS: dict[str, dict[str, float]] = {
     "breakout": {"breakout_N": 15.0},
     "force_offset": {"offset_N": 30.0},
     "modifying_lag": {"lag_s": 0.03},
+    "presliding_friction": {"friction_N": 30.0, "stiffness_N_per_{d}": 1e5},
     "deflection_scale": {"factor": 1.15},
     "bend": {"bend_{d}_per_N": 2.0 * K_REPORT},
     "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},

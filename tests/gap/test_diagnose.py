@@ -87,7 +87,7 @@ def test_a_single_effect_is_named_at_its_stage_and_size(
         near = 0.25 if name == "vertical_gust" else 0.06  # forty seconds meet few gusts
         assert measured == pytest.approx(value, rel=near), got
     assert found.shrink.closed is not None and found.shrink.closed > 0.95
-    assert name.replace("_", " ") in found.summary
+    assert name.replace("_", " ") in found.summary.lower()
     json.dumps(found.as_dict(), allow_nan=False)
 
 
