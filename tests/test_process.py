@@ -85,6 +85,7 @@ def test_a_terminal_without_our_letters_gets_question_marks(folder: Path, encodi
     assert json.loads(listed.stdout.decode(encoding)) == json.loads(ours.stdout.decode())
 
 
+@pytest.mark.slow
 def test_files_whose_names_are_no_text(folder: Path) -> None:
     (folder / os.fsdecode(b"r\xff.toml")).write_text(SHORT)
     done = shell(folder, "coupled fly $'r\\xff.toml' -o $'o\\xff.parquet' --json $'j\\xff.json'")

@@ -108,6 +108,7 @@ def test_the_seal_knows_its_key(made: Path, tmp_path: Path) -> None:
         check_seal(other, made / "seal.toml")
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_whatever_is_shipped_and_after_a_stop(
     made: Path, tmp_path: Path, grown: None
 ) -> None:

@@ -189,6 +189,7 @@ def test_a_seed_repeats_a_bench_and_another_does_not() -> None:
     assert np.all(one.deflection_looks == 2.0)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_and_k_is_within_5_percent() -> None:
     """120 benches of 25 readings; the benchmark counts 1000."""
     rig = report_rig()

@@ -108,6 +108,7 @@ def test_a_form_has_a_row_a_reading() -> None:
     assert all(line.count(",") == once[0].count(",") for line in once)
 
 
+@pytest.mark.slow
 def test_what_a_stiff_wheel_needs_is_said_and_does() -> None:
     """The T-37's stick bends little: of 25 readings δ̂ is right to 1.5 %, and 0.5 % is wanted."""
     rig, tools = read_rig(shipped_rigs()["t37"]), usual_instruments("wheel")

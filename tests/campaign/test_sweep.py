@@ -161,6 +161,7 @@ def test_a_killed_sweep_goes_on_and_repeats_no_flight(folder: Path) -> None:
         assert found.row(number, named=True) == row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_workers_end_with_an_interrupted_sweep_and_what_is_flown_is_kept(
     folder: Path, how: signal.Signals

@@ -149,6 +149,7 @@ def test_an_effect_without_a_number_is_always_tried(
     assert kept[1] == (BY_NAME["digital_multiplier"], [{}])
 
 
+@pytest.mark.slow
 def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
     """On the scale on which a large one is sought it lies within 1e-4 of its bound."""
     effect = {"cubic_stiffness": {"cubic_N_per_{d}3": 190.0}}
@@ -159,6 +160,7 @@ def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
     assert [e.name for e in found.effects] == ["cubic_stiffness"], found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect",
     [
@@ -209,6 +211,7 @@ def test_still_air_is_told_to_be_still_through_pulls_of_two_g(tmp_path: Path) ->
     assert np.std(told.error) == pytest.approx(0.011, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_killed_diagnosis_of_a_folder_leaves_no_worker(tmp_path: Path) -> None:
     (tmp_path / "rigs").mkdir()
     (tmp_path / "rigs" / "mine.toml").write_text(rig_text(RIG, "a bench"))

@@ -89,6 +89,7 @@ def test_a_gust_is_told_by_kinematics(tmp_path: Path) -> None:
     assert found.verdict == "unexplained"
 
 
+@pytest.mark.slow
 def test_power_is_the_size_at_which_an_effect_is_found(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     clean = made(tmp_path, nominal, {}, 8)
@@ -216,6 +217,7 @@ gradient = false
 """
 
 
+@pytest.mark.slow
 def test_a_loader_without_a_spring_is_judged_in_short_windows(tmp_path: Path) -> None:
     (tmp_path / "axis.toml").write_text(SPRINGLESS)
     found = diagnose(read_rig(tmp_path / "axis.toml"), {"a": drifting(tmp_path)}, "column")
@@ -225,6 +227,7 @@ def test_a_loader_without_a_spring_is_judged_in_short_windows(tmp_path: Path) ->
     assert named["force_offset"] == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_measured_axis_gives_its_published_answer(tmp_path: Path) -> None:
     """EMPS (Janot, Gautier, Brunot 2019): Fc 20.4 N, offset 3.2 N with the push, no Stribeck.
 

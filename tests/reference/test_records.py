@@ -144,6 +144,7 @@ def test_surface_and_airframe(case: Case) -> None:
         assert rms(left) == pytest.approx(NOISE[name], rel=0.1), name
 
 
+@pytest.mark.slow
 def test_the_shipped_records_are_those_of_the_script() -> None:
     """The twin of today makes the record that is kept."""
     _, level_N = rigs()["twin-bench"]
