@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from typer.testing import CliRunner
@@ -312,6 +312,9 @@ def test_any_gauge_grows_as_linear_theory_says(
     share: float,
     arm: float,
 ) -> None:
+    # Theory takes a converter that samples for a delay. Behind four times the loader's mass that is
+    # off by 4 % of the fastest rate, which is beyond what this test allows.
+    assume(sampling_Hz == 0.0 or over <= 1.0)
     values: dict[str, str | float] = {
         f"{SENSING}.gauge_order": order,
         f"{SENSING}.gauge_frequency_Hz": bandwidth_Hz,
