@@ -157,6 +157,7 @@ def test_a_comparison_is_asked_by_configuration_and_case() -> None:
         (lambda: fly(column=PULL, duration_s=None), "manoeuvre: duration_s: is missing"),
         (lambda: fly(column=PULL, duration_s=-1), "duration_s: input should be greater than 0"),
         (lambda: fly(column=PULL, sead=1), "sead: unknown key; did you mean seed?"),
+        (lambda: fly(colunm=PULL), "colunm: unknown key; did you mean column?"),
         (lambda: fly(column=PULL, name="pull", seed=-1), "pull: seed: input should be greater"),
         (lambda: fly(column=PULL, configuration="stiff"), "no 'stiff'"),
         (lambda: fly(column=PULL, dynamic_pressure_Pa=9.0), "t37 has an aircraft, which gives q̄"),

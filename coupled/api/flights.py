@@ -15,7 +15,7 @@ from coupled.flight.conditions import Conditions, build_conditions
 from coupled.flight.manoeuvre import EVERY_CONFIGURATION, Configuration, Manoeuvre, PressureProfile
 from coupled.flight.pilot import Pilot
 from coupled.flight.runfile import read_run
-from coupled.record.channels import ControlName
+from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.rig.rig import Rig
 from coupled.schema import known_keys
 
@@ -156,7 +156,8 @@ def _manoeuvre(
         _alone(what, pilots, duration_s, terms)
         return what
     name = terms.get("name", "manoeuvre")
-    known_keys(dict(terms), dict.fromkeys(Terms.__annotations__), name, "")
+    words = (*CONTROL_NAMES, "duration_s", *Terms.__annotations__)
+    known_keys(dict(terms), dict.fromkeys(words), name, "")
     if duration_s is None:
         raise InputError(name, "duration_s", "is missing")
     given: Mapping[str, object] = terms

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coupled.flight import loop
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
@@ -137,3 +138,13 @@ def test_three_controls_fly_together() -> None:
     for control, rate in (("column", "pitch"), ("wheel", "roll"), ("pedals", "yaw")):
         assert np.max(np.abs(record[f"{control}_force_N"])) > 10.0
         assert np.max(np.abs(record[f"{rate}_rate_rad_per_s"])) > 0.1
+
+
+def test_a_seeds_noise_does_not_hang_on_the_hands_own_force() -> None:
+    """That channel has no noise and takes no draw: the noise of a seed is that of older records."""
+    channels = ("time_s", "column_force_N", "column_hand_force_N", "pitch_rad")
+    levels = {"column_force_N": 0.5, "pitch_rad": 0.1}
+    noise = loop._noise(channels, levels, 50, 3)
+    plain = np.random.default_rng(3).standard_normal((50, 3)) * [0.0, 0.5, 0.1]
+    np.testing.assert_array_equal(noise[:, [0, 1, 3]], plain)
+    assert not noise[:, 2].any()
