@@ -1,7 +1,7 @@
 """Break a module in small ways, one at a time, and see whether its tests notice.
 
     python -m tests.mutation coupled/campaign/standards.py tests/campaign/test_check.py
-    python -m tests.mutation coupled/rig/linkage.py tests/rig/test_chain.py --plain --sample 25
+    python -m tests.mutation coupled/rig/linkage.py tests/rig/test_linkage.py --plain --sample 25
 
 Each mutant changes one operator, comparison, number or condition of the module. It is killed if
 a test fails, or hangs; one that survives is printed with its line: no test holds what it changed.

@@ -1,0 +1,58 @@
+"""Sensing: converters and scales."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupled.rig import sensing
+from coupled.rig.packing import pack
+from tests.support.rigs import bench
+
+SCHEDULE = "controls.column.schedule"
+
+
+@given(value=st.floats(-0.2, 0.2), bits=st.integers(6, 16))
+def test_a_converter_is_within_half_a_step(value: float, bits: int) -> None:
+    step = 2 * 0.2 / 2**bits
+    got = sensing.converted(value, step, 0.2)
+    assert abs(got - value) <= (0.5 if value < 0.2 - step else 1.0) * step + 1e-15
+    assert sensing.converted(got, step, 0.2) == pytest.approx(got, abs=1e-15)
+
+
+def test_a_converter_rounds_to_the_nearest_of_its_steps_and_holds_at_its_ends() -> None:
+    """Of 2ᴺ steps from −full scale on, the last is one step under full scale."""
+    found = [sensing.converted(0.1 * steps, 0.1, 0.8) for steps in (0.49, 0.51, -0.49, -0.51, 2.5)]
+    assert found == pytest.approx([0.0, 0.1, 0.0, -0.1, 0.3], abs=1e-15)
+    assert sensing.converted(5.0, 0.1, 0.8) == pytest.approx(0.7)
+    assert sensing.converted(-5.0, 0.1, 0.8) == pytest.approx(-0.8)
+    assert sensing.converted(0.123, 0.0, 0.0) == 0.123
+
+
+def test_what_is_read_is_the_scale_times_the_quantity_and_the_noise_on_it() -> None:
+    prefix = "controls.column.sensing"
+    rig = bench({f"{prefix}.deflection_scale": 1.1, f"{prefix}.force_scale": 0.9})
+    p = pack(rig)[0]["parameters"]["sensing"]
+    assert sensing.read_computed(p, 0.05, 1e-3) == pytest.approx(0.056, rel=1e-12)
+    assert sensing.read_force(p, -40.0, 0.5) == pytest.approx(-35.5, rel=1e-12)
+
+
+def test_scales_and_word_length_set_the_steps() -> None:
+    prefix = "controls.column.sensing"
+    rig = bench(
+        {
+            f"{prefix}.word_length_bits": 12,
+            f"{prefix}.s1_V_per_m": 500.0,
+            f"{prefix}.s2_V_per_N": 0.2,
+            f"{prefix}.s3_V_per_N": 0.25,
+        }
+    )
+    p = pack(rig)[0]["parameters"]["sensing"]
+    assert p["computed_step"] == pytest.approx(200.0 / 4096 / 500.0)
+    assert p["force_step"] == pytest.approx(200.0 / 4096 / 0.25)
+    assert p["product_step"] == pytest.approx(200.0 / 4096 / 0.2)
+    assert p["gradient_range"] == pytest.approx(500.0 / 0.2)
+    assert p["gradient_step"] == pytest.approx(2.0 * 500.0 / 0.2 / 4096)
+    for of, full in (("computed", 100.0 / 500.0), ("force", 100.0 / 0.25), ("product", 500.0)):
+        assert p[f"{of}_range"] == pytest.approx(full)
