@@ -128,24 +128,24 @@ def test_a_skewed_channel_is_what_stood_there_before(attribute: str) -> None:
     assert getattr(found, other) == pytest.approx(getattr(exact, other)[::20], abs=1e-12)
 
 
-def test_a_late_gradient_leaves_the_last_one_standing() -> None:
-    """The product is held over a frame: half a frame late, it is half the old one, half the new."""
-    base = {"multiplier": "digital", "mass_kg": 1e6, "damping_N_s_per_m": 0.0}
-    half_s = 0.5 / 100.0
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_a_late_gradient_leaves_the_last_one_standing(share: float) -> None:
+    """A product held over a frame comes a share of the frame late: until then the old one acts."""
+    mass, frame_s = 1e6, 0.01
+    base = {"multiplier": "digital", "mass_kg": mass, "damping_N_s_per_m": 0.0}
     rig = bench(base | {"controls.column.compensation.gradient": False}).changed(
         {"controls.column.schedule.total_gradient_N_per_m": [1560.0, 1560.0]}
     )
-    late = rig.changed({f"{SENSING}.gradient_skew_s": half_s})
-    frames, mass = 3, 1e6
+    late = rig.changed({f"{SENSING}.gradient_skew_s": share * frame_s})
+    frames = 3
     # A heavy loader under a great force: δc is ½·a·t², and F_mod small beside it.
     nodes = np.full(frames * rig.substeps + 1, 1e6)
     prompt_x, late_x = (run_control(r, "column", nodes, np.zeros(frames)) for r in (rig, late))
-    # F_mod at frames 1 and 2 is ΔG·½·a·T², ½·a·(2T)²; late, frame 1's second half has it only.
-    first = 1000.0 * 0.5 * 0.01**2
-    speed_lost = first * half_s / mass
-    distance_lost = speed_lost * 0.75 * 0.01  # of the first half of frame 1, to its end
+    # F_mod of frame 1 is ΔG·½·a·T². Where it comes late, that of frame 0, nothing, acts first.
+    force = 1000.0 * 0.5 * frame_s**2
+    spared = 0.5 * force / mass * frame_s**2 * (1.0 - (1.0 - share) ** 2)
     gained = late_x.computed[2] - prompt_x.computed[2]
-    assert gained == pytest.approx(distance_lost, rel=1e-3)
+    assert gained == pytest.approx(spared, rel=1e-3, abs=0.0)  # some 1e-12 m
 
 
 def test_a_multipliers_offset_is_a_constant_force_and_its_drift_one_linear_in_time() -> None:

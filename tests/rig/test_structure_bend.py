@@ -20,6 +20,7 @@ from coupled.rig.replay import replay_compensation, replay_linkage
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import rig_from_table
 from coupled.rig.rigwrite import rig_text
+from coupled.rig.standalone import nodes_of, run_control
 from coupled.rig.statics import static_line, static_point
 from coupled.rig.structure import felt_forces, lost_deflections, whole
 from coupled.schema import loads_toml
@@ -79,6 +80,20 @@ def test_the_work_that_hysteresis_takes_in_a_cycle(
     held = force[2000:]
     work = float(np.sum(0.5 * (held[1:] + held[:-1]) * np.diff(seen)))
     assert work == pytest.approx(share * 1e-4 * width * (2.0 * amplitude - width), rel=2e-3)
+
+
+def test_a_flown_force_takes_the_bends_hysteresis_along() -> None:
+    """Pulled to 60 N and let go to 40 N, the grip's bend is that of its two shares: the path's."""
+    share, width = 0.4, 10.0
+    rig = bench({"bend_hysteresis_share": share, "bend_hysteresis_width_N": width})
+    frames = 700
+    times = nodes_of(rig, frames)
+    nodes = np.interp(times, [0.0, 1.0, 3.5, 4.5], [0.0, 60.0, 60.0, 40.0])
+    found = run_control(rig, "column", nodes, np.zeros(frames))
+    shown = found.deflection - found.computed  # at rest the servo stands at δc
+    for at_s, force, carried in ((3.49, 60.0, 55.0), (6.99, 40.0, 45.0)):
+        bend = K_REPORT * ((1.0 - share) * force + share * carried)
+        assert shown[round(at_s * rig.frame_rate)] == pytest.approx(bend, rel=1e-3)
 
 
 def test_hysteresis_within_its_width_bends_less_and_takes_no_work() -> None:
@@ -227,6 +242,17 @@ def test_the_host_adds_the_force_as_it_reads_it() -> None:
     rig = joined({"controls.wheel.sensing.force_scale": 1.1}, assumed=FULL)
     column, _ = settled(rig, 150.0, 60.0)
     assert column[3] - column[2] == pytest.approx(0.1 * BETWEEN * 60.0, rel=1e-6)
+
+
+def test_the_host_adds_the_force_that_the_gauge_has() -> None:
+    """Before its slow amplifier has answered, the wheel's gauge knows nothing of the force."""
+    slow = {"gauge_frequency_Hz": 0.01, "gauge_order": "first"}
+    changes = {f"controls.wheel.sensing.{key}": value for key, value in slow.items()}
+    column, wheel = settled(joined(changes, assumed=FULL), 150.0, 60.0)
+    assert 0.0 < wheel[0] < 30.0  # F as the gauge has it, after 6 s
+    assert column[3] - column[1] == pytest.approx(
+        K_REPORT * column[0] + BETWEEN * wheel[0], rel=1e-9
+    )
 
 
 def test_losses_of_joined_controls_are_those_of_eq_7a_for_a_matrix() -> None:
