@@ -40,6 +40,11 @@ def shipped_sweeps() -> dict[str, Path]:
     return {p.stem: p for p in sorted(runs_folder().glob("sweeps/*.toml"))}
 
 
+def starter(name: str) -> Path:
+    """Return a commented file to start from, by its name."""
+    return Path(__file__).parent / "starters" / name
+
+
 def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = None) -> Path:
     """Return the file that a user's word means: a path, or the name of a shipped one.
 

@@ -33,3 +33,29 @@ def form(
             held = [f" and {forces[at]:g} N on the {name}" for name, forces in others.items()]
             lines.append(f"{station.label}{empty}{where}{''.join(held)}")
     return "\n".join(lines) + "\n"
+
+
+_STARTING_LOADS = (0.25, 0.5, 0.75, 1.0)  # of the most that is pulled, in each gradient set
+
+
+def starting_form(control: str, inches: bool = False) -> str:
+    """Return a form for a loader of which nothing is known yet, as a CSV with empty cells.
+
+    Two gradient sets, each pulled at four loads, and four nulls from both sides (eq. 14). A
+    wheel's deflection is in degrees; otherwise it is in mm and newtons, or inches and pounds.
+    """
+    unit = "deg" if control == "wheel" else "in" if inches else "mm"
+    force = "lb" if inches else "N"
+    heads = f"gradient_set,deflection_{unit},force_{force},v1_V,v3_V"
+    heads += f",deflection_after_{unit},force_after_{force},v2_V,approach,remark"
+    lines = [heads]
+    for label in ("softest", "stiffest"):
+        for load in _STARTING_LOADS:
+            where = f"{label} gradient: pull to {100 * load:.0f} % of what travel or strength allow"
+            where += "; ruler and scale; the voltmeter; ruler and scale again"
+            lines.append(f"{label},,,,,,,,,{where}")
+    for approach in ("out", "in", "out", "in"):
+        way = "" if approach == "out" else " from further out"
+        what = f"null: pull and note v1 and v3 without v2; then let v2 bring v1 back{way}"
+        lines.append(f"stiffest,,,,,,,,{approach},{what}")
+    return "\n".join(lines) + "\n"

@@ -10,6 +10,7 @@ from coupled.cli import (
     gaps,
     logs,
     maps,
+    new,
     stability,
 )
 from coupled.cli.app import app, main
@@ -26,5 +27,6 @@ __all__ = [
     "logs",
     "main",
     "maps",
+    "new",
     "stability",
 ]

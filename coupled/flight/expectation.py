@@ -7,8 +7,12 @@ where the bounds are from, above all whether they only pin what the model did be
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
+
+from pydantic import ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from coupled.errors import InputError, nearest
 from coupled.record.channels import CONTROL_NAMES, ControlName, channel
@@ -41,6 +45,11 @@ RATE: Standard = "rate against rigid"
 RATES = (SMALL_RATE, RATE)  # they hold a flight against the rigid one
 REFERENCE = "rigid"
 
+SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole: a bound of 1 bounds nothing
+RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "felt_ratio")
+RELATIVE += ("felt_ratio_closed_form",)
+_PER_CENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
+
 
 class Expect(Section):
     """One expectation; of `channel`, `measure` and `standard` just one is given."""
@@ -64,6 +73,21 @@ class Expect(Section):
     equal: float | None = named("is", None)
     within: float | None = quantity("", None, ge=0)
     why: str | None = None
+
+    @field_validator("least", "most", "equal", "within", mode="before")
+    @classmethod
+    def _in_shares(cls, value: Any, info: ValidationInfo) -> Any:
+        """Return a bound that is written in per cent as a share; refuse a share of 1 or more."""
+        measure, channel = info.data.get("measure"), info.data.get("channel") or ""
+        if isinstance(value, str):
+            found = _PER_CENT.fullmatch(value)
+            if found is None or not (measure in RELATIVE or channel.endswith("_norm")):
+                raise PydanticCustomError("number", "should be a number, without quotes")
+            return float(found[1]) / 100.0
+        if measure in SHARES and isinstance(value, (int, float)) and abs(value) >= 1:
+            message = 'is a share, of which 1 is everything: write 0.01 or "1 %" for one per cent'
+            raise PydanticCustomError("share", message)
+        return value
 
     @property
     def bounds(self) -> tuple[float | None, float | None]:

@@ -60,6 +60,30 @@ def flight(values: Any, ended: bool = False) -> Flight:
 RISE = np.linspace(0.0, 0.9, 10)
 
 
+@pytest.mark.parametrize(("text", "share"), [("1 %", 0.01), ("-2.5%", -0.025), (" .5 % ", 0.005)])
+def test_a_share_may_be_written_in_per_cent(text: str, share: float) -> None:
+    assert expect(measure="loss", most=text).bounds == (None, share)
+    assert expect(channel="column_surface_norm", least=text).bounds == (share, None)
+    within = expect(measure="felt_ratio", **{"is": "100 %", "within": "2 %"}).bounds
+    assert within == pytest.approx((0.98, 1.02))
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"measure": "loss", "most": 1}, 'is a share, .* "1 %" for one per cent, is 1'),
+        ({"measure": "loss_closed_form", "least": -1.5}, "is a share"),
+        ({"measure": "loss", "is": 0.1, "within": 1.0}, "is a share"),
+        ({"measure": "force_N", "most": "1 %"}, "should be a number, without quotes"),
+        ({"measure": "loss", "most": "0.01"}, "should be a number, without quotes"),
+        ({"channel": "pitch_rad", "most": "1 %"}, "should be a number, without quotes"),
+    ],
+)
+def test_a_share_that_was_meant_in_per_cent_is_refused(keys: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        expect(**keys)
+
+
 @pytest.mark.parametrize(
     ("keys", "value", "margin"),
     [
@@ -102,7 +126,7 @@ def test_a_difference_is_taken_row_by_row() -> None:
         ({"channel": "x", "most": 5.0}, True, "ended early: test"),
         ({"channel": "x", "at_s": 0.95, "most": 5.0}, True, "ended early: test"),
         ({"channel": "x", "from_s": 0.91, "to_s": 0.92, "most": 5.0}, False, "no row"),
-        ({"measure": "loss", "most": 5.0}, True, "ended early: test"),
+        ({"measure": "loss", "most": 0.5}, True, "ended early: test"),
         ({"measure": "time_to_attitude_s", "most": 5.0}, False, "no such figure"),
     ],
 )
@@ -281,18 +305,18 @@ def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
         ('standard = "25.143"', "expect[0].standard: input should be"),
         ("most = 1.0", "expect[0]: give one of channel, measure and standard"),
         ('measure = "loss"', "expect[0]: has no bound"),
-        ('measure = "loss"\nis = 1.0', "expect[0]: is and within are given together"),
-        ('measure = "loss"\nis = 1.0\nwithin = 0.1\nleast = 0.0', "not both"),
-        ('measure = "loss"\nleast = 1.0\nmost = 0.0', "nothing is at least 1 and at most 0"),
-        ('measure = "loss"\nmost = 1.0\nat_s = 1.0', "at_s: has no meaning with measure"),
+        ('measure = "loss"\nis = 0.5', "expect[0]: is and within are given together"),
+        ('measure = "loss"\nis = 0.5\nwithin = 0.1\nleast = 0.0', "not both"),
+        ('measure = "loss"\nleast = 0.5\nmost = 0.0', "nothing is at least 0.5 and at most 0"),
+        ('measure = "loss"\nmost = 0.5\nat_s = 1.0', "at_s: has no meaning with measure"),
         ('channel = "time_s"\nmost = 1.0\nat_s = 3.0', "at_s: is 3; give less than duration_s = 2"),
         ('channel = "time_s"\nmost = 1.0\nfrom_s = 1.0\nto_s = 0.5', "must be after from_s"),
         ('channel = "time_s"\nreaches = 1.0', "reaches needs by_s"),
         ('channel = "time_s"\nby_s = 1.0', "by_s: needs the level"),
         ('channel = "time_s"\nmost = 1.0\ncase = "x"', "case: no 'x'; known: push"),
-        ('measure = "loss"\nmost = 1.0\nconfiguration = "gradient only"', "flies no 'gradient on"),
+        ('measure = "loss"\nmost = 0.5\nconfiguration = "gradient only"', "flies no 'gradient on"),
         (
-            'measure = "loss"\nmost = 1.0\nminus = "rigid"\nconfiguration = "rigid"',
+            'measure = "loss"\nmost = 0.5\nminus = "rigid"\nconfiguration = "rigid"',
             "holds rigid against itself",
         ),
         ('standard = "25.143(d) one hand"\ncontrol = "wheel"', "control: the rig has no wheel"),

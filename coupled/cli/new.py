@@ -1,0 +1,91 @@
+"""The commands that write commented starters: new run, sweep, map, readings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupled.cli.app import app
+from coupled.cli.terminal import say
+from coupled.errors import InputError, nearest
+from coupled.files import check_target, read_text, write_text
+from coupled.record.channels import CONTROL_NAMES
+from coupled.resources import starter
+
+new = typer.Typer(no_args_is_help=True, help="Write a commented file to start from.")
+app.add_typer(new, name="new")
+
+
+@new.command(epilog="[dim]Example: coupled new run pull.toml, then coupled compare ./pull.toml[/]")
+def run(
+    file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-run.toml"),
+) -> None:
+    """Write a run: a rig, a pilot, two cases, what is measured and expected."""
+    write_new(file, _text("run.toml"), ".toml", f"coupled compare {_word(file)}")
+
+
+@new.command(epilog="[dim]Example: coupled new sweep s.toml, then coupled sweep ./s.toml[/]")
+def sweep(
+    file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-sweep.toml"),
+) -> None:
+    """Write a sweep: a run flown over two of its parameters."""
+    write_new(file, _text("sweep.toml"), ".toml", f"coupled sweep {_word(file)}")
+
+
+@new.command(
+    "map", epilog="[dim]Example: coupled new map m.toml, then coupled import LOG --map m.toml[/]"
+)
+def map_(
+    file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-map.toml"),
+) -> None:
+    """Write the map of a log: its columns as channels, with units, signs and clock."""
+    write_new(file, _text("map.toml"), ".toml", f"coupled import LOG --map {_word(file)}")
+
+
+@new.command(
+    epilog="[dim]Examples: coupled new readings · coupled new readings w.csv --control wheel[/]"
+)
+def readings(
+    file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-readings.csv"),
+    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
+) -> None:
+    """Write a form for a loader's readings, each row with what to do.
+
+    coupled calibrate --plan --write FILE makes one for a rig of your own, with the places where
+    its readings tell most.
+    """
+    from coupled.calibration.form import starting_form
+
+    if control not in CONTROL_NAMES:
+        hint = nearest(control, CONTROL_NAMES)
+        raise InputError("new readings", "--control", f"no {control!r}; {hint}")
+    then = f"coupled calibrate {_word(file)} --rig RIG --control {control}"
+    write_new(file, starting_form(control, inches), ".csv", f"fill it in, then: {then}")
+
+
+def write_new(file: Path, text: str, suffix: str, then: str) -> None:
+    """Write a starter where no file is yet, and say what to do with it next.
+
+    Raises InputError for another ending than `suffix`, and where a file is there already.
+    """
+    if file.suffix.lower() != suffix:
+        raise InputError(file, "", f"give a name that ends in {suffix}")
+    check_target(file)
+    if file.exists():
+        raise InputError(file, "", "is there already; give the name of a new file")
+    write_text(file, text)
+    say(f"written: {file}")
+    say(f"next: {then}")
+
+
+def _text(name: str) -> str:
+    return read_text(starter(name), "it was shipped as such")
+
+
+def _word(file: Path) -> str:
+    """Return the file as a command takes it."""
+    text = str(file)
+    return f"'{text}'" if " " in text else text

@@ -1,0 +1,84 @@
+"""Starters: each is what its command reads, as it was written."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from coupled.calibration.form import starting_form
+from coupled.calibration.readingsfile import read_readings
+from coupled.campaign.plan import read_plan
+from coupled.errors import InputError
+from coupled.record.importing.mapping import CHANNELS, read_map
+from tests.support.commands import coupled, files
+
+
+def test_a_new_run_passes_its_own_expectations(tmp_path: Path) -> None:
+    made = coupled(tmp_path, "new", "run", "pull.toml")
+    assert made.stdout.splitlines() == ["written: pull.toml", "next: coupled compare pull.toml"]
+    checked = coupled(tmp_path, "check", "./pull.toml")
+    assert checked.returncode == 0, checked.stdout
+    assert "4 of 4 expectations hold" in checked.stdout
+
+
+def test_a_new_sweep_is_planned_as_its_comments_say(tmp_path: Path) -> None:
+    assert coupled(tmp_path, "new", "sweep").returncode == 0
+    plan = read_plan(tmp_path / "my-sweep.toml")
+    assert len(plan.keys) == 2
+    assert [len(plan.sweep.vary[1].values or ()), plan.sweep.vary[0].steps] == [2, 4]
+
+
+def test_a_new_map_names_channels_of_a_record(tmp_path: Path) -> None:
+    assert coupled(tmp_path, "new", "map", "m.toml").returncode == 0
+    found = read_map(tmp_path / "m.toml")
+    assert {"column_force_N", "column_computed_m", "column_deflection_m"} <= set(found.channels)
+    text = (tmp_path / "m.toml").read_text(encoding="utf-8")
+    named = [
+        line.split(".", 1)[1].split("]")[0] for line in text.splitlines() if "[channels." in line
+    ]
+    assert len(named) == 8
+    assert set(named) <= set(CHANNELS)
+
+
+@pytest.mark.parametrize("control", ["column", "wheel", "pedals"])
+@pytest.mark.parametrize("inches", [False, True])
+def test_new_readings_are_read_once_they_are_filled_in(
+    tmp_path: Path, control: str, inches: bool
+) -> None:
+    rows = list(csv.DictReader(starting_form(control, inches).splitlines()))
+    empty = tmp_path / "form.csv"
+    empty.write_text(starting_form(control, inches), encoding="utf-8")
+    with pytest.raises(InputError, match="row 2"):
+        read_readings(empty, control)
+    for i, row in enumerate(rows):
+        loaded = row["remark"].startswith(("softest", "stiffest"))
+        numbers = [
+            head for head in row if head.split("_")[0] in ("deflection", "force", "v1", "v3")
+        ]
+        row.update({head: str(1 + i) for head in numbers if loaded or head in ("v1_V", "v3_V")})
+        row["v2_V"] = "" if loaded else "2"
+    with empty.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    found = read_readings(empty, control)
+    assert len(found.row) == 8
+    assert len(found.null_row) == 4
+    assert sorted(set(found.null_side)) == [-1.0, 1.0]
+
+
+def test_nothing_is_overwritten_and_endings_are_held(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("precious")
+    for words, said in (
+        (("run", "mine.toml"), "mine.toml: is there already; give the name of a new file"),
+        (("sweep", "mine"), "mine: give a name that ends in .toml"),
+        (("readings", "x.csv", "--control", "stick"), "--control: no 'stick'"),
+    ):
+        done = coupled(tmp_path, "new", *words)
+        assert done.returncode == 2
+        assert done.stderr.startswith("error: ")
+        assert said in done.stderr
+    assert files(tmp_path) == {"mine.toml"}
+    assert (tmp_path / "mine.toml").read_text() == "precious"
