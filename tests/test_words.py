@@ -14,7 +14,7 @@ PHRASES = ("stands there twice", "simulation and record part")
 TEXTS = [
     *sorted((ROOT / "coupled").rglob("*.py")),
     *sorted((ROOT / "examples").rglob("*.py")),
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "aircraft").rglob("*.md")),
     *sorted((ROOT / "runs").glob("*.toml")),
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md")),

@@ -1,6 +1,7 @@
-"""Every command and every output printed in the README, run and compared.
+"""Every command and every output printed in the README and the guides, run and compared.
 
-`python -m tests.test_readme` writes the outputs anew after a change that is meant.
+`python -m tests.test_pages` writes the outputs anew after a change that is meant;
+`python -m tests.test_pages PAGE…` those of some pages.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import tempfile
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +21,7 @@ from tests.support.benchmarks import SENTENCES
 from tests.support.commands import ROOT, coupled
 
 README = ROOT / "README.md"
+PAGES = [README, *sorted((ROOT / "docs" / "guides").glob("*.md"))]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.M | re.S)
 PYTHON = re.compile(r"^```python\n(.*?)^```\n+prints\n+```text\n(.*?)^```$", re.M | re.S)
 
@@ -59,26 +62,39 @@ def prepare(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("readme")
-    prepare(path)
-    return path
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, Path]:
+    """Return a folder for each page: its commands go on with one another's files."""
+    made = {page: tmp_path_factory.mktemp(page.stem) for page in PAGES}
+    for folder in made.values():
+        prepare(folder)
+    return made
 
 
-@pytest.mark.parametrize(("command", "output"), sessions(README.read_text(encoding="utf-8")))
-def test_a_command_prints_what_the_readme_says(command: str, output: str, folder: Path) -> None:
-    assert run(command, folder) == trimmed(output)
+def everything_printed() -> list[Any]:
+    return [
+        pytest.param(page, command, output, id=f"{page.stem}-{command}")
+        for page in PAGES
+        for command, output in sessions(page.read_text(encoding="utf-8"))
+    ]
 
 
-def test_the_python_example_prints_what_it_says(folder: Path) -> None:
+@pytest.mark.parametrize(("page", "command", "output"), everything_printed())
+def test_a_command_prints_what_the_page_says(
+    page: Path, command: str, output: str, folders: dict[Path, Path]
+) -> None:
+    assert run(command, folders[page]) == trimmed(output)
+
+
+def test_the_python_example_prints_what_it_says(folders: dict[Path, Path]) -> None:
     [(code, output)] = PYTHON.findall(README.read_text(encoding="utf-8"))
-    assert run_python(code, folder) == trimmed(output)
+    assert run_python(code, folders[README]) == trimmed(output)
 
 
-def test_the_pictures_and_pages_that_the_readme_shows_are_there() -> None:
-    text = README.read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_pictures_and_pages_that_a_page_shows_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
     for target in [*re.findall(r"\]\(([^)#:]+)\)", text), *re.findall(r'src="([^"]+)"', text)]:
-        assert (ROOT / target).exists(), target
+        assert (page.parent / target).exists(), target
 
 
 MEASURED = r"(<!-- {name} -->\n)(.*?)(\n<!-- end -->)"
@@ -86,23 +102,34 @@ MEASURED = r"(<!-- {name} -->\n)(.*?)(\n<!-- end -->)"
 
 @pytest.mark.parametrize("name", list(SENTENCES))
 def test_the_measured_figures_are_those_that_a_benchmark_kept(name: str) -> None:
-    found = re.search(MEASURED.format(name=name), README.read_text(encoding="utf-8"), re.S)
-    assert found is not None
-    assert " ".join(found.group(2).split()) == SENTENCES[name]()
+    found = [
+        (page, match.group(2))
+        for page in PAGES
+        for match in re.finditer(MEASURED.format(name=name), page.read_text(encoding="utf-8"), re.S)
+    ]
+    assert found
+    for page, text in found:
+        assert " ".join(text.split()) == on_page(SENTENCES[name](), page)
 
 
-def with_measured(text: str) -> str:
-    """Return the README with the benchmarks' sentences anew."""
+def on_page(sentence: str, page: Path) -> str:
+    """Return a sentence with its links as they are from a page."""
+    return sentence if page == README else sentence.replace("](docs/", "](../")
+
+
+def with_measured(text: str, page: Path) -> str:
+    """Return a page with the benchmarks' sentences anew, where it has their place."""
     for name, sentence in SENTENCES.items():
-        lines = "\n".join(textwrap.wrap(sentence(), 110, break_on_hyphens=False))
+        lines = "\n".join(textwrap.wrap(on_page(sentence(), page), 110, break_on_hyphens=False))
         head, end = f"<!-- {name} -->\n", "\n<!-- end -->"
-        before, _, after = text.partition(head)
-        text = before + head + lines + end + after.partition(end)[2]
+        before, found, after = text.partition(head)
+        if found:
+            text = before + head + lines + end + after.partition(end)[2]
     return text
 
 
-def refresh() -> None:
-    """Write the README's outputs anew."""
+def refresh(page: Path) -> None:
+    """Write a page's outputs anew."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         prepare(folder)
@@ -117,11 +144,12 @@ def refresh() -> None:
             code, output = match.groups()
             return match.group(0).replace(output, run_python(code, folder))
 
-        text = BLOCK.sub(block, README.read_text(encoding="utf-8"))
+        text = BLOCK.sub(block, page.read_text(encoding="utf-8"))
         text = PYTHON.sub(example, text)
-        text = with_measured(text)
-        README.write_text(text, encoding="utf-8")
+        text = with_measured(text, page)
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    refresh()
+    for each in [Path(name).resolve() for name in sys.argv[1:]] or PAGES:
+        refresh(each)
