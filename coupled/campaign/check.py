@@ -9,14 +9,16 @@ from pathlib import Path
 import polars as pl
 
 from coupled.authority.compare import Flight, compare
-from coupled.campaign.standards import UnjudgedError
+from coupled.campaign.latency import fly_undelayed
+from coupled.campaign.unjudged import UnjudgedError
 from coupled.campaign.verdict import Verdict, judge_expectation
 from coupled.errors import InputError
-from coupled.flight.expectation import Expect
+from coupled.flight.expectation import LATENCIES, Expect
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import read_run
 
 Progress = Callable[[str, int, int], None]
+Flown = dict[tuple[str, str], Flight]  # by case and configuration
 
 
 @dataclass(frozen=True)
@@ -72,10 +74,10 @@ def _expecting(scenarios: Sequence[Manoeuvre]) -> list[Manoeuvre]:
 def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) -> list[Verdict]:
     """Fly what a run's expectations look at, and return the verdicts, case by case."""
     flights = compare([_needed(scenario) for scenario in scenarios], progress)
-    flown: dict[tuple[str, str], Flight]
-    flown = {(f.outcome.case, f.configuration): f for f in flights}
+    flown: Flown = {(f.outcome.case, f.configuration): f for f in flights}
+    undelayed = {where: fly_undelayed(f.manoeuvre) for where, f in flown.items() if _timed(f)}
     return [
-        _verdict(expect, scenario, configuration, flown)
+        _verdict(expect, scenario, configuration, flown, undelayed)
         for scenario in scenarios
         for expect in scenario.expect
         for configuration in scenario.configurations
@@ -96,14 +98,24 @@ def _needed(scenario: Manoeuvre) -> Manoeuvre:
     return replace(scenario, configurations=kept)
 
 
+def _timed(flight: Flight) -> bool:
+    """Tell whether a flight is held against the same one with nothing late."""
+    asked = [e for e in flight.manoeuvre.expect if e.standard in LATENCIES]
+    ended = bool(flight.ended_early)
+    return not ended and any(e.concerns(flight.outcome.case, flight.configuration) for e in asked)
+
+
 def _verdict(
     expect: Expect,
     scenario: Manoeuvre,
     configuration: Configuration,
-    flown: dict[tuple[str, str], Flight],
+    flown: Flown,
+    undelayed: Flown,
 ) -> Verdict:
     flight = flown.get((scenario.label, configuration))
     other = flown.get((scenario.label, expect.reference or ""))
+    if expect.standard in LATENCIES:
+        other = undelayed.get((scenario.label, configuration))
     try:
         return judge_expectation(expect, flight, other)
     except UnjudgedError as why:

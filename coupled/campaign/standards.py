@@ -7,7 +7,7 @@ the force of a held control against the specified one (2.a, and 2.d.8 and 2.e.1 
 the peak rate after a small pitch input (2.b.4), for which the rigid structure stands for the
 aircraft. 2.b.4 is for approach and landing, whose choice is the run's, and for rates of 0.5 to
 2 °/s: a larger one is not judged by it, and "rate against rigid" has the same tolerances for any
-rate.
+rate. Latency (4.a) is `latency`.
 """
 
 from __future__ import annotations
@@ -18,18 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupled.authority.compare import Flight, held_forces
+from coupled.campaign.latency import latency_s
 from coupled.campaign.tolerances import (
     LONG_TERM_N,
     ONE_HAND_N,
     RATE_SHARE,
     TWO_HANDS_N,
+    LATENCY_s,
     RATE_rad_per_s,
     SHORT_TERM_s,
     SMALL_rad_per_s,
     force_band,
     sustained_force,
 )
-from coupled.flight.expectation import RATE, SMALL_RATE, Standard
+from coupled.campaign.unjudged import UnjudgedError
+from coupled.flight.expectation import LATENCIES, RATE, SMALL_RATE, Standard
 from coupled.record.channels import ControlName, channel
 from coupled.units import DEGREE_rad
 
@@ -40,13 +43,9 @@ _SHORT_TERM: Mapping[Standard, Mapping[ControlName, float]] = {
 _LONG_TERM: Standard = "25.143(d) long-term"
 
 
-class UnjudgedError(Exception):
-    """Why a figure could not be had."""
-
-
 @dataclass(frozen=True)
 class StandardFigure:
-    """A flight's figure and its bounds, in N or rad/s; `note` says which of several it is."""
+    """A flight's figure and its bounds, in N, rad/s or s; `note` says which of several it is."""
 
     value: float
     least: float | None
@@ -55,10 +54,11 @@ class StandardFigure:
 
 
 def judge_standard(
-    standard: Standard, control: ControlName | None, flight: Flight, rigid: Flight | None
+    standard: Standard, control: ControlName | None, flight: Flight, reference: Flight | None
 ) -> StandardFigure:
     """Return a flight's figure and its bounds.
 
+    `reference` is the rigid flight of a rate, and of a latency the one with nothing late.
     `control` is the one that the comparison looks at where none is named. Raises
     UnjudgedError where the standard is for other flights.
     """
@@ -66,8 +66,12 @@ def judge_standard(
     if standard == _LONG_TERM or standard in _SHORT_TERM:
         return _pilot_force(standard, looked_at, flight)
     if standard in (RATE, SMALL_RATE):
-        assert rigid is not None
-        return _rate(standard, flight, rigid)
+        assert reference is not None
+        return _rate(standard, flight, reference)
+    if standard in LATENCIES:
+        assert reference is not None
+        late_s = latency_s(looked_at, flight, reference)
+        return StandardFigure(late_s, None, LATENCY_s[standard])
     felt, specified = held_forces(flight.manoeuvre, looked_at, flight.record)
     allowed = float(force_band(looked_at, specified))
     return StandardFigure(felt, specified - allowed, specified + allowed)

@@ -1,8 +1,8 @@
 """The figures of the rules that controls and flights are held against.
 
 14 CFR Part 60, appendix A, table A2A: static checks (2.a), releases (2.b.1 to 3), a small
-pitch input (2.b.4). 14 CFR 25.143(d): what a pilot may have to hold, for short and for long.
-Of two tolerances of one quantity the wider holds, as the table has it.
+pitch input (2.b.4), latency (4.a). 14 CFR 25.143(d): what a pilot may have to hold, for short
+and for long. Of two tolerances of one quantity the wider holds, as the table has it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,13 @@ COUNTED = 0.05  # 2.b: overshoots above this share of the displacement count
 RATE_rad_per_s = 0.15 * DEGREE_rad  # 2.b.4
 RATE_SHARE = 0.20
 SMALL_rad_per_s = (0.5 * DEGREE_rad, 2.0 * DEGREE_rad)  # 2.b.4: the rates that it is for
+
+# 4.a.1: after the aircraft's own answer; levels C and D, A and B, and of helicopters C and D.
+LATENCY_s = {
+    "Part 60 4.a latency 150 ms": 0.150,
+    "Part 60 4.a latency 300 ms": 0.300,
+    "Part 60 4.a latency 100 ms": 0.100,
+}
 
 # 2.a.1 to 2.a.3: how far a surface may be from where the control asks for it.
 SURFACE_rad = {

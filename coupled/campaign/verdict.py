@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.compare import Flight
-from coupled.campaign.standards import StandardFigure, UnjudgedError, judge_standard
+from coupled.campaign.standards import StandardFigure, judge_standard
+from coupled.campaign.unjudged import UnjudgedError
 from coupled.flight.expectation import Expect
 from coupled.record.channels import TIME
 

@@ -39,9 +39,17 @@ Standard = Literal[
     "Part 60 2.a force",
     "Part 60 2.b.4 rate",
     "rate against rigid",
+    "Part 60 4.a latency 150 ms",
+    "Part 60 4.a latency 300 ms",
+    "Part 60 4.a latency 100 ms",
 ]
 SMALL_RATE: Standard = "Part 60 2.b.4 rate"  # a small pitch input's
 RATE: Standard = "rate against rigid"
+LATENCIES: tuple[Standard, ...] = (
+    "Part 60 4.a latency 150 ms",
+    "Part 60 4.a latency 300 ms",
+    "Part 60 4.a latency 100 ms",
+)
 RATES = (SMALL_RATE, RATE)  # they hold a flight against the rigid one
 REFERENCE = "rigid"
 
@@ -243,5 +251,6 @@ def _check_channels(expect: Expect, file: object, place: str, channels: Sequence
     if expect.control is not None and expect.control not in controls:
         hint = nearest(expect.control, controls)
         raise InputError(file, f"{place}.control", f"the rig has no {expect.control}; {hint}")
-    if expect.standard in RATES and "pitch_rate_rad_per_s" not in channels:
+    needs_motion = expect.standard in RATES or expect.standard in LATENCIES
+    if needs_motion and "pitch_rate_rad_per_s" not in channels:
         raise InputError(file, f"{place}.standard", "the rig has no aircraft whose rate this is")

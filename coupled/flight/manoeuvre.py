@@ -167,9 +167,11 @@ class Manoeuvre:
 
     @property
     def control(self) -> ControlName:
-        """The control that a comparison looks at."""
-        named = self.measure.control
-        return next(iter(self.pilots)) if named is None else named
+        """The control that a comparison looks at: by default the first that a pilot moves."""
+        if self.measure.control is not None:
+            return self.measure.control
+        moved = [control for control, pilot in self.pilots.items() if not pilot.rests]
+        return next(iter(moved or self.pilots))
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -84,6 +84,11 @@ class Pilot(Given):
         """Return what this pilot does on a rig's control."""
         raise NotImplementedError
 
+    @property
+    def rests(self) -> bool:
+        """Whether this pilot leaves the control alone."""
+        return False
+
     def reach(self, control: ControlName) -> float:
         """Return the reach on a control, d; 0 for none."""
         return self.reach_rad if unit_of(control) == "rad" else self.reach_m

@@ -23,6 +23,11 @@ class _Levels(Pilot):
     force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
     rise_s: float = quantity("", 0.1, ge=0, le=7200)
 
+    @property
+    def rests(self) -> bool:
+        """Whether the force is none."""
+        return self.force_N == 0.0
+
     def levels(self) -> list[tuple[float, float]]:
         """Return the (time in s, share of the force) that the signal goes to."""
         raise NotImplementedError
