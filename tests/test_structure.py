@@ -40,7 +40,16 @@ ORDER += [
     "calibration",
     "gap",
 ]
-ORDER += ["blind/twin", "blind/trials", "plots", "api", "cli/tables", "cli/terminal", "cli"]
+ORDER += [
+    "blind/twin",
+    "blind/trials",
+    "plots",
+    "reports",
+    "api",
+    "cli/tables",
+    "cli/terminal",
+    "cli",
+]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}
 
 

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, app
+from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_stale
 from coupled.cli.terminal import (
     check_json,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled compare · coupled compare pull-up-737 --figure out/737.png"
-    " · coupled compare my-run.toml --json -[/]"
+    " · coupled compare my-run.toml --json - · coupled compare --report out/report.html[/]"
 )
 def compare(
     run: RunArgument = DEFAULT_RUN,
@@ -42,6 +43,7 @@ def compare(
     ] = None,
     json_file: JsonOption = "",
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
+    report: ReportOption = None,
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -57,7 +59,8 @@ def compare(
 
         check_format(path)
         check_target(path, inputs)
-    check_json(json_file, inputs if no_figure else [*inputs, path])
+    own = inputs if no_figure else [*inputs, path]
+    check_json(json_file, [*own, *check_report(report, own)])
     say_stale(cases[0].rig)
     with progress() as advance:
         flights = compare_flights(cases, advance)
@@ -69,10 +72,15 @@ def compare(
 
             save(draw_comparison(flights), outputs.at(path))
         keep_json(table, json_file, outputs)
+        if report is not None:
+            from coupled.reports.comparison import comparison_report
+
+            write_report(report, outputs, inputs, lambda made: comparison_report(flights, made))
     if json_file != "-":
         print_comparison(out, flights)
         if not no_figure:
             say(f"figure: {path}")
+        say_report(report)
     print_json(table, json_file)
     _end(flights)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
@@ -49,16 +50,15 @@ def diagnose(
         typer.Option(metavar="DIR", help="For a folder: where its diagnoses go, a JSON each."),
     ] = None,
     json_file: JsonOption = "",
+    report: ReportOption = None,
 ) -> None:
     """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
     name = _control(control, records[0])
     from coupled.record.record import manifest_path
 
     if any(record.is_dir() for record in records):
-        asked = {"--improve": improve, "--plots": plots, "--power": power, "--json": json_file}
-        for option, value in asked.items():
-            if value:
-                raise InputError(records[0], option, "is for records of one rig, not for a folder")
+        asked = {"--improve": improve, "--plots": plots, "--power": power}
+        _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
         _diagnose_folder(records, rig, output, name)
         return
     if output is not None:
@@ -75,6 +75,7 @@ def diagnose(
         check_target(target, inputs)
     if improve in drawn:
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
+    targets += check_report(report, [*inputs, *targets])
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name)
     worse = improve is not None and not whole.improves
@@ -85,11 +86,19 @@ def diagnose(
         if plots is not None:
             _draw(outputs.folder(plots), whole)
         keep_json(table, json_file, outputs)
+        _report(report, outputs, inputs, whole, power)
     if json_file != "-":
         _print(whole, power, None if worse else improve, drawn)
+        say_report(report)
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")
     print_json(table, json_file)
+
+
+def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
+    for option, value in asked.items():
+        if value:
+            raise InputError(records[0], option, "is for records of one rig, not for a folder")
 
 
 def _control(word: str, file: Path) -> ControlName:
@@ -163,6 +172,17 @@ def _plot_targets(folder: Path | None) -> list[Path]:
     from coupled.plots.gaps import FIGURES
 
     return [folder / name for name in FIGURES]
+
+
+def _report(
+    path: Path | None, outputs: Outputs, inputs: list[Path], whole: Diagnosis, power: bool
+) -> None:
+    if path is None:
+        return
+    from coupled.reports.diagnosis import diagnosis_report
+
+    title = ", ".join(shown(Path(name).name) for name in whole.records)
+    write_report(path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power))
 
 
 def _draw(folder: Path, whole: Diagnosis) -> None:

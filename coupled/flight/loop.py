@@ -220,11 +220,12 @@ def _manifest(
         "ended_early": None if ended is None else asdict(ended),
         "stop_first_met_s": stops,
         "inputs_sha256": {path.name: sha256(path) for path in files},
-        "versions": dict(_versions()),
+        "versions": dict(versions()),
     }
 
 
 @lru_cache(maxsize=1)
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Return the versions of what flies."""
     found = {"coupled": version("coupled"), "python": platform.python_version()}
     return found | {name: version(name) for name in ("jsbsim", "numpy", "numba", "scipy")}

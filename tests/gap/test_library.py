@@ -105,5 +105,7 @@ def test_wheel_and_pedals_have_the_same_keys(flown: Rig) -> None:
 
 
 def test_the_guide_counts_the_effects() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "guides" / "diagnose.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "guides" / "diagnose.md").read_text(
+        encoding="utf-8"
+    )
     assert f"which of {len(EFFECTS)} effects causes it" in text

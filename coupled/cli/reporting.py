@@ -1,0 +1,55 @@
+"""The option that hands a command's result on: one HTML file."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coupled.cli.terminal import say
+from coupled.errors import InputError, printable
+from coupled.files import check_target, write_text
+from coupled.outputs import Outputs
+
+if TYPE_CHECKING:
+    from coupled.reports.page import Made, Report
+
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--report",
+        metavar="FILE.html",
+        help="Write verdict, tables, figures and settings as one HTML file, to hand on.",
+    ),
+]
+
+
+def check_report(path: Path | None, others: Iterable[Path]) -> list[Path]:
+    """Refuse a report that could not be written, or is another file; return it where asked for."""
+    if path is None:
+        return []
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(path, "--report", "is one HTML file: its name ends in .html")
+    check_target(path, others, "is another file of this command; give another name")
+    return [path]
+
+
+def write_report(
+    path: Path, outputs: Outputs, inputs: Iterable[Path], report: Callable[[Made], Report]
+) -> None:
+    """Write a command's report with its other files; `inputs` are the files that it read."""
+    from coupled.reports.made import made_by
+    from coupled.reports.page import render
+
+    command = shlex.join(["coupled", *map(printable, sys.argv[1:])])
+    write_text(outputs.at(path), render(report(made_by(command, inputs))))
+
+
+def say_report(path: Path | None) -> None:
+    """Say where the report is, where one was asked for."""
+    if path is not None:
+        say(f"report: {path}")

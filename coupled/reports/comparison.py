@@ -1,0 +1,89 @@
+"""The report of a comparison: what each configuration loses, and the flights that show it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+
+from coupled.authority.compare import Flight
+from coupled.authority.figures import rows
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.plots.flights import draw_comparison
+from coupled.plots.saving import svg_text
+from coupled.reports.page import Drawing, Made, Report, Section, Table, Verdict
+
+_SHOWN = (
+    "Surface command, motion, force against true deflection, and what is lost. Gray: as specified."
+)
+_STEPS = "Steps of the modifying force from frame to frame, which the hand feels."
+
+
+def comparison_report(flights: Sequence[Flight], made: Made) -> Report:
+    """Return the report: a table and a figure a case, or one of all where each is flown once."""
+    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+    once = len(cases) > 1 and all(len(case) == 1 for case in cases)
+    groups = [list(flights)] if once else cases
+    run = flights[0].manoeuvre
+    sections = [
+        Section(
+            "All cases" if once else case[0].outcome.case,
+            (_table(case, by_case=once), Drawing(svg_text(draw_comparison(case)), shown)),
+            own_page=i > 0,
+        )
+        for i, case in enumerate(groups)
+        for shown in [_STEPS if once else _SHOWN]
+    ]
+    return Report(
+        "Comparison", run.name, _verdict(flights), tuple(sections), tuple(_settings(run)), made
+    )
+
+
+def _table(case: Sequence[Flight], by_case: bool) -> Table:
+    heads = [f.outcome.case if by_case else f.configuration for f in case]
+    body = tuple((label, *cells) for label, cells in rows(case))
+    return Table(("", *heads), body)
+
+
+def _verdict(flights: Sequence[Flight]) -> Verdict:
+    """Return what each configuration loses over the cases, and what the hand feels."""
+    lost, felt = [], []
+    for configuration in dict.fromkeys(f.configuration for f in flights):
+        if configuration == "rigid":
+            continue
+        ours = [f.outcome for f in flights if f.configuration == configuration]
+        lost.append(f"{configuration} {_span([100.0 * o.loss for o in ours], 1)} %")
+        felt.append(f"{configuration} {_span([o.felt_ratio for o in ours], 3)}")
+    run = flights[0].manoeuvre
+    remarks = [f"Felt of the specified gradient: {', '.join(felt)}.", " ".join(run.card.split())]
+    ended = [
+        f"{f.outcome.case}, {f.configuration}: ended early, {f.ended_early}."
+        for f in flights
+        if f.ended_early
+    ]
+    said = f"Authority lost: {', '.join(lost)}."
+    return Verdict(said, "bad" if ended else "plain", tuple(filter(None, [*ended, *remarks])))
+
+
+def _span(values: Iterable[float], decimals: int) -> str:
+    """Return the least and the greatest of some figures, or the one that all are."""
+    there = [value for value in values if math.isfinite(value)]
+    if not there:
+        return "–"
+    ends = [f"{end:.{decimals}f}" for end in (min(there), max(there))]
+    low, high = (end.lstrip("-") if float(end) == 0.0 else end for end in ends)
+    return low if low == high else f"{low} to {high}"
+
+
+def _settings(run: Manoeuvre) -> Iterable[tuple[str, str]]:
+    """Yield what the flights share."""
+    rig = run.rig
+    yield "run", run.name
+    yield "rig", rig.name
+    yield "aircraft", rig.flight.model if rig.flight is not None else "none, on the bench"
+    yield "control", run.control
+    pilots = (f"{type(p).__name__} on the {control}" for control, p in run.pilots.items())
+    yield "pilot", ", ".join(pilots)
+    yield "length of a flight", f"{run.duration_s:g} s"
+    yield "frame rate", f"{rig.frame_rate:g} Hz, {rig.substeps} substeps of the rig a frame"
+    yield "seed", str(run.seed)
