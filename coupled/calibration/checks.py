@@ -79,7 +79,8 @@ def legs(response: History) -> tuple[SweepLeg, ...]:
     for i, part in enumerate(parts):
         order = slice(None, None, 1 if i % 2 == 0 else -1)
         columns = (deflection[part], response.hand_force[part], response.surface[part])
-        found.append(SweepLeg(*(column[order] for column in columns)))
+        delta, force, surface = (column[order] for column in columns)
+        found.append(SweepLeg(delta, force, surface))
     return tuple(found)
 
 
@@ -97,8 +98,15 @@ def judged(
 ) -> tuple[JudgedLeg, ...]:
     """Return what is felt and specified along each leg at the same δ."""
     found = []
-    at = np.linspace(INNER, OUTER, 181) * travel
+    grid = np.linspace(INNER, OUTER, 181) * travel
     for now, wanted, (side, _) in zip(felt, specified, LEGS.values(), strict=True):
+        at = grid
+        if wanted.read:
+            at = np.abs(wanted.deflection)
+            at = at[(at >= INNER * travel) & (at <= OUTER * travel)]
+        if not at.size:
+            found.append(JudgedLeg(at, at, at))
+            continue
         forces = (np.interp(at, side * leg.deflection, leg.force) for leg in (now, wanted))
         found.append(JudgedLeg(side * at, *forces))
     return tuple(found)
@@ -130,11 +138,16 @@ def static_checks(
     found = []
     straight = data.schedule.break_deflection or data.travel
     for now, wanted, leg in list(zip(felt, specified, LEGS, strict=True))[::2]:
+        near = np.abs(wanted.deflection) < LINE[1] * data.travel
+        if np.count_nonzero(near) < 2:
+            continue  # too few were read there for a line
         forces = [breakout(each, data.travel, straight) for each in (now, wanted)]
         name = f"breakout, {leg.removeprefix('out, ')}"
         allowed = STATIC[control].breakout_N
         found.append(ControlCheck(name, pressure_Pa, forces[0], forces[1], allowed, "N"))
     for at, leg in zip(judged(data.travel, felt, specified), LEGS, strict=True):
+        if not at.deflection.size:
+            continue
         band = force_band(control, at.specified)
         worst = int(np.argmax(np.abs(at.felt - at.specified) / band))
         felt_there, asked = float(at.felt[worst]), float(at.specified[worst])
@@ -149,18 +162,28 @@ def surface_checks(
     pressure_Pa: float,
     felt: Sequence[SweepLeg],
     surface: str = "",
+    read: Sequence[SweepLeg] = (),
 ) -> list[ControlCheck]:
     """Return the surface's position where it is farthest off the deflection's, both ways.
 
     `surface_rad` is the surface's travel for the whole of the control's; `surface` its name
-    where it is not the control's own, as a spoiler that the wheel moves.
+    where it is not the control's own, as a spoiler that the wheel moves. Where the aircraft's own
+    was `read` on a leg, it is held against that.
     """
     found = []
     allowed = SURFACE_rad[surface or data.surface] / DEGREE_rad
-    for leg, name in list(zip(felt, LEGS, strict=True))[::2]:
+    degrees = surface_rad / DEGREE_rad
+    for k, name in list(enumerate(LEGS))[::2]:
+        leg = felt[k]
         inside = np.abs(leg.deflection) <= OUTER * data.travel
-        moved = np.abs(leg.surface[inside]) * surface_rad / DEGREE_rad
-        asked = np.abs(leg.deflection[inside]) / data.travel * surface_rad / DEGREE_rad
+        at, moved = np.abs(leg.deflection[inside]), np.abs(leg.surface[inside]) * degrees
+        asked = at / data.travel * degrees
+        if read and read[k].read and np.isfinite(read[k].surface).any():
+            there = np.isfinite(read[k].surface) & (np.abs(read[k].deflection) <= at[-1])
+            if not there.any():
+                continue
+            moved = np.interp(np.abs(read[k].deflection[there]), at, moved)
+            asked = read[k].surface[there] * degrees
         worst = int(np.argmax(np.abs(moved - asked)))
         label = f"{surface or 'surface'}, {name.removeprefix('out, ')}"
         pair = (float(moved[worst]), float(asked[worst]))

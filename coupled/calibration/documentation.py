@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from coupled.calibration.aircraftdata import AircraftData
 from coupled.calibration.checks import (
     ControlCheck,
     dynamic_checks,
@@ -76,22 +77,25 @@ def document(
     surface_rad: float | None,
     progress: Progress | None = None,
     specification: Rig | None = None,
+    aircraft: AircraftData | None = None,
 ) -> Documentation:
     """Return a control's documentation at the least, middle and greatest gradient specified.
 
     `specification` is a rig that says what is specified where this one's own file does not:
-    its schedule, breakout, friction, mass and damping count. Raises InputError where it lacks
-    the control.
+    its schedule, breakout, friction, mass and damping count. `aircraft` are the aircraft's own
+    forces: the reference of the static checks then, at its dynamic pressures. Raises InputError
+    where the specification lacks the control.
     """
     specified = specified_rig((specification or rig).only(control))
-    pressures = feel_pressures(specified, control)
+    read = _legs_by_pressure(specified, control, aircraft)
+    pressures = list(read)
     conditions, checks = [], []
     for i, pressure in enumerate(pressures):
         if progress is not None:
             progress(f"{control}, q̄ = {pressure:.0f} Pa", i, len(pressures))
         condition = FeelCondition(
             pressure,
-            specified_legs(specified, control, pressure),
+            read[pressure],
             sweep(configure(rig, "uncompensated"), control, pressure),
             sweep(configure(rig, "compensated"), control, pressure),
             sweep(rig, control, pressure),
@@ -107,17 +111,29 @@ def check_feel(
     control: ControlName,
     surface_rad: float | None = None,
     specification: Rig | None = None,
+    aircraft: AircraftData | None = None,
 ) -> tuple[ControlCheck, ...]:
     """Return the checks of a control's documentation, without what is only drawn."""
     specified = specified_rig((specification or rig).only(control))
     checks = []
-    for pressure in feel_pressures(specified, control):
+    for pressure, legs_there in _legs_by_pressure(specified, control, aircraft).items():
         felt = sweep(rig, control, pressure)
-        legs_there = specified_legs(specified, control, pressure)
         let_go = _let_go(rig, control, pressure, specified)
         condition = FeelCondition(pressure, legs_there, felt, felt, felt, let_go)
         checks += _checks(condition, control, specified.controls[control], surface_rad)
     return tuple(checks)
+
+
+def _legs_by_pressure(
+    specified: Rig, control: ControlName, aircraft: AircraftData | None
+) -> Mapping[float, tuple[SweepLeg, ...]]:
+    """Return what a slow sweep is to show at each q̄ in Pa: the aircraft's own, or as specified."""
+    if aircraft is not None:
+        return aircraft.legs
+    return {
+        pressure: specified_legs(specified, control, pressure)
+        for pressure in feel_pressures(specified, control)
+    }
 
 
 def _let_go(rig: Rig, control: ControlName, pressure: float, specified: Rig) -> Mapping[str, LetGo]:
@@ -135,7 +151,7 @@ def _checks(
     pressure, felt = condition.pressure_Pa, legs(condition.felt)
     checks = static_checks(data, control, pressure, felt, condition.specified)
     if surface_rad is not None:
-        checks += surface_checks(data, surface_rad, pressure, felt)
+        checks += surface_checks(data, surface_rad, pressure, felt, read=condition.specified)
     for side, let_go in condition.let_go.items():
         checks += dynamic_checks(pressure, side, let_go.felt, let_go.specified)
     return checks

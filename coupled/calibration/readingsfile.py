@@ -43,7 +43,7 @@ FORCES = {"force_N": 1.0, "force_lb": POUND_N}
 
 def read_readings(path: Path, control: str) -> Readings:
     """Return the readings of a file, for a control's kind of deflection."""
-    lines = _lines(path)
+    lines = rows_of(path)
     if not lines:
         raise InputError(path, "", "holds nothing; its first row should name the columns")
     (_, heads), *rows = lines
@@ -63,7 +63,7 @@ def read_readings(path: Path, control: str) -> Readings:
     return _assembled(path, parsed, units)
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
+def rows_of(path: Path) -> list[tuple[int, list[str]]]:
     """Return (row number, stripped cells) of the file's rows, without blank ones at its end."""
     text = read_text(path, "save it as CSV in UTF-8")
     if "\0" in text:
@@ -162,7 +162,7 @@ def _assembled(
         may_lack = {"v2", "deflection after", "force after"}
         may_lack |= {"deflection", "force", *others} if null else set()
         value = {
-            quantity: _number(path, number, column, cells[column]) * factor
+            quantity: number_in(path, number, column, cells[column]) * factor
             for quantity, (column, factor) in units.items()
             if cells[column] or quantity not in may_lack
         }
@@ -211,7 +211,8 @@ def _side(path: Path, row: int, word: str) -> float:
     return SIDES.get(word, 1.0)
 
 
-def _number(path: Path, row: int, column: str, cell: str) -> float:
+def number_in(path: Path, row: int, column: str, cell: str) -> float:
+    """Return the number of a cell; raise InputError for what is none."""
     place = f"row {row}: {column}"
     if not cell:
         raise InputError(path, place, "is empty; a reading has no gaps")

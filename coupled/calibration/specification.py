@@ -4,7 +4,8 @@ Static: the force that `specified_force` gives at each deflection, and the frict
 motion. Dynamic: the specified rig let go. The specified rig is what the host assumes, with a
 rigid structure, true scales and nothing amiss: the schedule's table as it is written, G_B and
 breakout as the host has them; mass, damping, friction and servo as the file has them, which
-says nothing else of them. A fault of those shows against another rig, or the aircraft's data.
+says nothing else of them. A fault of those shows against another rig, or (static) against the
+aircraft's own forces, which are the reference where they are given (`aircraftdata`).
 """
 
 from __future__ import annotations
@@ -27,12 +28,14 @@ POINTS = 401  # of a specified leg
 class SweepLeg:
     """A quarter of a sweep, between neutral and a stop: δ in d, rising in size, F in N.
 
-    `surface` is the command that reaches the surface, about trim, of ±1.
+    `surface` is the command that reaches the surface, about trim, of ±1. A leg that was `read` on
+    an aircraft is known at its own places only, and may be empty (`aircraftdata`).
     """
 
     deflection: Floats
     force: Floats
     surface: Floats
+    read: bool = False
 
 
 # The legs in their order, with the side of neutral and the direction of the motion.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,13 +18,15 @@ from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.calibration.aircraftdata import AircraftData
     from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
 
 
 @app.command(
     epilog="[dim]Examples: coupled document · coupled document 737 --control column"
-    " · coupled document new.toml --readings my.csv --output doc[/]"
+    " · coupled document new.toml --readings my.csv --output doc"
+    " · coupled document 737 --control column --aircraft measured.csv[/]"
 )
 def document(
     rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
@@ -34,6 +37,10 @@ def document(
     specified: Annotated[
         str, typer.Option(help="A rig that says what is specified (default: this one's own file).")
     ] = "",
+    aircraft: Annotated[
+        Path | None,
+        typer.Option(help="The aircraft's own forces, a CSV: the reference of the static checks."),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
@@ -54,7 +61,7 @@ def document(
     chosen = [rig_and_control(rig, control)[2]] if control else controls_of(data)
     folder = output or Path("out") / f"{data.name}-document"
     pdf = folder / f"{data.name}.pdf"
-    inputs = [file, *([readings] if readings else []), *([reference] if reference else [])]
+    inputs = [file, *(path for path in (readings, reference, aircraft) if path is not None)]
     if folder.is_file():
         raise InputError(folder, "--output", "is a file; give a folder")
     check_target(pdf, inputs)
@@ -62,10 +69,12 @@ def document(
     say_stale(data)
     fits = {name: _fit_for(readings, data, name, chosen) for name in chosen}
     travels = surface_travels(data, file)
+    read = _aircraft_data(aircraft, wanted or data, chosen[0], travels)
     documents = []
     with progress() as advance:
         for name in chosen:
-            documents.append(gather(data, name, travels.get(name), advance, wanted))
+            known = read if name == chosen[0] else None
+            documents.append(gather(data, name, travels.get(name), advance, wanted, known))
     from coupled.plots.documentation import draw_pages
 
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
@@ -79,6 +88,19 @@ def document(
             out.print("no aircraft: the surface's position is not judged\n")
         say(f"{len(written)} figures and {pdf.name} in {folder}")
     print_json(table, json_file)
+
+
+def _aircraft_data(
+    path: Path | None, specified: Rig, control: ControlName, travels: Mapping[str, float]
+) -> AircraftData | None:
+    """Return what was read on the aircraft, of the first control chosen."""
+    if path is None:
+        return None
+    from coupled.calibration.aircraftdata import read_aircraft_data
+
+    if control not in specified.controls:
+        raise InputError(specified.name, "controls", f"the rig has no {control}")
+    return read_aircraft_data(path, control, specified.controls[control], travels.get(control))
 
 
 def _fit_for(

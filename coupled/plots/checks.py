@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from coupled.calibration.checks import Swing, swing_of
 from coupled.campaign.tolerances import TIME_SHARE, SURFACE_rad, force_band
-from coupled.plots.pages import BLUE, ORANGE, panels, pressure, scale, title, with_legend
+from coupled.plots.pages import BLUE, ORANGE, leg_names, panels, pressure, scale, title, with_legend
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
@@ -35,9 +35,10 @@ def draw_static_checks(found: Documentation) -> Figure:
         response = condition.felt
         x = factor * response.deflection
         axes.plot(x, response.hand_force, color=BLUE, linewidth=1.2, label="rig")
-        for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
+        for leg, name in zip(condition.specified, leg_names(condition), strict=True):
             x = factor * leg.deflection
-            axes.plot(x, leg.force, "k:", linewidth=1.0, label=name or None)
+            style = "k." if leg.read else "k:"
+            axes.plot(x, leg.force, style, linewidth=1.0, label=name or None)
         axes.set_title(_verdict(found, condition.pressure_Pa, ("breakout", "force")), fontsize=9)
         if found.surface_rad is not None:
             ends = np.array([-1.0, 1.0])
@@ -70,6 +71,8 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> 
         for check in found.checks
         if check.pressure_Pa == pressure_Pa and check.name.split(",")[0].split(" ")[0] in kinds
     ]
+    if not ours:
+        return f"{pressure(pressure_Pa)}: not judged"
     worst = min(ours, key=lambda check: check.margin)
     word = "pass" if worst.passed else "FAIL"
     margin = f"{100 * worst.margin:.{0 if abs(worst.margin) >= 0.01 else 1}f}".replace("-", "−")

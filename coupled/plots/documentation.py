@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from coupled.plots.pages import (
     GRAY,
     GREEN,
     ORANGE,
+    leg_names,
     panels,
     pressure,
     scale,
@@ -60,9 +62,10 @@ def draw_forces(found: Documentation) -> Figure:
         for name, response, color, width in sweeps:
             x = factor * response.deflection
             axes.plot(x, response.hand_force, color=color, linewidth=width, label=name)
-        for leg, name in zip(condition.specified, ("specified", "", "", ""), strict=True):
+        for leg, name in zip(condition.specified, leg_names(condition), strict=True):
             x, style = factor * leg.deflection, {"color": GRAY, "linewidth": 4.5, "zorder": 1}
-            axes.plot(x, leg.force, label=name or None, **style)
+            marks = {"linestyle": "", "marker": "o"} if leg.read else {}
+            axes.plot(x, leg.force, label=name or None, **style, **marks)
         axes.set_title(pressure(condition.pressure_Pa), fontsize=10)
         axes.set_xlabel(f"true deflection δ, {unit}")
         axes.grid(alpha=0.25)
@@ -81,7 +84,7 @@ def draw_deflections(found: Documentation) -> Figure:
     travel = found.rig.controls[found.control].travel
     figure, grid = panels(1, 2, 3.7)
     left, right = grid[0]
-    for condition, color in zip(found.conditions, (BLUE, ORANGE, GREEN), strict=False):
+    for condition, color in zip(found.conditions, cycle((BLUE, ORANGE, GREEN)), strict=False):
         bent = condition.compensated
         name = pressure(condition.pressure_Pa)
         left.plot(

@@ -10,7 +10,7 @@ from coupled.record.channels import unit_of
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
-    from coupled.calibration.documentation import Documentation
+    from coupled.calibration.documentation import Documentation, FeelCondition
 
 NARROWEST = 7.4  # inches that a page's title needs
 GRAY, ORANGE, GREEN, BLUE = "0.62", "#d55e00", "#009e73", "#0072b2"
@@ -42,6 +42,13 @@ def pressure(pressure_Pa: float) -> str:
 def title(found: Documentation, what: str) -> str:
     """Return a page's title."""
     return f"{found.rig.name}, {found.control}: {what}"
+
+
+def leg_names(condition: FeelCondition) -> list[str]:
+    """Return what a legend calls the reference's legs: a name for the first that is there."""
+    there = [leg.deflection.size > 0 for leg in condition.specified]
+    name = "aircraft" if any(leg.read for leg in condition.specified) else "specified"
+    return [name if k == there.index(True) else "" for k in range(len(there))]
 
 
 def with_legend(figure: Figure, axes: Any, columns: int) -> None:

@@ -1,0 +1,181 @@
+"""The aircraft's own forces, as measured on it: the reference of the static checks.
+
+A CSV that a person types, one row a reading of the aircraft's control, units in the columns' names:
+
+    deflection_…, force_…   and, where they were noted,   dynamic_pressure_…, direction, surface_…
+
+`direction` is `out` from neutral or `back` to it. Rows without it are the force between the two,
+and the friction is then what the specification says. Nothing is made up between rows: a check is
+of the places that were read, on the sides and legs that were read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.calibration.readingsfile import ANGLES, FORCES, LENGTHS, number_in, rows_of
+from coupled.calibration.specification import LEGS, SweepLeg
+from coupled.errors import InputError, nearest
+from coupled.record.channels import ControlName
+from coupled.rig.parameters import Control
+from coupled.units import DEGREE_rad, PSF_Pa
+
+Floats = NDArray[np.float64]
+PRESSURES = {
+    "dynamic_pressure_Pa": 1.0,
+    "dynamic_pressure_kPa": 1e3,
+    "dynamic_pressure_psf": PSF_Pa,
+}
+SURFACES = {"surface_deg": DEGREE_rad, "surface_rad": 1.0}
+DIRECTION, REMARK = "direction", "remark"
+DIRECTIONS = {"out": 1.0, "back": -1.0}
+MOST_PRESSURES = 8
+BEYOND = 1.02  # of the travel: what a reading may be past the stop
+NOTHING = SweepLeg(np.empty(0), np.empty(0), np.empty(0), read=True)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One reading, SI; `direction` is 0 for the force between both ways, `surface` may be NaN."""
+
+    number: int
+    pressure: float
+    deflection: float
+    force: float
+    direction: float
+    surface: float
+
+
+@dataclass(frozen=True)
+class AircraftData:
+    """What was read of one control: four legs, in the order of `LEGS`, by q̄ in Pa, rising.
+
+    A leg's `surface` is a share of the surface's travel in size, NaN where it was not read.
+    """
+
+    legs: Mapping[float, tuple[SweepLeg, ...]]
+
+
+def read_aircraft_data(
+    path: Path, control: ControlName, specified: Control, surface_rad: float | None = None
+) -> AircraftData:
+    """Return a file's readings of a control; where none was read, its friction is as `specified`.
+
+    `surface_rad` is the surface's travel for the control's whole one. Raises InputError.
+    """
+    lines = rows_of(path)
+    if len(lines) < 2:
+        raise InputError(path, "", "holds no readings; its first row names the columns")
+    (_, heads), *below = lines
+    units = _units(path, heads, control, surface_rad)
+    rows = []
+    for number, cells in below:
+        if len(cells) != len(heads):
+            problem = f"has {len(cells)} cells, the columns are {len(heads)}"
+            raise InputError(path, f"row {number}", problem)
+        rows.append(_row(path, number, dict(zip(heads, cells, strict=True)), units))
+    found = {}
+    for pressure in sorted({row.pressure for row in rows}):
+        here = [row for row in rows if row.pressure == pressure]
+        found[pressure] = _legs(path, here, specified, surface_rad or np.nan)
+    if len(found) > MOST_PRESSURES:
+        problem = f"is of {len(found)} dynamic pressures; give {MOST_PRESSURES} at most"
+        raise InputError(path, "", problem)
+    return AircraftData(found)
+
+
+def _units(
+    path: Path, heads: list[str], control: ControlName, surface_rad: float | None
+) -> dict[str, tuple[str, float]]:
+    """Return {quantity: (column, factor to SI)}."""
+    ours = ANGLES if control == "wheel" else LENGTHS
+    choices = {"deflection": ours, "force": FORCES, "pressure": PRESSURES, "surface": SURFACES}
+    known = [DIRECTION, REMARK, *(head for each in choices.values() for head in each)]
+    for head in heads:
+        if heads.count(head) > 1:
+            raise InputError(path, f"row 1: {head}", "duplicate column")
+        if head not in known:
+            problem = f"is no column of an aircraft's {control}; {nearest(head, known)}"
+            raise InputError(path, f"row 1: {head}", problem)
+    found = {}
+    for quantity, factors in choices.items():
+        present = [head for head in heads if head in factors]
+        if len(present) > 1:
+            problem = f"mixes units: {' and '.join(present)}; give one of them"
+            raise InputError(path, "row 1", problem)
+        if present:
+            found[quantity] = (present[0], factors[present[0]])
+        elif quantity in ("deflection", "force"):
+            problem = f"the column {quantity} in {' or '.join(factors)} is missing"
+            raise InputError(path, "row 1", problem)
+    if "surface" in found and surface_rad is None:
+        problem = "cannot be judged: the rig has no aircraft whose surface it is"
+        raise InputError(path, f"row 1: {found['surface'][0]}", problem)
+    return found
+
+
+def _row(
+    path: Path, number: int, cells: dict[str, str], units: dict[str, tuple[str, float]]
+) -> _Row:
+    value = {
+        quantity: number_in(path, number, column, cells[column]) * factor
+        for quantity, (column, factor) in units.items()
+        if quantity != "surface" or cells[column]
+    }
+    word = cells.get(DIRECTION, "")
+    if word not in ("", *DIRECTIONS):
+        problem = f"{word!r} is neither out nor back"
+        raise InputError(path, f"row {number}: {DIRECTION}", problem)
+    pressure = value.get("pressure", 0.0)
+    if pressure < 0.0:
+        raise InputError(path, f"row {number}: {units['pressure'][0]}", "cannot be negative")
+    surface = abs(value.get("surface", np.nan))
+    way = DIRECTIONS.get(word, 0.0)
+    return _Row(number, pressure, value["deflection"], value["force"], way, surface)
+
+
+def _legs(
+    path: Path, rows: list[_Row], specified: Control, surface_rad: float
+) -> tuple[SweepLeg, ...]:
+    """Return the four legs of one q̄, those without readings empty."""
+    legs = []
+    for side, motion in LEGS.values():
+        on = [row for row in rows if row.deflection * side > 0.0 and row.direction in (0.0, motion)]
+        on.sort(key=lambda row: abs(row.deflection))
+        if not on:
+            legs.append(NOTHING)
+            continue
+        _check(path, on, specified.travel)
+        rubs = side * motion * specified.loader.friction
+        legs.append(
+            SweepLeg(
+                np.array([row.deflection for row in on]),
+                np.array([row.force + (0.0 if row.direction else rubs) for row in on]),
+                np.array([row.surface for row in on]) / surface_rad,
+                read=True,
+            )
+        )
+    if all(not leg.deflection.size for leg in legs):
+        raise InputError(path, f"row {rows[0].number}", "is at neutral, and no other is of its q̄")
+    return tuple(legs)
+
+
+def _check(path: Path, rows: list[_Row], travel: float) -> None:
+    """Refuse what no control does; rows are of one leg, by the size of their deflection."""
+    for before, row in zip([None, *rows[:-1]], rows, strict=True):
+        if abs(row.deflection) > BEYOND * travel:
+            problem = f"is at {row.deflection:.4g}, beyond the rig's travel of ±{travel:.4g}"
+            raise InputError(path, f"row {row.number}", problem)
+        if before is None:
+            continue
+        if row.deflection == before.deflection:
+            problem = f"is at the place of row {before.number}; give one force for each place"
+            raise InputError(path, f"row {row.number}", f"{problem} and direction")
+        if bool(row.direction) != bool(before.direction):
+            problem = f"names a direction, or none, unlike row {before.number}; do as one"
+            raise InputError(path, f"row {row.number}", problem)
