@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.output import Output
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -32,8 +33,9 @@ class Parameter:
     the starts count.
 
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
-    the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. `host`
-    is what the host calls its own number for it, which is then to be set.
+    the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
+    that `may_vanish` can be 0 while the effect is there. `host` is what the host calls its own
+    number for it, which is then to be set.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Parameter:
     scanned: bool = True
     shape: bool = False
     inverse: bool = False
+    may_vanish: bool = False
     host: str = ""
 
     def named(self, control: str) -> str:
@@ -120,6 +123,7 @@ class Effect:
     `tolerance`    relative; its number is a setting, off by so much without being an effect
     `alike`        the effect for which it passes in a faint gap
     `sample_error` relative standard error of its number, from what little of it a record meets
+    `seen`         values by parameter where a fit may start, as a rig's residuals show them
     """
 
     name: str
@@ -131,6 +135,7 @@ class Effect:
     tolerance: float = 0.0
     alike: Likeness | None = None
     sample_error: Callable[[Record, float], float] | None = None
+    seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
 
     @property
     def free(self) -> tuple[Parameter, ...]:

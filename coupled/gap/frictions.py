@@ -37,6 +37,13 @@ _CONTACT = Parameter(
     "stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}", "value", 1e2, 1e8, (1e4, 1e5)
 )
 
+
+def _one_way(name: str, *starts_N: float) -> Parameter:
+    """Return the friction in one direction of motion above the nominal one."""
+    number = Parameter(name, f"loader.friction_{name}", "added", 0, 60, starts_N)
+    return replace(number, may_vanish=True)
+
+
 FRICTIONS: tuple[Effect, ...] = (
     Effect("coulomb_friction", "loader", (_level(1.5),), _DRAWN),
     Effect(
@@ -55,5 +62,19 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (_level(1.5), replace(_CONTACT, scanned=False, shape=True, inverse=True)),
         _DRAWN,
+    ),
+    # By itself it is the same law as plain friction of the mean with a constant force of half the
+    # difference, however the control is moved.
+    Effect(
+        "asymmetric_friction",
+        "loader",
+        (_one_way("pull_N", 1.5, 0.5), _one_way("push_N", 0.5, 1.5)),
+        _DRAWN,
+    ),
+    Effect(
+        "load_friction",
+        "loader",
+        (Parameter("factor", "loader.friction_by_load", "added", 0, 0.8, (0.03,)),),
+        Signature("force", "missing"),
     ),
 )

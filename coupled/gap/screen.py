@@ -32,9 +32,9 @@ def screen(
         ours = touched(case.outputs, [effect])
         now = np.concatenate([output.residual(current.rig) for output in ours])
         best, starts = 0.0, []
-        for shape in range(max([len(p.starts) for p in effect.free], default=1)):
+        for tries in _tries(case, current, effect):
             least, start = np.inf, {}
-            for values in _sizes(case, effect, shape):
+            for values in tries:
                 rig = _with(case, current, effect, values)
                 if rig is None:
                     continue
@@ -59,6 +59,20 @@ def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) ->
     every = (*chosen, *case.nuisances(chosen))
     known = {**case.neutral, **current.values, **values}
     return possible(case.nominal, case.control, every, known)
+
+
+def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, float]]]:
+    """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
+    if effect.seen is None:
+        shapes = max([len(p.starts) for p in effect.free], default=1)
+        return [_sizes(case, effect, shape) for shape in range(shapes)]
+    seen = effect.seen(case.outputs, current.rig, case.control)
+    return [
+        [
+            {effect.value_key(p): float(np.clip(one[p.name], p.low, p.high)) for p in effect.free}
+            for one in seen
+        ]
+    ]
 
 
 def _sizes(case: Case, effect: Effect, shape: int) -> list[dict[str, float]]:

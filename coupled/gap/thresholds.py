@@ -59,6 +59,10 @@ SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter start
 SCREEN_FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
 SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which a size does something
 
+# Where a fit of a ripple starts (`ripples`).
+RIPPLE_LEAST = 1.5  # chosen: periods within the deflections met, fewer of which are a spring's law
+RIPPLE_PERIODS = 60.0  # chosen: the most of them
+
 # Choosing (`choose`).
 LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it
 RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only answer

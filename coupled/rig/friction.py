@@ -16,6 +16,10 @@ is stiffness·z, and a damping that fades with speed, which lets a stuck control
 z depends on the way alone, and is solved exactly along it; so no event is located. A step takes
 the mean force over its way, an averaged vector field of second order; a turn inside a step costs
 the difference between two ways of length h², which keeps the order.
+
+Friction may differ with the direction of motion and grow with the force carried (gears, worn
+guides): to the levels above comes `pull` or `push`, and `by_load`·|F|. By direction alone, of a
+rigid contact, it is plain friction of the mean and a constant force of half the difference.
 """
 
 from __future__ import annotations
@@ -35,18 +39,34 @@ class FrictionParameters(Protocol):
     stribeck_rate: float  # v_s, d/s
     stiffness: float  # of the contact, N/d; 0 for a rigid one
     contact_damping: float  # N·s/d at rest
+    pull: float  # more where the control moves aft, N
+    push: float  # and where it moves forward, N
+    by_load: float  # and for each N that the loader carries
+    dry: int  # whether there is any
+    rigid: int  # and its contact is rigid
+    varies: int  # with the direction or the load
 
 
 ELASTIC_SHARE = 0.3  # of the bristles' length, bent before any of it slips
 CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
+LEAST_N = 1e-9  # friction of bristles that carry none at this load
 SOLVED = 1e-12  # of the speeds at hand
 
 
 def _stiffness(given: Given) -> float:
     """Return the stiffness of a contact that carries friction, N/d."""
+    return given.control.loader.friction_stiffness if _dry(given) else 0.0
+
+
+def _dry(given: Given) -> bool:
     loader = given.control.loader
-    return loader.friction_stiffness if max(loader.friction, loader.breakaway) > 0.0 else 0.0
+    return max(loader.friction, loader.breakaway) > 0.0 or _varies(given)
+
+
+def _varies(given: Given) -> bool:
+    loader = given.control.loader
+    return max(loader.friction_pull, loader.friction_push, loader.friction_by_load) > 0.0
 
 
 FRICTION = Declaration(
@@ -59,6 +79,12 @@ FRICTION = Declaration(
         "contact_damping": lambda g: (
             CONTACT_DAMPING * math.sqrt(_stiffness(g) * g.control.loader.mass)
         ),
+        "pull": lambda g: g.control.loader.friction_pull,
+        "push": lambda g: g.control.loader.friction_push,
+        "by_load": lambda g: g.control.loader.friction_by_load,
+        "dry": _dry,
+        "rigid": lambda g: _dry(g) and g.control.loader.friction_stiffness == 0.0,
+        "varies": _varies,
     },
 )
 
@@ -70,6 +96,21 @@ def running_friction(p: FrictionParameters, rate: float) -> float:
         return p.running
     ratio = rate / p.stribeck_rate
     return p.running + (p.breakaway - p.running) * math.exp(-ratio * ratio)
+
+
+@stage
+def more_friction(p: FrictionParameters, load: float, direction: float) -> float:
+    """Return what the direction of motion and the force carried, N, add to friction, N."""
+    if p.varies == 0:
+        return 0.0
+    return (p.pull if direction > 0.0 else p.push) + p.by_load * load
+
+
+@stage
+def _slipping(p: FrictionParameters, load: float, rate: float) -> float:
+    """Return the friction at which bristles slip at a rate, N."""
+    level = running_friction(p, rate) + more_friction(p, load, rate)
+    return max(level, LEAST_N) if p.varies else level
 
 
 @stage
@@ -97,16 +138,22 @@ def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tup
 
 
 @stage
-def bent_after(p: FrictionParameters, bent: float, rate: float, way: float) -> float:
+def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load: float) -> float:
     """Return how far bristles are bent after a way at a rate, d; 0 of a rigid contact."""
     if p.stiffness == 0.0:
         return 0.0
-    return yielded(p, running_friction(p, rate), bent, way)[0]
+    return yielded(p, _slipping(p, load, rate), bent, way)[0]
 
 
 @stage
 def yielding_speed(
-    p: FrictionParameters, bent: float, v: float, push: float, inertia: float, span: float
+    p: FrictionParameters,
+    bent: float,
+    v: float,
+    push: float,
+    inertia: float,
+    span: float,
+    load: float,
 ) -> float:
     """Return the speed u at the middle of a step of `span` seconds, in d/s, of a yielding contact.
 
@@ -117,7 +164,7 @@ def yielding_speed(
     spring = p.stiffness * (0.5 * span)
     u = (inertia * v + push - p.stiffness * bent) / (inertia + spring + p.contact_damping)
     for _ in range(NEWTON_STEPS):
-        level, fading = running_friction(p, u), u / p.stribeck_rate
+        level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = p.contact_damping * math.exp(-fading * fading)
         way = u * span
         after, mean = yielded(p, level, bent, way)
@@ -141,16 +188,18 @@ def rubbing_speed(
     direction: float,
     inertia: float,
     span: float,
+    load: float,
 ) -> float:
     """Return the speed at the middle of a step of `span` seconds, of any friction, in d/s.
 
     `push` is the force but for friction, N, `inertia` what it has to move, N·s/d, `direction` the
-    side to which a rigid contact slides.
+    side to which a rigid contact slides, `load` the force carried, N.
     """
-    if p.breakaway == 0.0:
+    if p.dry == 0:
         return v + push / inertia
     if p.stiffness > 0.0:
-        return yielding_speed(p, bent, v, push, inertia, span)
+        return yielding_speed(p, bent, v, push, inertia, span, load)
+    push -= more_friction(p, load, direction) * direction
     halfway = v + (push - running_friction(p, v) * direction) / inertia
     if p.breakaway > p.running:  # Stribeck: once more with the speed just found
         halfway = v + (push - running_friction(p, halfway) * direction) / inertia

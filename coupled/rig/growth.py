@@ -15,7 +15,7 @@ from coupled.rig.compiled import entry, stage
 from coupled.rig.control import CONTROL, STAGES, ControlArray, ControlState
 from coupled.rig.frame import CHANNELS_PER_CONTROL, host_frame
 from coupled.rig.gauge import start_gauge
-from coupled.rig.loader import start_delay
+from coupled.rig.loader import start_loader
 from coupled.rig.mechanism import run_frame, set_hand
 from coupled.rig.packing import Hand, pack
 from coupled.rig.rig import Rig
@@ -83,7 +83,7 @@ def _grow(
     s.linkage.position = s.linkage.grip = 0.8
     s.hand.at = s.linkage.grip
     set_hand(p, s, 0.0, 0.0, 0.0)
-    start_delay(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
+    start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
     grown = 0.0
     for k in range(len(logs)):
         out[:] = 0.0  # what it holds is the noise of what is read

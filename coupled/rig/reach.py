@@ -24,10 +24,11 @@ from typing import Protocol
 
 from coupled.rig.compiled import layout, stage
 from coupled.rig.declaration import Declaration
-from coupled.rig.friction import FrictionParameters
+from coupled.rig.friction import FrictionParameters, more_friction
 from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.modification import ModificationState, slope, smooth_force
+from coupled.rig.springs import limited, spring, spring_slope
 
 _ITERATIONS = 40
 _SEAT = 1e-12  # of a deflection: rounding
@@ -84,16 +85,18 @@ def _place(
     """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
     low, high = 0.0, p.travel
     x = min(r, high)
-    level = p.breakout + m.breakout + friction.running - side * s.external
+    rubs = friction.running + more_friction(friction, 0.0, side)
+    level = p.breakout + m.breakout + rubs - side * s.external
     force = level
     for _ in range(_ITERATIONS):
-        force = level + (p.basic_gradient + p.cubic * x * x) * x + smooth_force(m, x)
+        force = level + side * spring(p, side * x) + limited(p, smooth_force(m, x))
+        force /= 1.0 - friction.by_load
         over = x + bend(linkage_p, force) - r
         if over > 0.0:
             high = x
         else:
             low = x
-        stiffness = p.basic_gradient + 3.0 * p.cubic * x * x + slope(m, x)
+        stiffness = (spring_slope(p, side * x) + slope(m, x)) / (1.0 - friction.by_load)
         rise = 1.0 + bend_slope(linkage_p, force) * stiffness
         after = x - over / rise if rise > 0.0 else 0.5 * (low + high)
         if not low <= after <= high:

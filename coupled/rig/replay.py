@@ -19,7 +19,7 @@ from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
 from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import carry_bend, deflection, move_linkage, transducer
-from coupled.rig.loader import move_loader, set_external, start_delay
+from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import set_gradients
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
@@ -192,7 +192,7 @@ def _loader(
     """Run the loader; `given`, shape (6, frames): G_T twice, misread δc, load factor, restarts."""
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
-    start_delay(p.loader, s.loader, force[0])
+    start_loader(p.loader, s.loader, force[0])
     ends = (-p.loader.travel, p.loader.travel)
     frames = len(misread)
     for k in range(frames):

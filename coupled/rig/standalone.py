@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from coupled.record.channels import channel, control_channels
 from coupled.rig.compiled import entry
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
-from coupled.rig.loader import move_loader, set_external, start_delay
+from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
 
@@ -117,7 +117,7 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 @entry
 def _supplied(parameters: Any, states: Any, supply_N: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
-    start_delay(p.loader, s.loader, 0.0)
+    start_loader(p.loader, s.loader, 0.0)
     ends = (-p.loader.travel, p.loader.travel)
     set_external(p.loader, s.loader, 1.0)
     for node in range(len(supply_N)):

@@ -25,6 +25,7 @@ from coupled.rig.modification import modifying_force, set_gradients
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
+from coupled.rig.springs import limited, ripple
 
 Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
@@ -108,7 +109,8 @@ def _force(p: ControlParameters, s: ControlState, computed: float) -> float:
     """Return F in N at δc = `computed` d, which is not zero."""
     breakout = p.loader.breakout if computed > 0.0 else -p.loader.breakout
     spring = loader_force(p.loader.basic_gradient, computed) + p.loader.cubic * computed**3
-    return breakout + spring + modifying_force(s.modification, computed)
+    given = limited(p.loader, modifying_force(s.modification, computed))
+    return breakout + spring + ripple(p.loader, computed) + given
 
 
 @entry

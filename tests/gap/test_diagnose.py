@@ -36,6 +36,11 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "digital_multiplier", {}),
     (False, "transport_delay", {"delay_s": 0.03}),
     (False, "modifying_lag", {"lag_s": 0.02}),
+    (False, "asymmetric_friction", {"pull_N": 4.0, "push_N": 1.0}),
+    (False, "load_friction", {"factor": 0.08}),
+    (False, "friction_ripple", {"ripple_N": 3.0, "period_{d}": 6e-3, "phase_rad": 0.5}),
+    (False, "relaxation", {"stiffness_N_per_{d}": 300.0, "time_s": 0.6}),
+    (False, "force_limit", {"limit_N": 20.0}),
     (True, "deflection_scale", {"factor": 1.05}),
     (True, "bend", {"bend_{d}_per_N": 1.6e-4}),
     (False, "stiffening_bend", {"bend_{d}_per_N": 1.5e-4, "limit_{d}": 4e-3}),
@@ -57,6 +62,7 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
 # Those that take longest to tell from their rivals; of each stage others are found in a moment.
 LONG = {"viscous_damping", "gradient_error", "cubic_stiffness", "breakout", "bob_weight"}
 LONG |= {"force_offset", "digital_multiplier", "transport_delay", "deflection_scale"}
+LONG |= {"asymmetric_friction", "load_friction", "relaxation", "friction_ripple"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
 
 

@@ -1,0 +1,139 @@
+"""Springs: what opposes δc by where the loader stands, and what remembers where it stood.
+
+    spring      G_B·δc + k₃·δc³
+    ripple      + r·sin(2π·δc/period + phase)        cogging, teeth, a ball screw
+    F_mod       no more than the actuator gives: −limit ≤ F_mod ≤ limit
+    relaxation  + y,  y' = k·δc' − y/τ               a spring k in series with a damper k·τ
+
+The loader's step takes their mean over the step. That of the relaxing spring is exact for an even
+motion: with a = τ·(1 − e^(−h/τ))/h it is a·y + (1 − a)·k·τ·u, u being the mean rate, so it enters
+the implicit step as a force and a damping. All else is taken at the step's middle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from coupled.rig.compiled import stage
+from coupled.rig.declaration import Given, first_order_gain
+from coupled.rig.modification import ModificationState, modifying_force, slope, smooth_force
+
+
+class SpringParameters(Protocol):
+    """The loader's springs; d is m, or rad for a wheel. 0 leaves a part out."""
+
+    basic_gradient: float  # G_B, N/d
+    cubic: float  # k₃, N/d³
+    ripple: float  # N
+    ripple_wave: float  # 2π over the period, 1/d
+    ripple_phase: float  # rad
+    force_limit: float  # of F_mod as the actuator gives it, N
+    relaxing: float  # stiffness of the spring that relaxes, N/d
+    relaxing_time: float  # τ, s
+    digital: int  # F_mod is held over the frame
+    lag_gain: float  # share that F_mod's lag goes in half a substep; 0 without lag
+    held: int  # F_mod does not follow δc within a substep: it is digital, or lags
+
+
+class SpringState(Protocol):
+    """What the springs remember."""
+
+    felt: float  # F_mod as the loader feels it where it is held, N
+    relaxed: float  # y, N
+
+
+def _half_step_gain(given: Given) -> float:
+    """Return the share that F_mod's lag goes in half a substep, 0 where it has none."""
+    lag_s = given.control.loader.modifying_lag
+    return first_order_gain(lag_s, 0.5 * given.substep_s) if lag_s > 0.0 else 0.0
+
+
+DERIVED: dict[str, Callable[[Given], Any]] = {
+    "ripple": lambda g: g.control.loader.ripple,
+    "ripple_wave": lambda g: 2.0 * math.pi / g.control.loader.ripple_period,
+    "ripple_phase": lambda g: g.control.loader.ripple_phase,
+    "relaxing": lambda g: g.control.loader.relaxing_stiffness,
+    "relaxing_time": lambda g: g.control.loader.relaxing_time,
+    "digital": lambda g: g.control.loader.multiplier == "digital",
+    "lag_gain": _half_step_gain,
+    "held": lambda g: g.control.loader.multiplier == "digital" or _half_step_gain(g) > 0.0,
+}
+
+
+@stage
+def ripple(p: SpringParameters, x: float) -> float:
+    """Return the force that comes again at every period of δc = x, N."""
+    return p.ripple * math.sin(p.ripple_wave * x + p.ripple_phase) if p.ripple != 0.0 else 0.0
+
+
+@stage
+def spring(p: SpringParameters, x: float) -> float:
+    """Return what the electronics' own springs oppose δc = x with, N: F_L of eq. (8)."""
+    return (p.basic_gradient + p.cubic * x * x) * x + ripple(p, x)
+
+
+@stage
+def spring_slope(p: SpringParameters, x: float) -> float:
+    """Return the slope of `spring`, N/d."""
+    own = p.basic_gradient + 3.0 * p.cubic * x * x
+    if p.ripple != 0.0:
+        own += p.ripple * p.ripple_wave * math.cos(p.ripple_wave * x + p.ripple_phase)
+    return own
+
+
+@stage
+def limited(p: SpringParameters, force: float) -> float:
+    """Return what the actuator gives of a modifying force, N."""
+    if p.force_limit > 0.0:
+        return min(max(force, -p.force_limit), p.force_limit)
+    return force
+
+
+@stage
+def elastic(p: SpringParameters, m: ModificationState, s: SpringState, x: float) -> float:
+    """Return the smooth part of the force that opposes δc = x, N: the springs', and F_mod."""
+    force = spring(p, x)
+    return force + (s.felt if p.held else limited(p, smooth_force(m, x)))
+
+
+@stage
+def stiffness(p: SpringParameters, m: ModificationState, x: float) -> float:
+    """Return the slope of `elastic`, N/d."""
+    own = spring_slope(p, x)
+    if p.held or (p.force_limit > 0.0 and abs(smooth_force(m, x)) >= p.force_limit):
+        return own
+    return own + slope(m, x)
+
+
+@stage
+def feel(p: SpringParameters, m: ModificationState, s: SpringState, computed: float) -> None:
+    """Let a held F_mod reach the loader: at once, or half a substep on through its lag."""
+    wanted = m.held if p.digital else modifying_force(m, computed)
+    wanted = limited(p, wanted)
+    if p.lag_gain > 0.0:
+        wanted = s.felt + p.lag_gain * (wanted - s.felt)
+    s.felt = wanted
+
+
+@stage
+def faded(p: SpringParameters, s: SpringState, span: float) -> float:
+    """Return the relaxing spring's force after `span` seconds at rest, N."""
+    return s.relaxed * math.exp(-span / p.relaxing_time)
+
+
+@stage
+def relaxing_mean(p: SpringParameters, s: SpringState, span: float) -> tuple[float, float]:
+    """Return the mean of y over `span` seconds at rest, N, and what each d/s adds to it, N·s/d."""
+    kept = -math.expm1(-span / p.relaxing_time) * p.relaxing_time / span
+    return kept * s.relaxed, (1.0 - kept) * p.relaxing * p.relaxing_time
+
+
+@stage
+def relax(p: SpringParameters, s: SpringState, way: float, span: float) -> None:
+    """Advance the relaxing spring over `span` seconds of even motion, `way` long, d."""
+    if span <= 0.0:
+        return
+    steady = p.relaxing * p.relaxing_time * way / span
+    s.relaxed = steady + (s.relaxed - steady) * math.exp(-span / p.relaxing_time)
