@@ -13,7 +13,7 @@ from coupled.cli.terminal import check_json, keep_json, out, print_json, progres
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
 from coupled.outputs import Outputs
-from coupled.record.channels import CONTROL_NAMES, ControlName
+from coupled.record.channels import ControlName, control_named
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def diagnose(
     report: ReportOption = None,
 ) -> None:
     """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
-    name = _control(control, records[0])
+    name = control_named(control, records[0])
     from coupled.record.record import manifest_path
 
     if any(record.is_dir() for record in records):
@@ -101,13 +101,6 @@ def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
             raise InputError(records[0], option, "is for records of one rig, not for a folder")
 
 
-def _control(word: str, file: Path) -> ControlName:
-    for name in CONTROL_NAMES:
-        if name == word:
-            return name
-    raise InputError(file, "--control", f"is {word!r}; one of {', '.join(CONTROL_NAMES)}")
-
-
 def _diagnose(
     files: list[Path], rig_file: Path, control: ControlName
 ) -> tuple[Diagnosis, dict[str, Record]]:
@@ -152,8 +145,9 @@ def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
+    from coupled.files import read_text
     from coupled.gap.summary import change, plain
-    from coupled.rig.rigwrite import rig_text
+    from coupled.rig.rigedit import differences, edited
 
     names = ", ".join(shown(Path(name).name) for name in records)
     remark = f"{shown(rig_file.name)} with what was found in {names}:\n{whole.summary}\n"
@@ -162,7 +156,8 @@ def _write_improved(
     for setting in whole.settings:
         moved = f"{100 * (setting.factor - 1):+.2f} %, within what it is set to"
         remark += f"changed: {plain(setting.name)} {moved}\n"
-    write_text(path, rig_text(whole.improved, remark))
+    changes = differences(whole.nominal, whole.improved)
+    write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:

@@ -12,7 +12,6 @@ from coupled.gap.case import Case
 from coupled.gap.choose import Choice, Found
 from coupled.gap.credibility import credibility
 from coupled.gap.effect import Effect, Parameter, field_of
-from coupled.gap.library import SETTINGS
 from coupled.gap.result import (
     EffectResult,
     ParameterEstimate,
@@ -20,6 +19,7 @@ from coupled.gap.result import (
     StageResult,
     Verdict,
 )
+from coupled.gap.settings import settings
 from coupled.gap.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, REMAINDER, SURE
 from coupled.record.channels import ControlName
@@ -54,12 +54,13 @@ def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
 
 
 def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
-    """Return what the settings of the nominal rig were found to be."""
+    """Return what the settings of the nominal rig were found to be, over what is filed."""
     found = []
-    for setting in SETTINGS.values():
+    for setting in settings(rig, control).values():
         for p in setting.free:
-            factor = choice.fit.values.get(setting.value_key(p))
-            if factor is not None:
+            value, filed = choice.fit.values.get(setting.value_key(p)), p.nominal(rig, control)
+            if value is not None and filed:
+                factor = float(p.entered(filed, value) / filed)
                 name = field_of(rig, control, p.key)
                 found.append(SettingResult(name, setting.stage, factor))
     return tuple(found)

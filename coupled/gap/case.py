@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, fit
-from coupled.gap.library import SETTINGS
 from coupled.gap.output import Output, Part, stage_gaps
+from coupled.gap.settings import settings
 from coupled.gap.thresholds import SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -29,16 +30,26 @@ class Case:
     tell: Tell | None = None
     refloored: Callable[[Rig], Sequence[Output]] | None = None
 
-    @property
+    @cached_property
+    def known(self) -> dict[str, Effect]:
+        """The nominal rig's settings, by the effects that free the same numbers."""
+        return settings(self.nominal, self.control)
+
+    @cached_property
     def settings(self) -> tuple[Effect, ...]:
         """The nominal rig's settings that the outputs depend on: nuisances of every fit."""
         stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
-        return tuple(s for s in SETTINGS.values() if s.stage in stages)
+        return tuple(s for s in self.known.values() if s.stage in stages)
 
-    @property
+    @cached_property
     def neutral(self) -> dict[str, float]:
         """The settings as the rig file has them."""
-        return {s.value_key(p): 1.0 for s in SETTINGS.values() for p in s.free}
+        return {s.value_key(p): p.starts[0] for s in self.known.values() for p in s.free}
+
+    def ends(self, effect: Effect) -> tuple[float, float] | None:
+        """Return between which values an effect's number is a setting; None where it is none."""
+        setting = self.known.get(effect.name)
+        return None if setting is None else (setting.free[0].low, setting.free[0].high)
 
     def gaps(self, rig: Rig) -> dict[str, float]:
         """Return each stage's gap, by the floors of this rig where they are higher."""
@@ -50,8 +61,8 @@ class Case:
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the settings whose number none of these effects frees."""
-        freed = {SETTINGS[effect.name].name for effect in effects if effect.name in SETTINGS}
-        return [setting for setting in self.settings if setting.name not in freed]
+        freed = {p.key for effect in effects for p in effect.parameters}
+        return [one for one in self.settings if freed.isdisjoint(p.key for p in one.free)]
 
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
         """Return the rig with some of the effects that a fit found, and its settings."""

@@ -16,8 +16,9 @@ import numpy as np
 from coupled.gap.case import Case, Tell
 from coupled.gap.effect import Effect, apply, value_of
 from coupled.gap.fit import Fit
-from coupled.gap.library import BY_NAME, EFFECTS, SETTINGS
-from coupled.gap.output import Output, explained_below, memory, stage_gaps, stage_limits
+from coupled.gap.gain import Candidate, ranked_by_gain
+from coupled.gap.library import BY_NAME, EFFECTS
+from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.screen import screen
 from coupled.gap.thresholds import (
     FAINT_GAP,
@@ -25,22 +26,12 @@ from coupled.gap.thresholds import (
     LEAST_GAIN,
     MOST_EFFECTS,
     NEEDLESS_GAIN,
-    NO_GAP_LEFT,
     RIVAL_GAIN,
     SIMPLER_GAIN,
     SIMPLER_SHARE,
 )
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect fitted beside those found so far, and its gain on held-out stretches."""
-
-    gain: float
-    effect: Effect
-    fit: Fit
 
 
 @dataclass(frozen=True)
@@ -222,7 +213,7 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
     guilty = {
         stage for stage, gap in now.items() if gap > explained_below(first[stage], limits[stage])
     }
-    among = guilty or _strained(current)
+    among = guilty or _strained(case, current)
     candidates = [
         effect
         for effect in library
@@ -239,61 +230,40 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         ]
         fitted = min(tries, key=lambda one: one.cost)
         bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
-        if not bound and not _within_tolerance(effect, fitted):
+        if not bound and not _within_tolerance(case, effect, fitted):
             found.append((effect, fitted))
     ranked = ranked_by_gain(case.outputs, current, found)
-    return ranked if guilty or _surely_beyond(ranked) else []
+    return ranked if guilty or _surely_beyond(case, ranked) else []
 
 
-def _within_tolerance(effect: Effect, fitted: Fit) -> bool:
+def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:
     """Tell whether a nominal number moved by no more than its setting can be trusted to."""
-    if effect.tolerance == 0.0:
+    ends = case.ends(effect)
+    if ends is None:
         return False
     (number,) = effect.free
-    return number.size(fitted.values[effect.value_key(number)]) < effect.tolerance
+    return ends[0] < fitted.values[effect.value_key(number)] < ends[1]
 
 
-def _strained(current: Fit) -> set[str]:
+def _strained(case: Case, current: Fit) -> set[str]:
     """Return the stages of which a setting stands at the end of its tolerance.
 
     It may then keep a stage within its limit that is off by more.
     """
-    settings = SETTINGS.values()
+    settings = case.known.values()
     return {one.stage for one in settings for p in one.free if one.value_key(p) in current.at_bound}
 
 
-def _surely_beyond(ranked: Sequence[Candidate]) -> bool:
+def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:
     """Tell whether the best candidate is a number off by more than its setting, and nothing else.
 
     In a stage within its limit no other effect is claimed.
     """
-    if not ranked or ranked[0].effect.tolerance == 0.0:
+    ends = case.ends(ranked[0].effect) if ranked else None
+    if ends is None:
         return False
-    best, slack = ranked[0], ranked[0].effect.tolerance
+    best = ranked[0]
     (number,) = best.effect.free
     key = best.effect.value_key(number)
-    beyond = best.fit.low[key] > 1.0 + slack or best.fit.high[key] < 1.0 - slack
+    beyond = best.fit.low[key] > ends[1] or best.fit.high[key] < ends[0]
     return beyond and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])
-
-
-def ranked_by_gain(
-    outputs: Sequence[Output], current: Fit, found: Sequence[tuple[Effect, Fit]]
-) -> list[Candidate]:
-    """Return fitted candidates by the held-out log-likelihood that they gain, best first.
-
-    A sample counts as the best candidate's residual lets it, the same for all: a worse one's
-    longer memory is its own fault, and no reason to weigh its misfit less.
-    """
-    if not found:
-        return []
-    before = [float(np.mean(o.residual(current.rig, "held") ** 2)) + NO_GAP_LEFT for o in outputs]
-    lefts = [[o.residual(fitted.rig, "held") for o in outputs] for _, fitted in found]
-    squares = [[float(np.mean(left**2)) + NO_GAP_LEFT for left in each] for each in lefts]
-    best = min(range(len(found)), key=lambda i: float(np.sum(np.log(squares[i]))))
-    counts = [0.5 * len(left) / memory(left) for left in lefts[best]]
-    ranked = []
-    for (effect, fitted), after in zip(found, squares, strict=True):
-        terms = zip(counts, before, after, strict=True)
-        gain = float(sum(n * np.log(b / a) for n, b, a in terms))
-        ranked.append(Candidate(gain, effect, fitted))
-    return sorted(ranked, key=lambda candidate: -candidate.gain)

@@ -7,7 +7,7 @@ stages then fly.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal
 
@@ -88,6 +88,12 @@ class Parameter:
         """Return how far a value is from where it does nothing."""
         return abs(value - 1.0) if self.mode == "factor" else abs(value)
 
+    def neutral(self, rig: Rig, control: ControlName) -> float:
+        """Return the value at which the rig's number stays as it is."""
+        if self.mode == "value":
+            return float(self.nominal(rig, control))
+        return 1.0 if self.mode == "factor" else 0.0
+
 
 @dataclass(frozen=True)
 class Signature:
@@ -154,6 +160,13 @@ class Effect:
     def can_be_tried(self, records: Sequence[Record]) -> bool:
         """Tell whether all records have the channels that it needs."""
         return all(name in record for record in records for name in self.needs)
+
+
+def setting_of(effect: Effect, low: float, high: float, neutral: float = 1.0) -> Effect:
+    """Return the number that an effect frees as a setting, free between two values."""
+    (number,) = effect.parameters
+    within = replace(number, low=low, high=high, starts=(neutral,))
+    return replace(effect, name=f"setting of {effect.name}", parameters=(within,), tolerance=0.0)
 
 
 @cache

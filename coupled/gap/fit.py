@@ -8,7 +8,7 @@ of them stand at a bound, and the residuals.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ class Fit:
     at_bound: tuple[str, ...]
     rig: Rig
     cost: float  # half the sum of squares, in floors
+    # {keys of parameters fitted together: JᵀJ in their own units}, J in floors
+    information: Mapping[tuple[str, ...], Floats] = field(default_factory=dict, compare=False)
 
 
 def touched(outputs: Sequence[Output], effects: Sequence[Effect]) -> list[Output]:
@@ -68,19 +70,20 @@ def fit(
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     bound: tuple[str, ...] = ()
-    cost = 0.0
+    cost, information = 0.0, dict[tuple[str, ...], Floats]()
     for group in _groups(every):
         if only is None or only in group:
             found = _fit(nominal, control, touched(outputs, group), group, part, start or {})
             low, high, bound = low | found.low, high | found.high, bound + found.at_bound
             values, cost = values | found.values, cost + found.cost
+            information[tuple(found.values)] = found.information
             continue
         keys, frees = _free(group)
         values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
     rig = possible(nominal, control, every, values)
     if rig is None:
         rig, bound = nominal, tuple(values)
-    return Fit(tuple(effects), values, low, high, bound, rig, cost)
+    return Fit(tuple(effects), values, low, high, bound, rig, cost, information)
 
 
 def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
@@ -107,6 +110,7 @@ class _Group:
     high: dict[str, float]
     at_bound: tuple[str, ...]
     cost: float
+    information: Floats
 
 
 def _fit(
@@ -118,7 +122,7 @@ def _fit(
     start: Mapping[str, float],
 ) -> _Group:
     keys, frees = _free(effects)
-    scale = np.array([max(abs(s) for s in p.starts) or 1.0 for p in frees])
+    scale = np.array([_scale(p) for p in frees])
     frames = sum(int(output.rows(part).sum()) for output in ours)
 
     def residual(scaled: Floats) -> Floats:
@@ -129,10 +133,11 @@ def _fit(
         return np.concatenate([output.residual(rig, part) for output in ours])
 
     if not ours:
-        return _Group(dict(zip(keys, _starts(keys, frees, start)[0], strict=True)), {}, {}, (), 0.0)
+        known = dict(zip(keys, _starts(keys, frees, start)[0], strict=True))
+        return _Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
     if not keys:
         left = residual(np.array([]))
-        return _Group({}, {}, {}, (), 0.5 * float(left @ left))
+        return _Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
     low = np.array([p.low for p in frees]) / scale
     high = np.array([p.high for p in frees]) / scale
     best = None
@@ -159,7 +164,13 @@ def _fit(
         dict(zip(keys, (values + half).tolist(), strict=True)),
         tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
         float(best.cost),
+        np.asarray(best.jac.T @ best.jac) / np.outer(scale, scale),
     )
+
+
+def _scale(p: Parameter) -> float:
+    """Return a size of a parameter for which a step of a hundredth is small."""
+    return max(abs(start) for start in p.starts) or 0.5 * (p.high - p.low)
 
 
 class _Slopes:

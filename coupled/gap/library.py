@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from coupled.gap.air import NEEDS as AIR
 from coupled.gap.air import spread_of_air
-from coupled.gap.effect import Effect
+from coupled.gap.effect import Effect, setting_of
 from coupled.gap.entries import added, factor, limit, one, value
 from coupled.gap.library_linkage import LINKAGE
 from coupled.gap.library_loader import LOADER
@@ -98,15 +98,9 @@ EFFECTS: tuple[Effect, ...] = (
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 
-def _setting(effect: Effect) -> Effect:
-    """Return the number that an effect frees as a setting, free within its tolerance."""
-    low, high = 1.0 - effect.tolerance, 1.0 + effect.tolerance
-    (number,) = effect.parameters
-    within = replace(number, low=low, high=high, starts=(1.0,))
-    return replace(effect, name=f"setting of {effect.name}", parameters=(within,), tolerance=0.0)
-
-
-# {the effect that frees the same number: the setting}
+# {the effect that frees the same number: the setting}, where the rig file gives no tolerance
 SETTINGS: dict[str, Effect] = {
-    effect.name: _setting(effect) for effect in EFFECTS if effect.tolerance > 0.0
+    effect.name: setting_of(effect, 1.0 - effect.tolerance, 1.0 + effect.tolerance)
+    for effect in EFFECTS
+    if effect.tolerance > 0.0
 }

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from coupled.gap.effect import Effect, Parameter, apply, possible, value_of
 from coupled.gap.fit import touched
-from coupled.gap.library import EFFECTS, SETTINGS
+from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output
+from coupled.gap.settings import settings
 from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -123,9 +124,11 @@ def _signature(
 def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
     """Return the signatures of a stage's settings, a column each."""
     columns = []
-    for name, setting in SETTINGS.items():
+    for name, setting in settings(nominal, control).items():
         if setting.stage == output.stage and name != effect.name:
-            values = {setting.value_key(p): SETTING_NUDGE for p in setting.free}
+            (number,) = setting.free
+            nudge = SETTING_NUDGE * (number.high - number.starts[0])
+            values = {setting.value_key(number): number.starts[0] + nudge}
             rig = apply(nominal, control, [setting], values)
             columns.append(output.residual(rig) - output.residual(nominal))
     return np.column_stack(columns) if columns else np.empty((0, 0))

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.case import Case
-from coupled.gap.choose import Choice, ranked_by_gain
+from coupled.gap.choose import Choice
 from coupled.gap.effect import Effect, value_of
 from coupled.gap.flown import fly_force
+from coupled.gap.gain import ranked_by_gain
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, white
 from coupled.gap.stages import Reader

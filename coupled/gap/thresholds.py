@@ -53,6 +53,10 @@ MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, an
 FIT_ITERATIONS = 40  # chosen
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
 
+# A nominal rig from records (`nominal`).
+ALIKE = 0.05  # least eigenvalue of signatures' cosines: two at cosine 0.95 are one answer together
+SHARES_IN = 0.3  # chosen: of the largest part, from which a number belongs to such a group
+
 # Screening (`screen`).
 SCREENED = 6  # chosen: candidates fitted in a round
 SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
@@ -109,7 +113,7 @@ FEW_STRETCHES = 8  # under which a bootstrap interval is not to be relied on; ch
 # What size would have shown (`power`).
 POWER_DECADES = 3  # chosen: to either side of a fit's start
 POWER_HALVINGS = 5  # of the decade where an effect begins to show: to 7 %
-SETTING_NUDGE = 1.01  # chosen: factor by which a setting's signature is taken
+SETTING_NUDGE = 0.5  # chosen: of a setting's tolerance, at which its signature is taken
 
 # The next test (`proposal`), and the flight again (`flown`).
 TEST_s = 15.0  # chosen: length of a test

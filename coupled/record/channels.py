@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+from coupled.errors import InputError
+
 ControlName = Literal["column", "wheel", "pedals"]
 CONTROL_NAMES: tuple[ControlName, ...] = ("column", "wheel", "pedals")
 SURFACES = {"column": "elevator", "wheel": "aileron", "pedals": "rudder"}
@@ -115,3 +117,11 @@ def noisy_channels(controls: Sequence[str], flown: bool) -> list[str]:
     """Return the channels that a sensor reads, and that noise may be given for."""
     names = [control_channels(control)[i] for control in controls for i in _NOISY]
     return names + list(motion_channels(controls, flown))
+
+
+def control_named(word: str, file: object) -> ControlName:
+    """Return the control of a word; raise InputError for another, naming a file."""
+    for name in CONTROL_NAMES:
+        if name == word:
+            return name
+    raise InputError(file, "--control", f"is {word!r}; one of {', '.join(CONTROL_NAMES)}")

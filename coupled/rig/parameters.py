@@ -177,6 +177,8 @@ class Control(Section):
     gains: Gains = Gains()
     rigging: Rigging = Rigging()
     calibration: Calibration = Calibration()
+    # How well the numbers above are known: half of a 95 % interval by their keys, in their units.
+    tolerance: dict[str, float] = {}
 
     @property
     def assumed_basic_gradient(self) -> float:

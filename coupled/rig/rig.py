@@ -29,7 +29,7 @@ from coupled.rig.parameters import (
     Flight,
 )
 from coupled.rig.structure import Structure, check_structure
-from coupled.schema import Section, build, changed, grouped, known_keys, quantity
+from coupled.schema import Section, build, changed, file_keys, grouped, known_keys, quantity
 
 
 class Rig(Section):
@@ -156,6 +156,21 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     _check_inertia(control, file, path, d)
     _check_schedule(control, file, path, d)
     _check_converters(control, file, path, d)
+    _check_tolerance(control, file, path, d)
+
+
+def _check_tolerance(control: Control, file: object, path: str, d: str) -> None:
+    """Refuse how well a number is known where there is no such number."""
+    for key, wide in control.tolerance.items():
+        section, _, name = key.partition(".")
+        holder = getattr(control, section, None)
+        known = file_keys(type(holder), d) if isinstance(holder, Section) else {}
+        value = getattr(holder, known.get(name, ""), None)
+        if not isinstance(value, float):
+            problem = 'is no number of the control; give its key, as "loader.mass_kg"'
+            raise InputError(file, f"{path}.tolerance.{key}", problem)
+        if wide <= 0.0:
+            raise InputError(file, f"{path}.tolerance.{key}", "must be above 0")
 
 
 def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None:

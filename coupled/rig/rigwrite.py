@@ -25,6 +25,7 @@ def rig_text(rig: Rig, remark: str = "") -> str:
     lines += _table("structure", rig.structure, "m")
     for name, control in rig.controls.items():
         lines += _table(f"controls.{name}", control, unit_of(name))
+        lines += _mapping(f"controls.{name}.tolerance", control.tolerance)
     return "\n".join(lines).lstrip("\n") + "\n"
 
 

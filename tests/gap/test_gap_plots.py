@@ -12,11 +12,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from coupled.gap.airframe import airframe_outputs
-from coupled.gap.choose import Candidate, Choice, Found
+from coupled.gap.choose import Choice, Found
 from coupled.gap.diagnose import diagnose
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import Effect, apply
 from coupled.gap.fit import Fit
+from coupled.gap.gain import Candidate
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import Output, stage_gaps
 from coupled.gap.result import EffectResult, ParameterEstimate, StageResult

@@ -18,7 +18,7 @@ from tests.support.rigs import bench
 
 STAGES = controls.STAGES
 # What is no number of the kernels: said of the host, the airframe or a calibration.
-ELSEWHERE = {"gains", "calibration"}
+ELSEWHERE = {"gains", "calibration", "tolerance"}
 # Everything on, so that each number counts: two segments, converters, an arc.
 SCHEDULE, HOST, SENSING = (f"controls.column.{s}" for s in ("schedule", "compensation", "sensing"))
 RIG = bench(
@@ -54,6 +54,8 @@ def other(value: Any) -> Any:
         return more[more.index(value) ^ 1] if value in more else others[others.index(value) ^ 1]
     if isinstance(value, list):
         return [*value[:-1], 1.01 * value[-1] + 1.0]
+    if isinstance(value, dict):
+        return {"loader.mass_kg": 0.1}
     return value + 1 if isinstance(value, int) else 1.01 * value + 1e-3
 
 

@@ -1,0 +1,104 @@
+"""The command that makes a nominal rig from records of a healthy machine: fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coupled.cli.app import JsonOption, app
+from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.errors import InputError, shown
+from coupled.files import check_target, write_text
+from coupled.outputs import Outputs
+from coupled.record.channels import control_named
+from coupled.resources import find, shipped_rigs
+
+if TYPE_CHECKING:
+    from coupled.gap.nominalfit import NominalFit
+
+
+@app.command(
+    epilog="[dim]Examples: coupled fit well1.csv well2.csv --rig start.toml --output axis.toml"
+    " · coupled fit well.csv --rig start.toml --free loader.mass_kg --free loader.friction_N[/]"
+)
+def fit(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="Records of the healthy machine, CSV or Parquet."),
+    ],
+    rig: Annotated[str, typer.Option(help="The rig file to start from, or a shipped one.")],
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY",
+            help="A number of the control to fit, as loader.mass_kg; may be given often."
+            "  [default: those that the records judge]",
+        ),
+    ] = None,
+    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="NEW.toml", help="Write the fitted rig there."),
+    ] = None,
+    json_file: JsonOption = "",
+) -> None:
+    """Fit a nominal rig to records of a healthy machine, and say what they do not tell."""
+    from coupled.gap.nominal import fit_nominal
+    from coupled.record.record import manifest_path, read_record
+    from coupled.rig.rigfile import read_rig
+
+    name = control_named(control, logs[0])
+    rig_file = find(rig, shipped_rigs(), "rig")
+    inputs = [*logs, *map(manifest_path, logs), rig_file]
+    if output is not None:
+        if output.suffix != ".toml":
+            raise InputError(output, "--output", "is a rig file: its name ends in .toml")
+        check_target(output, inputs)
+    check_json(json_file, [*inputs, *([output] if output else [])])
+    start = read_rig(rig_file)
+    records = {}
+    for file in logs:
+        if str(file) in records:
+            raise InputError(file, "", "is a duplicate: give each record once")
+        records[str(file)] = read_record(file)
+    with progress() as advance:
+        fitted = fit_nominal(start, records, free or (), name, advance)
+    with Outputs() as outputs:
+        if output is not None:
+            text = _text(fitted, rig_file, logs)
+            write_text(outputs.at(output), text)
+        keep_json(fitted.as_dict(), json_file, outputs)
+    if json_file != "-":
+        _print(fitted)
+        if output is not None:
+            say(f"fitted rig: {output}")
+    print_json(fitted.as_dict(), json_file)
+
+
+def _text(fitted: NominalFit, rig_file: Path, logs: list[Path]) -> str:
+    from coupled.files import read_text
+    from coupled.rig.rigedit import differences, edited
+    from coupled.rig.rigfile import read_rig
+
+    names = ", ".join(shown(log.name) for log in logs)
+    remark = f"{shown(rig_file.name)} with what was fitted to {names}.\n"
+    remark += "The tolerances are halves of 95 % intervals.\n"
+    remark += "".join(f"Not distinguished: {one.words}.\n" for one in fitted.alike)
+    changes = differences(read_rig(rig_file), fitted.rig)
+    return edited(read_text(rig_file, "a rig file is wanted"), changes, remark)
+
+
+def _print(fitted: NominalFit) -> None:
+    from coupled.cli.tables.fit import print_channels, print_numbers
+
+    print_numbers(out, fitted)
+    print_channels(out, fitted.channels)
+    for one in fitted.alike:
+        say(f"not distinguished: {one.words}")
+    for key in fitted.unknown:
+        say(f"not determined: {key}; nothing in these records depends on it")
+    for number in fitted.numbers:
+        if number.at_bound:
+            say(f"at the end of what it may be: {number.key}")

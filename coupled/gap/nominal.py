@@ -1,0 +1,211 @@
+"""A nominal rig from records of a healthy machine: what its numbers are, and how well known.
+
+The freed numbers are fitted by the stages' own physics, driven by what was measured, as effects
+are (`fit`). How well they are known is the scatter of the score from stretch to stretch, or of the
+numbers from record to record where that is more. Numbers that act alike in these records are not
+distinguished: a friction and a damping where all motion has one speed are one number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.gap.airframe import airframe_outputs
+from coupled.gap.case import Tell
+from coupled.gap.checks import check_record
+from coupled.gap.effect import Effect
+from coupled.gap.fit import Fit, fit, touched
+from coupled.gap.freed import default_keys, freed
+from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
+from coupled.gap.output import Output
+from coupled.gap.stages import Reader
+from coupled.gap.surfaces import surface_points
+from coupled.gap.thresholds import ALIKE, SHARES_IN
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+# Why two numbers may act alike, by the last parts of their keys.
+WHY = {
+    frozenset(("friction", "damping")): "all motion is at one speed",
+    frozenset(("friction", "offset")): "all motion is in one direction",
+    frozenset(("mass", "basic_gradient")): "all motion is at one frequency",
+    frozenset(("servo_frequency", "servo_damping_ratio")): "all motion is slow beside the servo",
+}
+
+
+def fit_nominal(
+    rig: Rig,
+    records: Mapping[str, Record],
+    keys: Sequence[str] = (),
+    control: ControlName = "column",
+    tell: Tell | None = None,
+) -> NominalFit:
+    """Return a rig with the numbers of some keys fitted to records of it, by their files' names.
+
+    A key is one of the control's in a rig file, as `loader.mass_kg`; without any, the usual ones of
+    the stages that the records judge. The rig's `tolerance` holds half of each one's 95 % interval.
+    Raises InputError where a record is of another rig, or no record depends on a key.
+    """
+    for file, record in records.items():
+        check_record(rig, record, control, file)
+    readers = [
+        Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
+    ]
+    outputs = [output.halved(rig) for output in _outputs(readers)]
+    if not outputs:
+        raise InputError(next(iter(records)), "", "lets no stage be judged, so nothing be fitted")
+    chosen = tuple(keys) or default_keys(rig, control, {output.stage for output in outputs})
+    effects = [freed(rig, control, key) for key in chosen]
+    for key, effect in zip(chosen, effects, strict=True):
+        if not touched(outputs, [effect]):
+            lacking = sorted({n for r in readers for n in r.missing().get(effect.stage, [])})
+            needs = ", ".join(lacking) or f"what judges the {effect.stage}"
+            raise InputError(next(iter(records)), key, f"nothing depends on it; it lacks {needs}")
+    _tell(tell, "fitting", 0, len(records) + 2)
+    held = fit(rig, control, outputs, effects, part="fitted")
+    _tell(tell, "fitting to all", 1, len(records) + 2)
+    whole = fit(rig, control, outputs, effects, start=held.values)
+    each = _each(rig, control, outputs, effects, whole, tell)
+    numbers = tuple(
+        _number(rig, control, key, effect, whole, each)
+        for key, effect in zip(chosen, effects, strict=True)
+    )
+    used = touched(outputs, effects)
+    files = list(records)
+    return NominalFit(
+        control,
+        _known(rig, control, numbers),
+        numbers,
+        tuple(one for group in whole.information.items() for one in _alike(rig, control, *group)),
+        tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
+    )
+
+
+def _tell(tell: Tell | None, what: str, done: int, total: int) -> None:
+    if tell is not None:
+        tell(what, done, total)
+
+
+def _outputs(readers: Sequence[Reader]) -> list[Output]:
+    found: list[Output] = []
+    for reader in readers:
+        found += reader.outputs()
+        found += airframe_outputs(reader.rig, reader.record, reader.number)
+    return found
+
+
+def _each(
+    rig: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    effects: Sequence[Effect],
+    whole: Fit,
+    tell: Tell | None,
+) -> list[Fit]:
+    """Return a fit to each record alone; none where there is one record."""
+    records = sorted({output.record for output in outputs})
+    found = []
+    for i, record in enumerate(records if len(records) > 1 else []):
+        _tell(tell, f"fitting to record {i + 1} alone", i + 2, len(records) + 2)
+        ours = [output for output in outputs if output.record == record]
+        found.append(fit(rig, control, ours, effects, start=whole.values))
+    return found
+
+
+def _number(
+    rig: Rig,
+    control: ControlName,
+    key: str,
+    effect: Effect,
+    whole: Fit,
+    each: Sequence[Fit],
+) -> Number:
+    """Return a number with the wider of its interval and its scatter from record to record."""
+    (parameter,) = effect.free
+    name = effect.value_key(parameter)
+    found, half = whole.values[name], 0.5 * (whole.high[name] - whole.low[name])
+    if each:
+        scatter = float(np.std([one.values[name] for one in each], ddof=1))
+        half = max(half, 2.0 * scatter)
+    if abs(found - parameter.low) < 1e-6 * parameter.starts[0]:
+        found = parameter.low  # the fit stays by a hair within its bounds
+    filed = float(parameter.nominal(rig, control))
+    known = half if math.isfinite(half) else None
+    return Number(key, filed, found, known, parameter.low, name in whole.at_bound)
+
+
+def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
+    """Return the rig with the numbers found, and how well they are known.
+
+    What the host assumes of the loader stays as filed: it made the records with that.
+    """
+    data = rig.controls[control]
+    changes: dict[str, Any] = {}
+    for one in numbers:
+        at = one.key if one.key.startswith("flight.") else f"controls.{control}.{one.key}"
+        changes[at] = one.found
+        if "basic_gradient" in one.key:
+            host = f"controls.{control}.compensation.{one.key.partition('.')[2]}"
+            changes[host] = data.assumed_basic_gradient
+        if "breakout" in one.key:
+            changes[f"controls.{control}.compensation.breakout_N"] = data.assumed_breakout
+    halves = {one.key: one.half for one in numbers if one.half is not None and one.half > 0.0}
+    known = {**data.tolerance, **halves}
+    kept = {key: half for key, half in known.items() if not key.startswith("flight.")}
+    return rig.changed({**changes, f"controls.{control}.tolerance": kept})
+
+
+def _alike(
+    rig: Rig, control: ControlName, names: tuple[str, ...], information: Floats
+) -> list[Alike]:
+    """Return the numbers of a group whose signatures nearly add up to nothing.
+
+    By the small eigenvalues of the signatures' cosines: where each number may be moved as far as
+    the others make good again.
+    """
+    size = np.sqrt(np.diag(information))
+    moved = size > 0.0
+    if moved.sum() < 2:
+        return []
+    keys = [name.rstrip(".") for name in names]  # of numbers without a name of their own
+    shown = [key for key, on in zip(keys, moved, strict=True) if on]
+    cosines = information[np.ix_(moved, moved)] / np.outer(size[moved], size[moved])
+    strengths, directions = np.linalg.eigh(cosines)
+    found = []
+    for strength, direction in zip(strengths, directions.T, strict=True):
+        if strength > ALIKE:
+            break
+        least = SHARES_IN * float(np.max(np.abs(direction)))
+        shares = [key for key, d in zip(shown, direction, strict=True) if abs(d) >= least]
+        found.append(Alike(tuple(shares), _why(shares)))
+    return found
+
+
+def _why(keys: Sequence[str]) -> str:
+    """Return why numbers act alike, where it is known."""
+    words = [key.partition(".")[2] for key in keys]
+    for pair, why in WHY.items():
+        if len(words) == 2 and all(any(w.startswith(name) for w in words) for name in pair):
+            return why
+    return ""
+
+
+def _channel(output: Output, before: Rig, after: Rig, file: str) -> ChannelFit:
+    """Return how far a channel stays from its prediction on held-out stretches."""
+    rms = [float(np.sqrt(np.mean(output.residual(r, "held") ** 2))) for r in (before, after)]
+    return ChannelFit(
+        file,
+        output.channel,
+        rms[0] * output.floor,
+        rms[1] * output.floor,
+        output.floor,
+        float(np.std(output.measured)),
+    )

@@ -1,0 +1,110 @@
+"""What a fit of a nominal rig found, as data; each result makes its own part of the JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+
+
+@dataclass(frozen=True)
+class Number:
+    """A fitted number: as filed, as found, and half of its 95 % interval; None: undetermined.
+
+    `least` is the smallest that it may be.
+    """
+
+    key: str
+    filed: float
+    found: float
+    half: float | None
+    least: float = -math.inf
+    at_bound: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval, within what the number may be; None where nothing determines it."""
+        if self.half is None:
+            return None
+        return max(self.found - self.half, self.least), self.found + self.half
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        ends = self.interval or (None, None)
+        known = {"filed": self.filed, "found": self.found, "low": ends[0], "high": ends[1]}
+        return known | ({"at_bound": True} if self.at_bound else {})
+
+
+@dataclass(frozen=True)
+class Alike:
+    """Numbers that these records do not distinguish, by their keys, and why."""
+
+    keys: tuple[str, ...]
+    why: str
+
+    @property
+    def words(self) -> str:
+        """What is to be said of them."""
+        count = {2: "one number", 3: "two numbers"}.get(len(self.keys), "fewer numbers")
+        names = " and ".join((", ".join(self.keys[:-1]), self.keys[-1]))
+        because = f"{self.why}: " if self.why else ""
+        return f"{because}{names} are {count} in these records"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"keys": list(self.keys), "why": self.why, "words": self.words}
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """How far a channel's prediction stays from it, rms in its unit, on stretches held out.
+
+    `floor` is what noise alone leaves, `moves` the standard deviation of the channel.
+    """
+
+    file: str
+    channel: str
+    before: float
+    after: float
+    floor: float
+    moves: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "record": self.file,
+            "channel": self.channel,
+            "before": self.before,
+            "after": self.after,
+            "floor": self.floor,
+            "moves": self.moves,
+        }
+
+
+@dataclass(frozen=True)
+class NominalFit:
+    """A nominal rig fitted to records: its numbers, and what the records do not tell of them."""
+
+    control: ControlName
+    rig: Rig
+    numbers: tuple[Number, ...]
+    alike: tuple[Alike, ...]
+    channels: tuple[ChannelFit, ...]
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The keys of numbers on which the records do not depend."""
+        return tuple(number.key for number in self.numbers if number.half is None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "control": self.control,
+            "numbers": {number.key: number.as_dict() for number in self.numbers},
+            "alike": [one.as_dict() for one in self.alike],
+            "undetermined": list(self.unknown),
+            "channels": [one.as_dict() for one in self.channels],
+        }

@@ -1,0 +1,159 @@
+"""A nominal rig from records: the numbers that made them, and what they do not tell."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.errors import InputError
+from coupled.gap.diagnose import diagnose
+from coupled.gap.nominal import fit_nominal
+from coupled.gap.nominalfit import NominalFit
+from coupled.record.record import Record, read_record, write_record
+from coupled.rig.rig import Rig
+from coupled.rig.rigedit import differences, edited
+from coupled.rig.rigfile import read_rig
+from coupled.rig.rigwrite import rig_text
+from tests.support.commands import coupled
+from tests.support.gaps import made, nominal_rig
+from tests.support.rigs import bench
+
+FOUNDERS = Path(__file__).parents[3] / "shared" / "real"
+RATE_Hz, MASS_kg, DAMPING, FRICTION_N = 100.0, 8.0, 30.0, 4.0
+SLIDE = "controls.column.schedule.total_gradient_N_per_m"
+
+
+def slide() -> Rig:
+    """Return a slide without a spring, its numbers a third off."""
+    guess = {"mass_kg": 10.0, "damping_N_s_per_m": 40.0, "friction_N": 3.0}
+    guess |= {"basic_gradient_N_per_m": 0.0, "bend_m_per_N": 0.0}
+    lists = {SLIDE: [0.0, 0.0], "controls.column.travel_m": 1.0}
+    return bench({**guess, **lists, "controls.column.length_m": 2.0})
+
+
+def moved(speeds_m_per_s: list[float]) -> Record:
+    """Return a record of a slide that goes to and fro, each way at one speed of a list."""
+    rng = np.random.default_rng(2)
+    speed = np.repeat([s * side for s in speeds_m_per_s for side in (1, -1)], round(RATE_Hz))
+    edge = np.hanning(21)
+    speed = np.convolve(np.concatenate((np.zeros(50), speed)), edge / edge.sum(), "same")
+    place = (np.cumsum(speed) - 0.5 * speed) / RATE_Hz
+    pull = MASS_kg * np.gradient(speed) * RATE_Hz + DAMPING * speed
+    pull += FRICTION_N * np.tanh(speed / 1e-3) + rng.normal(0.0, 0.02, len(speed))
+    place += rng.normal(0.0, 1e-6, len(place))
+    time = np.arange(len(speed)) / RATE_Hz
+    names = ("time_s", "column_force_N", "column_computed_m", "dynamic_pressure_Pa")
+    return Record(names, np.column_stack((time, pull, place, 0.0 * time)))
+
+
+KEYS = ("loader.mass_kg", "loader.damping_N_s_per_m", "loader.friction_N")
+
+
+def found(fitted: NominalFit) -> dict[str, float]:
+    return {one.key: one.found for one in fitted.numbers}
+
+
+def test_motion_at_several_speeds_tells_friction_from_damping() -> None:
+    fitted = fit_nominal(slide(), {"r": moved([0.02, 0.05, 0.1, 0.03, 0.08, 0.15])}, KEYS)
+    assert found(fitted) == pytest.approx(dict(zip(KEYS, (8.0, 30.0, 4.0), strict=True)), rel=0.03)
+    assert fitted.alike == ()
+
+
+def test_motion_at_one_speed_does_not_tell_friction_from_damping() -> None:
+    fitted = fit_nominal(slide(), {"r": moved([0.1] * 5)}, KEYS)
+    [one] = fitted.alike
+    assert set(one.keys) == {"loader.damping_N_s_per_m", "loader.friction_N"}
+    assert one.words.startswith("all motion is at one speed: ")
+    numbers = found(fitted)
+    both = numbers["loader.friction_N"] + 0.1 * numbers["loader.damping_N_s_per_m"]
+    assert both == pytest.approx(FRICTION_N + 0.1 * DAMPING, rel=0.03)
+    assert numbers["loader.mass_kg"] == pytest.approx(MASS_kg, rel=0.03)
+
+
+def test_the_numbers_of_a_loader_and_a_servo_are_found_and_kept_for_a_diagnosis(
+    tmp_path: Path,
+) -> None:
+    real = nominal_rig(False)
+    record = made(tmp_path, real, {}, 5).between(0.0, 20.0)
+    loader = "controls.column.loader."
+    off = {"mass_kg": 5.0, "damping_N_s_per_m": 60.0, "servo_frequency_Hz": 14.0, "friction_N": 1.0}
+    start = real.changed({loader + key: value for key, value in off.items()})
+    keys = [f"loader.{key}" for key in off]
+    fitted = fit_nominal(start, {"r": record}, keys)
+    truth = {"mass_kg": 4.0, "damping_N_s_per_m": 75.0, "servo_frequency_Hz": 18.0}
+    for number in fitted.numbers:
+        wanted = truth.get(number.key.removeprefix("loader."), 0.0)
+        assert number.interval is not None
+        low, high = number.interval
+        assert low - 1e-9 <= wanted <= high
+    known = fitted.rig.controls["column"].tolerance
+    assert set(known) == set(keys)
+    assert known["loader.mass_kg"] < 0.2
+    assert all(one.after < 1.1 * one.floor for one in fitted.channels)
+    # A machine whose mass is off by no more than it is known is as it was; then by more.
+    text = rig_text(fitted.rig)
+    (tmp_path / "fitted.toml").write_text(text)
+    assert read_rig(tmp_path / "fitted.toml") == fitted.rig
+    loose = fitted.rig.changed({"controls.column.tolerance": {"loader.mass_kg": 1.2}})
+    heavy = made(tmp_path, real.changed({loader + "mass_kg": 4.8}), {}, 6).between(0.0, 15.0)
+    assert diagnose(loose, {"r": heavy}).verdict == "no_gap"
+    diagnosed = diagnose(fitted.rig, {"r": heavy})
+    assert [effect.name for effect in diagnosed.effects] == ["inertia"]
+    assert diagnosed.verdict == "effect"
+
+
+def test_a_rig_file_keeps_its_comments_and_order() -> None:
+    text = '# mine\nname = "a"  # a name\n\n[b]\nx = 1.0 # of x\ny = 2.0\n'
+    new = edited(text, {("b", "x"): 3.0, ("b", "t", "loader.m"): 0.5}, "said\nof it")
+    assert new.startswith('# said\n# of it\n# mine\nname = "a"  # a name\n')
+    assert "x = 3.0 # of x\ny = 2.0\n" in new
+    assert '[b.t]\n"loader.m" = 0.5\n' in new
+    rig = slide()
+    other = rig.changed({"controls.column.loader.mass_kg": 11.0, "noise": {"column_force_N": 0.1}})
+    assert differences(rig, other) == {
+        ("controls", "column", "loader", "mass_kg"): 11.0,
+        ("noise", "column_force_N"): 0.1,
+    }
+
+
+def test_what_cannot_be_fitted_is_refused() -> None:
+    record = moved([0.1] * 5)
+    for key, why in (
+        ("loader.mass", "unknown key"),
+        ("loader.servo_frequency_Hz", "lacks column_deflection_m"),
+        ("loader.multiplier", "not a single number"),
+        ("hand.mass_kg", "no number to fit"),
+    ):
+        with pytest.raises(InputError, match=why):
+            fit_nominal(slide(), {"r": record}, [key])
+
+
+def test_the_command_writes_a_rig_that_a_diagnosis_takes(tmp_path: Path) -> None:
+    write_record(moved([0.02, 0.05, 0.1, 0.03, 0.08, 0.15]), tmp_path / "well.csv")
+    (tmp_path / "start.toml").write_text("# my slide\n" + rig_text(slide()))
+    words = "fit well.csv --rig start.toml -o new.toml --json new.json"
+    words += " --free loader.mass_kg --free loader.friction_N"
+    done = coupled(tmp_path, *words.split())
+    assert done.returncode == 0, done.stderr
+    assert "# my slide" in (tmp_path / "new.toml").read_text()
+    table = json.loads((tmp_path / "new.json").read_text())
+    mass = read_rig(tmp_path / "new.toml").controls["column"].loader.mass
+    assert mass == table["numbers"]["loader.mass_kg"]["found"]
+    assert "loader.mass_kg" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not FOUNDERS.is_dir(), reason="the measured records lie beside the project")
+def test_a_measured_axis_has_the_published_numbers() -> None:
+    """EMPS: M = 95.1 kg, Fv = 203.5 N·s/m, Fc = 20.4 N, offset −3.2 N on the other side."""
+    start = read_rig(FOUNDERS / "emps-train.toml")
+    fitted = fit_nominal(start, {"r": read_record(FOUNDERS / "emps-train.csv")})
+    published = {"mass_kg": 95.1, "damping_N_s_per_m": 203.5, "friction_N": 20.4, "offset_N": 3.2}
+    for number in fitted.numbers:
+        wanted = published.get(number.key.removeprefix("loader."))
+        if wanted is not None:
+            assert number.interval is not None
+            assert number.interval[0] < wanted < number.interval[1]
