@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
@@ -61,6 +62,7 @@ def calibrate(
     ] = None,
     error: ErrorOption = None,
     json_file: JsonOption = "",
+    report: ReportOption = None,
 ) -> None:
     """Find S1, S2, S3 and K from readings, with their errors; or plan the readings."""
     file, data, name = rig_and_control(rig, control)
@@ -68,6 +70,8 @@ def calibrate(
     if plan:
         if readings is not None or figure is not None:
             raise InputError("--plan", "", "plans readings to come; give no readings and no figure")
+        if report is not None:
+            raise InputError("--plan", "--report", "is for a calibration, not for a plan")
         wanted = (precision / 100.0, strongest, 1 if once else 2, crossed)
         _plan((file, data, name), tools, wanted, (write, json_file))
         return
@@ -83,15 +87,17 @@ def calibrate(
         from coupled.plots.saving import check_format
 
         check_format(figure)
-    check_json(json_file, [*inputs, *(path for path in (write, figure) if path)])
-    _calibrate(readings, (file, data, name), tools, (write, figure, json_file), (date, hardware))
+    own = [*inputs, *(path for path in (write, figure) if path)]
+    check_json(json_file, [*own, *check_report(report, own)])
+    targets = (write, figure, report, json_file)
+    _calibrate(readings, (file, data, name), tools, targets, (date, hardware))
 
 
 def _calibrate(
     path: Path,
     rig: tuple[Path, Rig, ControlName],
     tools: Instruments,
-    targets: tuple[Path | None, Path | None, str],
+    targets: tuple[Path | None, Path | None, Path | None, str],
     noted: tuple[str, bool],
 ) -> None:
     from coupled.calibration.calibrate import calibrate_control as fit
@@ -102,7 +108,8 @@ def _calibrate(
     from coupled.rig.rigwrite import rig_text
     from coupled.schema import loads_toml
 
-    (file, data, name), (write, figure, json_file), (date, hardware) = rig, targets, noted
+    (file, data, name), (write, figure, report, json_file) = rig, targets
+    date, hardware = noted
     found = fit(read_readings(path, name), data.controls[name], name, tools, path)
     text = ""
     if write is not None:
@@ -118,12 +125,21 @@ def _calibrate(
 
             save(draw_readings(found, shown(path.name)), outputs.at(figure))
         keep_json(found.as_dict(), json_file, outputs)
+        if report is not None:
+            from coupled.reports.calibration import calibration_report
+
+            names = (data.name, shown(path.name), date)
+            inputs = [path, file]
+            write_report(
+                report, outputs, inputs, lambda made: calibration_report(found, *names, made)
+            )
     if json_file != "-":
         print_calibration(out, found)
         if write is not None:
             say(f"calibrated rig: {write}")
         if figure is not None:
             say(f"figure: {figure}")
+        say_report(report)
     print_json(found.as_dict(), json_file)
 
 

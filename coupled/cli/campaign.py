@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
@@ -20,12 +21,13 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled check worst-case"
-    " · coupled check runs/*.toml --junit out/junit.xml[/]"
+    " · coupled check runs/*.toml --junit out/junit.xml --report out/check.html[/]"
 )
 def check(
     run: Annotated[list[str], typer.Argument(help="Run files, or names of shipped ones.")],
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
     json_file: JsonOption = "",
+    report: ReportOption = None,
 ) -> None:
     """Fly runs and hold them against their expectations; exit code 1 if any fails."""
     from coupled.campaign.check import check as check_runs
@@ -42,7 +44,8 @@ def check(
     inputs = [file for scenarios in found for s in scenarios for file in input_files(s)]
     if junit is not None:
         check_target(junit, inputs)
-    check_json(json_file, [*inputs, *([junit] if junit else [])])
+    own = [*inputs, *([junit] if junit else [])]
+    check_json(json_file, [*own, *check_report(report, own)])
     with progress() as advance:
         checked = check_runs(found, advance)
     table = [verdict.as_dict() for verdict in checked.verdicts]
@@ -50,10 +53,15 @@ def check(
         if junit is not None:
             write_text(outputs.at(junit), junit_xml(checked.verdicts))
         keep_json(table, json_file, outputs)
+        if report is not None:
+            from coupled.reports.check import check_report as reported
+
+            write_report(report, outputs, inputs, lambda made: reported(checked, made))
     if json_file != "-":
         print_verdicts(out, checked.verdicts)
         if junit is not None:
             say(f"JUnit XML: {junit}")
+        say_report(report)
     print_json(table, json_file)
     if not checked.passed:
         raise typer.Exit(1)
@@ -82,6 +90,7 @@ def sweep(
         Path | None, typer.Option(help="PNG, PDF or SVG.  [default: FOLDER/sweep.png]")
     ] = None,
     json_file: JsonOption = "",
+    report: ReportOption = None,
 ) -> None:
     """Fly a run over values of its parameters, to one table; called again, it goes on."""
     from coupled.campaign.journal import JOURNAL
@@ -109,14 +118,14 @@ def sweep(
     ]
     check_format(path)
     check_target(path, own)
-    check_json(json_file, [*own, path])
+    check_json(json_file, [*own, path, *check_report(report, [*own, path])])
     try:
         with progress() as advance:
             found = fly_all(plan, target, workers, cluster, advance, _say_found)
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    _show(found, target, path, json_file)
+    _show(found, target, path, json_file, report)
 
 
 def _say_found(found: int, flights: int) -> None:
@@ -128,29 +137,28 @@ def _say_found(found: int, flights: int) -> None:
         err.print(f"{found} flights are there already", highlight=False)
 
 
-def _show(found: SweepResult, target: Path, path: Path, json_file: str) -> None:
+def _show(
+    found: SweepResult, target: Path, path: Path, json_file: str, report: Path | None
+) -> None:
     """Draw and print a sweep's table, with its indices or boundaries where they are asked for."""
     from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
     from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
-    from coupled.plots.campaign import draw_sweep
+    from coupled.plots.results import draw_result
     from coupled.plots.saving import save
-    from coupled.plots.sensitivity import draw_sensitivity
-    from coupled.plots.survival import draw_survival
 
     asked, table = found.plan.sweep, found.table
-    if found.indices:
-        drawn = draw_sensitivity(found.indices)
-    elif found.limits:
-        drawn = draw_survival(asked.name, found.numeric_keys[0], found.limits)
-    else:
-        drawn = draw_sweep(table, found.plan.keys, asked.keep)
     rows = [index.as_dict() for index in found.indices] or table.to_dicts()
     with Outputs() as outputs:
         if found.indices:
             write_indices(found.indices, outputs.at(target / INDICES))
-        save(drawn, outputs.at(path))
+        save(draw_result(found), outputs.at(path))
         keep_json(rows, json_file, outputs)
+        if report is not None:
+            from coupled.reports.sweep import sweep_report
+
+            inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
+            write_report(report, outputs, inputs, lambda made: sweep_report(found, made))
     if json_file != "-":
         print_sweep(out, table, asked.keep)
         print_survival(out, found.limits)
@@ -159,4 +167,5 @@ def _show(found: SweepResult, target: Path, path: Path, json_file: str) -> None:
             print_indices(out, found.indices)
             say(f"indices: {target / INDICES}")
         say(f"figure: {path}")
+        say_report(report)
     print_json(rows, json_file)

@@ -1,0 +1,154 @@
+"""The figures of a calibration for people: with units and intervals, and what to say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from coupled.record.channels import unit_of
+from coupled.units import POUND_N, DEGREE_rad, INCH_PER_POUND_m_per_N
+
+if TYPE_CHECKING:
+    from coupled.calibration.estimate import Estimate
+    from coupled.calibration.result import CalibrationResult
+
+CREEP = 3.0  # standard errors of the mean rise that are no chance
+LARGE, SMALL = 2.0, 0.4  # residuals over the instruments' errors that call for a word
+
+
+HEADS = ("value", "std. error", "95 % interval")
+Row = tuple[str, str, str, str]
+
+
+def rows(found: CalibrationResult) -> Iterator[Row]:
+    """Yield each figure: its label with the unit, value, standard error and 95 % interval."""
+    d, bend = unit_of(found.control), found.line.bend
+    unit, factor = ("in/lb", 1.0 / INCH_PER_POUND_m_per_N)
+    if d == "rad":
+        unit, factor = ("°/lb", POUND_N / DEGREE_rad)
+    a, b = found.printed
+    plain = found.plain.bend.scaled(factor)
+    yield _row(f"S1, V/{d}", found.line.s1)
+    yield _row("  ordinary least squares", found.plain.s1)
+    yield ("  normal equations, appendix A", written(a, found.plain.s1.error), "", "")
+    yield _row(f"K, {d}/N", bend)
+    yield _row(f"K, {unit}", bend.scaled(factor))
+    yield _row("  ordinary least squares", plain)
+    yield ("  normal equations, appendix A", written(-b / a * factor, plain.error), "", "")
+    for name, estimate in found.fit.others.items():
+        yield _row(f"K by {name}, {d}/N", estimate)
+    yield _row("S3, V/N", found.s3)
+    yield _row("  mean of v3/F, eq. (13)", found.s3_mean)
+    for i, (way, estimate) in enumerate(found.s2.items()):
+        yield _row(f"{'  ' if i else 'S2, V/N, '}by {way}", estimate)
+
+
+def basis(found: CalibrationResult) -> str:
+    """Return what the figures are of: how many readings, of what."""
+    sets, at = len(set(found.readings.label)), found.readings.row
+    text = f"{found.count} readings of the {found.control} in {sets} gradient sets"
+    return f"{text}, rows {at[0]} to {at[-1]}; S1 and K with errors in all variables"
+
+
+def _row(name: str, estimate: Estimate) -> Row:
+    error = estimate.error
+    ends = f"{written(estimate.low, error)} to {written(estimate.high, error)}"
+    return name, written(estimate.value, error), f"{error:#.2g}".rstrip("."), ends
+
+
+def written(value: float, error: float) -> str:
+    """Return a number to a tenth of its standard error, nine figures at most."""
+    if value == 0.0:
+        return "0"
+    figures = 9
+    if error > 0.0:
+        figures = int(np.floor(np.log10(abs(value))) - np.floor(np.log10(error))) + 2
+    return f"{value:#.{min(max(figures, 2), 9)}g}".rstrip(".")
+
+
+def remarks(found: CalibrationResult) -> list[str]:
+    """Return the sentences: residuals, which fit to use, what was left out, what it is worth."""
+    line, plain = found.line, found.plain
+    size = np.abs(line.residual)
+    row = found.readings.row[int(np.argmax(size))]
+    lines = [
+        f"residuals of v1: {float(np.sqrt(np.mean(size**2))):.3g} V rms,"
+        f" largest {size.max():.3g} V in row {row}",
+        f"condition number {found.condition:.3g}; errors of S1 and K correlate by"
+        f" {line.correlation:+.2f}",
+    ]
+    if np.isfinite(line.excess):
+        lines[0] += f"; {line.excess:.2f} of what the instruments explain"
+        if line.excess > LARGE:
+            lines.append("They are larger: an instrument errs more, or the bend is not straight.")
+        elif line.excess < SMALL:
+            lines.append("They are smaller: the instruments are better than stated.")
+    if line.bend.error > 0.0:
+        off = (plain.bend.value - line.bend.value) / line.bend.error
+        lines.append(
+            f"Ordinary least squares takes ruler and scale as exact, which biases it: its K is"
+            f" {off:+.2f} standard errors off. Use the figures with errors in all variables;"
+            " the ordinary ones only where the voltmeter alone errs, or beside an old fit."
+        )
+    for s in found.suspects:
+        lines.append(
+            f"row {s.row} is left out: {s.columns} is {s.deviations:.0f} standard deviations"
+            " off, mistyped?"
+        )
+    lines += _creep_lines(found) + _accuracy_lines(found) + _arc_lines(found)
+    lines += [f"stale calibration in the rig file: {change}" for change in found.changed]
+    return lines
+
+
+def _creep_lines(found: CalibrationResult) -> list[str]:
+    """Return what the second looks show of a control that crept, and a null from one side."""
+    lines = []
+    d, factor, unit = unit_of(found.control), 1000.0, "mm"
+    if d == "rad":
+        factor, unit = 1.0 / DEGREE_rad, "°"
+    rise = found.readings.deflection_rise
+    rise = rise[~np.isnan(rise)]
+    if len(rise) > 2:
+        error = float(np.std(rise, ddof=1) / np.sqrt(len(rise)))
+        mean = float(np.mean(rise))
+        text = f"ruler's second look less its first: {factor * mean:+.2g} {unit} on the mean"
+        text += f" (std. error {factor * error:.1g})"
+        if abs(mean) > CREEP * error > 0.0:
+            text += "; the control creeps while it is read, their mean allows for it"
+        lines.append(text)
+    if found.one_sided:
+        lines.append(
+            "The nulls are not four or more from both sides, and the control has friction: S2 is"
+            " widened for what a wandering hand does then. Take more from beyond (approach: in)."
+        )
+    return lines
+
+
+def _accuracy_lines(found: CalibrationResult) -> list[str]:
+    """Return what the figures give to those who fly with them."""
+    if found.accuracy is None or found.accuracy.deflection.error == 0.0:
+        return []
+    off, felt = found.accuracy.deflection, found.accuracy.felt
+    gradient = f"{found.accuracy.gradient:.4g} N/{unit_of(found.control)}"
+    text = f"compensated with these, at {gradient} the aircraft gets the deflection to within"
+    text += f" {100 * off.half_width:.2g} %"
+    if felt is not None:
+        text += f" and the hand the gradient to within {100 * felt.half_width:.2g} %"
+    return [f"{text} (95 %)"]
+
+
+def _arc_lines(found: CalibrationResult) -> list[str]:
+    if found.angle_rad is None or not found.beyond:
+        return []
+    most = float(np.max(np.abs(found.angle_rad)))
+    rows = ", ".join(str(row) for row in found.beyond)
+    text = f"rows {rows} are beyond 14° of arc, to {most / DEGREE_rad:.1f}°:"
+    share = 100.0 * most**2 / 6.0
+    if found.level is not None:
+        return [f"{text} a level ruler reads up to {share:.1f} % short; corrected, eqs. (15)-(17)"]
+    return [
+        f"{text} a level ruler would read {share:.1f} % short there; if yours was level, set"
+        " arc_geometry = true in the rig's loader, and they are corrected"
+    ]

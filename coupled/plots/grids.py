@@ -1,0 +1,106 @@
+"""A sweep on a grid of two parameters: lines labelled by the other's value, or a map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import polars as pl
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from coupled.campaign.entry import AS_FILED
+from coupled.campaign.labels import parameter_label
+from coupled.plots.histories import plain
+from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of
+
+_MOST_LINES = 8
+_MARKS = "os^Dv<>p"
+
+
+def is_grid(found: pl.DataFrame, keys: Sequence[str], numeric: Sequence[str]) -> bool:
+    """Tell whether a sweep flew each value of one parameter with each of another, and no more."""
+    if len(numeric) != 2 or list(keys) != list(numeric):
+        return False
+    counts = [found[key].n_unique() for key in numeric]
+    configurations = found["configuration"].n_unique()
+    return min(counts) > 1 and len(found) == counts[0] * counts[1] * configurations
+
+
+def draw_grid(
+    found: pl.DataFrame, keys: tuple[str, str], figures: Sequence[str], title: str
+) -> Figure:
+    """Draw a row a figure, a column a configuration; the longer parameter along the bottom."""
+    along, other = sorted(keys, key=lambda key: -found[key].n_unique())
+    configurations = found["configuration"].unique(maintain_order=True).to_list()
+    size = (max(1.6 + 3.1 * len(configurations), 6.0), 1.5 + 2.4 * len(figures))
+    drawn = Figure(figsize=size, layout="constrained")
+    as_lines = found[other].n_unique() <= _MOST_LINES
+    ended = not as_lines and bool((found["ended_early"] != "").any())
+    drawn.suptitle(f"{title}\ngray: ended early" if ended else title, fontsize=11)
+    panels = drawn.subplots(
+        len(figures), len(configurations), squeeze=False, sharex=True, sharey="row"
+    )
+    for row, name in zip(panels, figures, strict=True):
+        shown = Shown.of(name)
+        if as_lines:
+            for axes, configuration in zip(row, configurations, strict=True):
+                rows = found.filter(pl.col("configuration") == configuration)
+                _draw_lines(axes, rows, along, other, shown)
+            row[0].set_ylabel(shown.label)
+        else:
+            _draw_maps(drawn, row, found, along, other, shown)
+    for axes, configuration in zip(panels[0], configurations, strict=True):
+        axes.set_title("" if configuration == AS_FILED else plain(configuration), fontsize=10)
+    for axes in panels[-1]:
+        place_of(axes, along, found[along])
+    if as_lines:
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        drawn.legend(
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=min(len(labels), 6),
+            title=parameter_label(other),
+            fontsize=8,
+            title_fontsize=9,
+        )
+    return drawn
+
+
+def _draw_lines(axes: Any, rows: pl.DataFrame, along: str, other: str, shown: Shown) -> None:
+    values = rows[other].unique().sort().to_list()
+    colours = colormaps["viridis"](np.linspace(0.0, 0.88, len(values)))
+    for value, colour, mark in zip(values, colours, _MARKS, strict=False):
+        line = rows.filter((pl.col(other) == value) & (pl.col("ended_early") == "")).sort(along)
+        style = {"color": colour, "marker": mark, "markersize": 3.5, "linewidth": 1.2}
+        axes.plot(line[along], shown.of_rows(line), label=f"{value:.4g}", **style)
+    mark_ended(axes, np.asarray(rows.filter(pl.col("ended_early") != "")[along]))
+    axes.grid(alpha=0.25)
+
+
+def _draw_maps(
+    drawn: Figure, row: Any, found: pl.DataFrame, along: str, other: str, shown: Shown
+) -> None:
+    """Draw a map a configuration, all of a row in the same colours; gray where none was flown."""
+    flown = found.with_columns(
+        pl.when(pl.col("ended_early") == "").then(pl.col(shown.name)).otherwise(None)
+    )
+    values = shown.of_rows(flown)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    places = [found[key].unique().sort().cast(pl.Float64).to_numpy() for key in (along, other)]
+    configurations = found["configuration"].unique(maintain_order=True)
+    for axes, configuration in zip(row, configurations, strict=True):
+        ours = flown.filter(pl.col("configuration") == configuration).sort(other, along)
+        cells = shown.of_rows(ours).reshape(len(places[1]), len(places[0]))
+        axes.set_facecolor("0.8")
+        mesh = axes.pcolormesh(
+            *places, cells, shading="nearest", vmin=low, vmax=high, cmap="viridis"
+        )
+    logarithmic = is_logarithmic(places[1])
+    if logarithmic:
+        row[0].set_yscale("log")
+    row[0].set_ylabel(parameter_label(other) + (" (logarithmic)" if logarithmic else ""))
+    bar = drawn.colorbar(mesh, ax=list(row), aspect=14)
+    bar.set_label(shown.label, fontsize=9)

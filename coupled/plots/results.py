@@ -1,0 +1,23 @@
+"""The figure of a sweep: its indices, its boundaries, or the figures that it kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from coupled.campaign.sweep import SweepResult
+from coupled.plots.campaign import draw_sweep
+from coupled.plots.sensitivity import draw_sensitivity
+from coupled.plots.survival import draw_survival
+
+
+def draw_result(found: SweepResult) -> Figure:
+    """Draw what a sweep asks for."""
+    asked = found.plan.sweep
+    if found.indices:
+        return draw_sensitivity(found.indices)
+    if found.limits:
+        return draw_survival(asked.name, found.numeric_keys[0], found.limits)
+    title = f"{asked.name}: flights of {Path(asked.run).stem}"
+    return draw_sweep(found.table, found.plan.keys, asked.keep, title)

@@ -1,0 +1,112 @@
+"""What the figures of a sweep share: labels with units, axes, and which figures vary at all."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.campaign.labels import parameter_label
+from coupled.plots.histories import plain
+
+Floats = NDArray[np.float64]
+MOST_ROWS = 4
+_STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic's own
+_EVEN = 1e-3  # of a step, by which steps differ that are taken as even
+_WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
+LABELS = {
+    "asked_norm": ("surface asked, % of travel", 100.0),
+    "reached_norm": ("surface reached, % of travel", 100.0),
+    "loss": ("authority lost, %", 100.0),
+    "loss_closed_form": ("loss by closed form, %", 100.0),
+    "felt_ratio": ("felt over specified", 1.0),
+    "felt_ratio_closed_form": ("felt by closed form", 1.0),
+    "force_N": ("force needed, N", 1.0),
+    "force_step_N": ("force step, N", 1.0),
+    "peak_rate_rad_per_s": ("peak rate, rad/s", 1.0),
+    "peak_load_factor": ("peak load factor", 1.0),
+    "time_to_attitude_s": ("time to attitude, s", 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A figure of the table as people see it: its label, and the factor to the label's unit."""
+
+    name: str
+    label: str
+    factor: float
+
+    @classmethod
+    def of(cls, name: str) -> Shown:
+        """Return a figure by its column's name."""
+        label, factor = LABELS.get(name, (parameter_label(name), 1.0))
+        return cls(name, label, factor)
+
+    def of_rows(self, rows: pl.DataFrame) -> Floats:
+        """Return the figure of each row in the label's unit; NaN where there is none."""
+        return self.factor * rows[self.name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+
+
+def varying(found: pl.DataFrame, figures: Sequence[str]) -> tuple[list[str], str]:
+    """Return the first figures that vary, and a remark on those that do not.
+
+    All of them where none does: a figure of nothing says less than a level line.
+    """
+    flown = found.filter(pl.col("ended_early") == "")
+    drawn, still = [], []
+    for name in figures:
+        values = flown[name].drop_nulls().cast(pl.Float64).to_numpy()
+        size = float(np.max(np.abs(values), initial=0.0))
+        if values.size and np.ptp(values) <= _STILL * max(size, 1.0):
+            shown = Shown.of(name)
+            level = shown.factor * float(np.median(values))
+            still.append(f"{shown.label}: {0.0 if abs(level) < _STILL else level:.4g}")
+        else:
+            drawn.append(name)
+    if not drawn:
+        return list(figures)[:1], ""
+    remark = "the same in every flight: " + "; ".join(still) if still else ""
+    return drawn[:MOST_ROWS], remark
+
+
+def titled(title: str, remark: str, width: int = 90) -> str:
+    """Return a figure's title, with a remark on lines of its own."""
+    return "\n".join([plain(title), *textwrap.wrap(plain(remark), width)]).strip("\n")
+
+
+def is_logarithmic(values: Floats) -> bool:
+    """Tell whether values were spread evenly in their logarithms, and over more than a decade."""
+    if len(values) < 3 or values[0] <= 0.0 or values[-1] < _WIDE * values[0]:
+        return False
+    steps = np.diff(np.log(values))
+    return bool(np.ptp(steps) <= _EVEN * steps.mean())
+
+
+def place_of(axes: Any, key: str, column: pl.Series) -> None:
+    """Label the axis of a parameter along the bottom; logarithmic where its values are spread so.
+
+    An axis that is not linear says so.
+    """
+    values = column.unique().sort().cast(pl.Float64).to_numpy()
+    label = parameter_label(key)
+    if is_logarithmic(values):
+        axes.set_xscale("log")
+        label += " (logarithmic)"
+    else:
+        axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4), useMathText=True)
+    axes.set_xlabel(label)
+
+
+def mark_ended(axes: Any, places: Floats) -> None:
+    """Put a cross on the lower edge where a flight ended early."""
+    if not len(places):
+        return
+    low = np.zeros(len(places))
+    marks = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+    axes.plot(places, low, "x", color="#cc0000", markersize=6, label="ended early", **marks)

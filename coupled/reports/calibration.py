@@ -1,0 +1,58 @@
+"""The report of a calibration: the figures with their errors, and the readings that gave them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupled.calibration.figures import HEADS, basis, remarks, rows
+from coupled.calibration.result import CalibrationResult
+from coupled.plots.readings import draw_readings
+from coupled.plots.saving import svg_text
+from coupled.record.channels import unit_of
+from coupled.reports.page import Drawing, Made, Report, Section, Table, Text, Verdict
+
+_DECIMALS = (5, 2, 3, 3, 3)
+_SHOWN = "The readings, and the lines through them that S1, K and S3 are (the report's figure 4)."
+
+
+def calibration_report(
+    found: CalibrationResult, rig: str, readings: str, date: str, made: Made
+) -> Report:
+    """Return the report; `rig`, `readings` and `date` as the user names them."""
+    sections = (
+        Section("Figures", (Table(("", *HEADS), tuple(rows(found))), Text(tuple(remarks(found))))),
+        Section("Fit", (Drawing(svg_text(draw_readings(found, readings)), _SHOWN),)),
+        Section("Readings used", (_readings(found),)),
+    )
+    settings = [("rig", rig), ("control", found.control), ("readings", basis(found))]
+    if date:
+        settings.append(("date, as given", date))
+    return Report("Calibration", readings, _verdict(found), sections, tuple(settings), made)
+
+
+def _verdict(found: CalibrationResult) -> Verdict:
+    figures = {label: (value, ends) for label, value, _, ends in rows(found) if label[0] != " "}
+    said = [
+        f"{name} = {value} {unit} ({ends})"
+        for label, (value, ends) in figures.items()
+        for name, _, unit in [label.partition(", ")]
+        if unit in (f"V/{unit_of(found.control)}", f"{unit_of(found.control)}/N", "V/N")
+    ]
+    worth = [line for line in remarks(found) if line.startswith("compensated with these")]
+    doubts = [f"{len(found.suspects)} readings are left out as mistyped."] if found.suspects else []
+    sentences = [f"{line[0].upper()}{line[1:]}." for line in worth]
+    return Verdict("; ".join(said) + ", 95 % intervals.", "plain", (*sentences, *doubts))
+
+
+def _readings(found: CalibrationResult) -> Table:
+    d, read = unit_of(found.control), found.readings
+    heads = ("row", "gradient set", f"δ, {d}", "F, N", "v1, V", "v3, V", "residual of v1, V")
+    return Table(heads, tuple(_reading_rows(found)), f"{len(read.row)} readings, as fitted", 2)
+
+
+def _reading_rows(found: CalibrationResult) -> Iterator[tuple[str, ...]]:
+    read = found.readings
+    columns = (read.deflection, read.force, read.v1, read.v3, found.line.residual)
+    for i, row in enumerate(read.row):
+        numbers = (f"{column[i]:.{n}f}" for column, n in zip(columns, _DECIMALS, strict=True))
+        yield str(int(row)), str(read.label[i]), *numbers
