@@ -8,7 +8,11 @@ import tomllib
 import numpy as np
 import pytest
 
+from coupled.api.rigs import load_rig
 from coupled.authority.compare import Comparison, Flight, compare
+from coupled.calibration.checks import swing_of
+from coupled.calibration.letgo import scheduled
+from coupled.calibration.sweeps import Release
 from coupled.campaign.standards import judge_standard
 from coupled.flight.runfile import read_run
 from coupled.plots.flights import draw_comparison
@@ -16,8 +20,9 @@ from coupled.resources import shipped_runs
 from coupled.units import PSF_Pa
 
 WORST = {"worst-case", "worst-case-t37"}
-# Of another kind; one that some configurations do not end; one whose stick rests in two cases.
-OWN = {"multiplier", "recovery", "latency"}
+# Of another kind; one that some configurations do not end; one whose stick rests in two cases; one
+# in which a bend loses nothing.
+OWN = {"multiplier", "recovery", "latency", "calibrated-low"}
 
 
 def flown(name: str) -> Comparison:
@@ -144,6 +149,31 @@ def test_every_bound_says_where_it_is_from(name: str) -> None:
     for expect in tomllib.loads(shipped_runs()[name].read_text(encoding="utf-8"))["expect"]:
         plain = "standard" in expect or expect.get("is") in (0.0, 1.0)
         assert plain or expect.get("why", "").startswith(ORIGINS), expect
+
+
+def test_the_bounds_of_the_release_are_the_rules_about_the_rigid_stick() -> None:
+    """Part 60, 2.b: ± 10 % of the time from 90 % of where it was held to its first crossing."""
+    crossed = {}
+    for flight in flown("release"):
+        time_s, deflection = flight.record.time_s, flight.record["column_deflection_m"]
+        after = time_s >= 2.5
+        start = float(deflection[np.flatnonzero(after)[0] - 1])
+        swing = swing_of(Release(time_s[after] - 2.5, deflection[after], start))
+        crossed[flight.outcome.case] = float(swing.crossings[0])
+    rigid = crossed["rigid, as specified"]
+    expected = {expect.case: expect for expect in read_run("release")[0].expect}
+    bounds = expected["compensated, by the gradient"].bounds
+    assert bounds == pytest.approx((2.5 + 0.9 * rigid, 2.5 + 1.1 * rigid), abs=1e-4)
+    assert crossed["compensated"] > 1.2 * rigid
+    assert crossed["compensated, by the gradient"] == pytest.approx(rigid, rel=0.05)
+
+
+def test_the_table_of_the_release_is_what_the_remedy_finds() -> None:
+    filed = read_run("release")[2].rig.controls["column"].compensation
+    found = scheduled(load_rig("t37"), "column").controls["column"].compensation
+    assert filed.inertia_gradient == found.inertia_gradient
+    assert filed.force_lead == found.force_lead
+    assert filed.mass_factor == filed.damping_factor == found.mass_factor == found.damping_factor
 
 
 def closed_form(configuration: str) -> float:

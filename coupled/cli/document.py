@@ -12,7 +12,7 @@ from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
 from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, shown
-from coupled.files import check_target
+from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 @app.command(
     epilog="[dim]Examples: coupled document · coupled document 737 --control column"
     " · coupled document new.toml --readings my.csv --output doc"
-    " · coupled document 737 --control column --aircraft measured.csv[/]"
+    " · coupled document 737 --control column --aircraft measured.csv"
+    " · coupled document t37 --control column --write new.toml[/]"
 )
 def document(
     rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
@@ -40,6 +41,13 @@ def document(
     aircraft: Annotated[
         Path | None,
         typer.Option(help="The aircraft's own forces, a CSV: the reference of the static checks."),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the rig with mass, damping and a lead on the force that go with the"
+            " gradient, so that compensated releases are as specified, and document that one."
+        ),
     ] = None,
     output: Annotated[
         Path | None,
@@ -65,8 +73,11 @@ def document(
     if folder.is_file():
         raise InputError(folder, "--output", "is a file; give a folder")
     check_target(pdf, inputs)
-    check_json(json_file, [*inputs, pdf])
+    check_json(json_file, [*inputs, pdf, *([write] if write else [])])
     say_stale(data)
+    text = ""
+    if write is not None:
+        data, text = _remedied(data, chosen, file, write, [*inputs, pdf])
     fits = {name: _fit_for(readings, data, name, chosen) for name in chosen}
     travels = surface_travels(data, file)
     read = _aircraft_data(aircraft, wanted or data, chosen[0], travels)
@@ -80,6 +91,8 @@ def document(
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
     with Outputs() as outputs:
         written = draw_pages(documents, fits, outputs.folder(folder), outputs.at(pdf))
+        if write is not None:
+            write_text(outputs.at(write), text)
         keep_json(table, json_file, outputs)
     if json_file != "-":
         for found in documents:
@@ -87,7 +100,34 @@ def document(
         if not travels:
             out.print("no aircraft: the surface's position is not judged\n")
         say(f"{len(written)} figures and {pdf.name} in {folder}")
+        if write is not None:
+            say(f"rig: {write}")
     print_json(table, json_file)
+
+
+def _remedied(
+    rig: Rig, chosen: list[ControlName], file: Path, target: Path, inputs: list[Path]
+) -> tuple[Rig, str]:
+    """Return the rig whose compensated releases are as specified, and its text."""
+    from coupled.calibration.letgo import scheduled
+    from coupled.rig.rigfile import rig_from_table
+    from coupled.rig.rigwrite import rig_text
+    from coupled.schema import loads_toml
+
+    if target.suffix.lower() != ".toml":
+        raise InputError(target, "--write", "a rig file ends in .toml")
+    check_target(target, inputs)
+    bent = [name for name in chosen if rig.controls[name].compensation.gradient]
+    if not bent:
+        key = f"controls.{chosen[0]}.compensation.gradient"
+        problem = "is false; only releases with the gradient correction need --write"
+        raise InputError(file, key, problem)
+    for name in bent:
+        rig = scheduled(rig, name)
+    remark = f"{shown(file.name)}, mass, damping and a lead by the gradient on {', '.join(bent)}"
+    text = rig_text(rig, remark)
+    rig_from_table(loads_toml(text, target), target)  # a rig that cannot be flown is refused
+    return rig, text
 
 
 def _aircraft_data(

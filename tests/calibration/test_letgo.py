@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
+from tests.support.commands import coupled
 from tests.support.rigs import G_STIFF, K_REPORT, bench, push
 
 HOST = "controls.column.compensation"
@@ -160,3 +163,32 @@ def test_in_flight_a_column_let_go_comes_back_when_specified() -> None:
 def test_a_table_that_cannot_be_is_refused(changes: dict[str, list[float]], says: str) -> None:
     with pytest.raises(InputError, match=says):
         bench({f"{HOST}.{key}": value for key, value in changes.items()})
+
+
+def test_the_command_writes_the_rig_whose_releases_pass(tmp_path: Path) -> None:
+    more = ["--control", "column", "--write", "new.toml", "--json", "-", "-o", "doc"]
+    checks = json.loads(coupled(tmp_path, "document", "report-column", *more).stdout)["column"]
+    crossings = [check for check in checks if check["name"].startswith("first zero")]
+    assert crossings
+    assert all(check["passed"] for check in checks)
+    written = read_rig(tmp_path / "new.toml")
+    assert written == scheduled(read_rig(shipped_rigs()["report-column"]), "column")
+
+
+@pytest.mark.parametrize(
+    ("gradient", "target", "says"),
+    [
+        (True, "new.csv", "--write: a rig file ends in .toml"),
+        (False, "new.toml", "compensation.gradient: is false"),
+        (True, "rig.toml", "rig.toml: is a file that this command reads"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is_made(
+    tmp_path: Path, gradient: bool, target: str, says: str
+) -> None:
+    rig = bench({f"{HOST}.gradient": gradient})
+    (tmp_path / "rig.toml").write_text(rig_text(rig))
+    result = coupled(tmp_path, "document", "rig.toml", "--write", target)
+    assert result.returncode == 2
+    assert says in " ".join(result.stderr.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["rig.toml"]
