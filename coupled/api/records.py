@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -47,9 +48,14 @@ def write_record(record: Record, path: str | PathLike[str]) -> None:
 
 
 def import_log(
-    log: str | PathLike[str], log_map: str | PathLike[str], rig: Rig | None = None
+    log: str | PathLike[str] | Sequence[str | PathLike[str]],
+    log_map: str | PathLike[str],
+    rig: Rig | None = None,
 ) -> tuple[Record, ImportAccount]:
     r'''Return the record of a log of your own, and the account of how it was made.
+
+    Several logs of one test, each with stamps from one clock, make one record: the first one's
+    rows make the frames.
 
     `log_map` is a TOML file that names the log's columns and their units; `rig` gives the frame
     rate that the record is laid on. The account has `.clock`, `.channels`, `.unmapped` and
@@ -71,4 +77,5 @@ def import_log(
     >>> record.channels
     ('time_s', 'column_force_N')
     '''
-    return convert.import_log(Path(log), Path(log_map), rig)
+    logs = [log] if isinstance(log, (str, PathLike)) else log
+    return convert.import_log([Path(each) for each in logs], Path(log_map), rig)

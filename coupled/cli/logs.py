@@ -3,26 +3,48 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
+from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs
-from coupled.resources import shipped_rigs
+from coupled.resources import find, shipped_rigs
+
+if TYPE_CHECKING:
+    from coupled.rig.rig import Rig
 
 
 @app.command(
     "import",
-    epilog="[dim]Example: coupled import test7.mat --map map.toml -o out/test7.csv --rig 737[/]",
+    epilog="[dim]Examples:\n\n"
+    "coupled import test7.mat --suggest map.toml\n\n"
+    "coupled import test7.mat --map map.toml -o out/test7.csv --rig 737\n\n"
+    "coupled import command.csv state.csv --map map.toml[/]",
 )
 def import_log(
-    log: Annotated[Path, typer.Argument(help="A log: CSV, Parquet or MATLAB (up to v7.2).")],
-    map_file: Annotated[
-        Path, typer.Option("--map", metavar="MAP.toml", help="Its names, units, signs and clock.")
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG...",
+            help="A log: CSV, Parquet or MATLAB (up to v7.2); or several of one test, each with "
+            "stamps from one clock. The first one's rows make the frames.",
+        ),
     ],
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="MAP.toml", help="Its names, units, signs and clock."),
+    ] = None,
+    suggest: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MAP.toml",
+            help="Write a first map, from names, units and sizes; what they leave open it asks.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Record, CSV or Parquet.  [default: out/LOG.csv]"),
@@ -33,24 +55,44 @@ def import_log(
     json_file: JsonOption = "",
 ) -> None:
     """Make a record of your own log, and tell whether each channel can be true."""
+    if (map_file is None) == (suggest is None):
+        raise InputError("coupled import", "--map", "give a map, or --suggest to have one proposed")
+    rig_file = find(rig, shipped_rigs(), "rig") if rig else None
+    inputs = [*logs, *([rig_file] if rig_file else [])]
+    if map_file is None:
+        assert suggest is not None
+        if output is not None:
+            raise InputError("coupled import", "--output", "goes with --map, not with --suggest")
+        _suggest(logs, suggest, rig_file, inputs, json_file)
+    else:
+        _convert(logs, map_file, output, rig_file, inputs, json_file)
+
+
+def _rig(rig_file: Path | None) -> Rig | None:
+    from coupled.rig.rigfile import read_rig
+
+    return None if rig_file is None else read_rig(rig_file)
+
+
+def _convert(
+    logs: list[Path],
+    map_file: Path,
+    output: Path | None,
+    rig_file: Path | None,
+    inputs: list[Path],
+    json_file: str,
+) -> None:
     from coupled.cli.tables.logs import print_account
     from coupled.record.importing.convert import import_log as import_file
     from coupled.record.record import check_suffix, manifest_path, write_record
-    from coupled.resources import find
 
-    path = output or Path("out") / f"{log.stem}.csv"
+    path = output or Path("out") / f"{logs[0].stem}.csv"
+    inputs = [*inputs, map_file]
     check_suffix(path)
-    rig_file = find(rig, shipped_rigs(), "rig") if rig else None
-    inputs = [log, map_file, *([rig_file] if rig_file else [])]
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
     check_json(json_file, [*inputs, path, manifest_path(path)])
-    nominal = None
-    if rig_file is not None:
-        from coupled.rig.rigfile import read_rig
-
-        nominal = read_rig(rig_file)
-    record, account = import_file(log, map_file, nominal)
+    record, account = import_file(logs, map_file, _rig(rig_file))
     table = {"record": str(path), **account.as_dict()}
     with Outputs() as outputs:
         write_record(record, outputs.at(path))
@@ -59,4 +101,23 @@ def import_log(
         print_account(out, account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")
+    print_json(table, json_file)
+
+
+def _suggest(
+    logs: list[Path], target: Path, rig_file: Path | None, inputs: list[Path], json_file: str
+) -> None:
+    from coupled.cli.tables.logs import print_proposal
+    from coupled.record.importing.suggest.propose import propose
+
+    check_target(target, inputs)
+    check_json(json_file, [*inputs, target])
+    proposal = propose(logs, _rig(rig_file))
+    table = {"map": str(target), **proposal.as_dict()}
+    with Outputs() as outputs:
+        outputs.at(target).write_text(proposal.text, encoding="utf-8")
+        keep_json(table, json_file, outputs)
+    if json_file != "-":
+        print_proposal(out, proposal)
+        say(f"map: {target}")
     print_json(table, json_file)

@@ -1,4 +1,4 @@
-"""The figures of a sweep: labelled lines or a map, no panel of nothing, axes that say their scale."""
+"""The figures of a sweep: labelled lines or a map, no empty panel, axes that say their scale."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ def test_two_long_parameters_make_a_map() -> None:
     found = table(np.geomspace(1e-6, 1e-4, 10), np.linspace(60.0, 140.0, 9), ended=True)
     figure = draw_sweep(found, [BEND, SPEED], ["loss"], "bends")
     meshes = [m for axes in figure.axes for m in axes.collections if isinstance(m, QuadMesh)]
-    values = np.ma.filled(np.ma.asarray(meshes[0].get_array(), float), np.nan).reshape(9, 10)
+    values: np.ndarray = np.ma.filled(np.ma.asarray(meshes[0].get_array(), float), np.nan).reshape(
+        9, 10
+    )
     assert np.isnan(values[-1]).all()
     assert values[2, 3] == pytest.approx(100 * np.geomspace(1e-6, 1e-4, 10)[3] * 80.0)
     assert figure.axes[0].get_xscale() == "log"

@@ -7,6 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from coupled.record.importing.account import ClockAccount, ImportAccount
+from coupled.record.importing.suggest.propose import Proposal
 
 LISTED = 12  # unmapped columns named on the terminal; the manifest has all
 
@@ -33,6 +34,20 @@ def print_account(console: Console, account: ImportAccount) -> None:
     if left:
         more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
         console.print(f"not mapped: {escape(', '.join(left[:LISTED]))}{more}", highlight=False)
+
+
+def print_proposal(console: Console, proposal: Proposal) -> None:
+    """Print which column a proposed map takes for which channel, and what it asks."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("channel", no_wrap=True)
+    table.add_column("from")
+    for channel, column in proposal.mapped.items():
+        table.add_row(escape(channel), escape(column))
+    console.print(table, highlight=False)
+    for question in proposal.questions:
+        console.print(f"[yellow]to answer:[/] {escape(question)}", highlight=False)
+    if proposal.unmapped:
+        console.print(f"not used: {escape(', '.join(proposal.unmapped[:LISTED]))}", highlight=False)
 
 
 def clock_in_words(clock: ClockAccount) -> str:

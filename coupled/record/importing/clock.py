@@ -7,7 +7,8 @@ none, where a cubic spline would ring at a step or a stop, and a straight line w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,8 @@ from scipy.interpolate import PchipInterpolator
 
 from coupled.errors import InputError
 from coupled.record.importing.account import ClockAccount
-from coupled.record.importing.mapping import Clock, LogMap, known_unit
-from coupled.record.importing.reading import Log
+from coupled.record.importing.mapping import Clock, LogMap, OtherClock
+from coupled.record.importing.reading import Log, Stamps
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -57,15 +58,26 @@ class Grid:
         return chosen
 
 
-def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | None) -> Grid:
-    """Return the frames of the record, at the map's rate, or else `frame_rate_Hz`, or the log's."""
+def lay_grid(
+    log: Log,
+    log_map: LogMap,
+    map_file: Path,
+    frame_rate_Hz: float | None,
+    span_s: tuple[float, float] = (0.0, np.inf),
+) -> Grid:
+    """Return the frames of the record, at the map's rate, or else `frame_rate_Hz`, or the log's.
+
+    `span_s` is what all logs have, in s from the first row of this one, where there are several.
+    """
     clock = log_map.clock
-    stamps_s = _stamps(log, clock, map_file)
+    begin_s = max(clock.start, span_s[0])
+    end_s = min(np.inf if clock.end is None else clock.end, span_s[1])
+    stamps_s = stamps_of(log, clock, map_file).from_first_s
     delay_s = max(channel.delay for channel in log_map.channels.values())
-    kept = _cut(log, stamps_s, clock, delay_s)
+    kept = _cut(log, stamps_s, clock.source, (begin_s, end_s + delay_s))
     time_s = stamps_s[kept]
-    _check_steps(log, time_s, kept.start, clock)
-    first = int(np.searchsorted(time_s, clock.start - 1e-9))
+    _check_steps(log, time_s, kept.start, clock.source, clock.longest_gap)
+    first = int(np.searchsorted(time_s, begin_s - 1e-9))
     if first == time_s.size:
         raise InputError(map_file, "clock.start_s", f"the log ends at {time_s[-1]:.6g} s")
     start_s = float(time_s[first])
@@ -79,9 +91,7 @@ def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | N
         problem = f"{wished:g} Hz from rows at {1.0 / median_s:.4g} Hz would be invented"
         raise InputError(map_file, "clock.frame_rate_Hz", problem)
     on_grid = time_s - start_s if even is None else even / wished
-    last_s = on_grid[-1] - delay_s
-    if clock.end is not None:
-        last_s = min(last_s, clock.end - start_s)
+    last_s = min(on_grid[-1] - delay_s, end_s - start_s)
     frames = int(np.floor(last_s * wished + 1e-6)) + 1
     if not 2 <= frames <= MOST_FRAMES:
         raise InputError(log.file, "", f"would make a record of {max(frames, 0)} frames")
@@ -104,37 +114,50 @@ def lay_grid(log: Log, log_map: LogMap, map_file: Path, frame_rate_Hz: float | N
     return Grid(kept, on_grid, frame, even is not None, wished, frames, account)
 
 
-def _stamps(log: Log, clock: Clock, map_file: Path) -> Floats:
-    """Return the time of every row from the first one on, in s."""
-    if clock.rate is not None:
+def stamps_of(log: Log, clock: Clock | OtherClock, map_file: Path, key: str = "clock") -> Stamps:
+    """Return when every row was taken, from the first one on, in s."""
+    if isinstance(clock, Clock) and clock.rate is not None:
         rows = len(next(iter(log.columns.values())))
-        return np.arange(rows) / clock.rate
-    values, in_seconds = log.time(clock.source, map_file, "clock.from")
-    if values.size < 2:
+        return Stamps(Fraction(0), np.arange(rows) / clock.rate)
+    stamps = log.stamps(clock, map_file, key)
+    if stamps.from_first_s.size < 2:
         raise InputError(log.file, clock.source, "has fewer than two rows")
-    if np.isnan(values).any():
-        row = int(np.argmax(np.isnan(values)))
+    lacking = np.isnan(stamps.from_first_s)
+    if lacking.any():
+        row = int(np.argmax(lacking))
         raise InputError(log.file, clock.source, f"row {log.line(row)} has no time")
-    return values if in_seconds else values * known_unit(clock.unit, map_file, "clock.unit").factor
+    return stamps
 
 
-def _cut(log: Log, stamps_s: Floats, clock: Clock, delay_s: float) -> slice:
+def beside(
+    grid: Grid, stamps_s: Floats, delay_s: float, log: Log, source: str, longest_gap: int
+) -> Grid:
+    """Return the same frames over the rows of another log, whose stamps count from frame 0, in s.
+
+    Its rows stand wherever they stand: its channels are interpolated.
+    """
+    end_s = (grid.frames - 1) / grid.frame_rate_Hz
+    kept = _cut(log, stamps_s, source, (0.0, end_s + delay_s))
+    _check_steps(log, stamps_s[kept], kept.start, source, longest_gap)
+    nowhere = np.zeros(0, dtype=np.int64)
+    return replace(grid, kept=kept, time_s=stamps_s[kept], frame=nowhere, even=False)
+
+
+def _cut(log: Log, stamps_s: Floats, source: str, span_s: tuple[float, float]) -> slice:
     if stamps_s.size < 2:
         raise InputError(log.file, "", "has fewer than two rows")
     margin_s = MARGIN_rows * float(np.median(np.abs(np.diff(stamps_s))))
-    wanted = stamps_s >= clock.start - margin_s
-    if clock.end is not None:
-        wanted &= stamps_s <= clock.end + delay_s + margin_s
+    wanted = (stamps_s >= span_s[0] - margin_s) & (stamps_s <= span_s[1] + margin_s)
     rows = np.flatnonzero(wanted)
     if rows.size < 2:
         problem = (
             f"has no rows between the map's start_s and end_s; it ends at {stamps_s[-1]:.6g} s"
         )
-        raise InputError(log.file, clock.source, problem)
+        raise InputError(log.file, source, problem)
     return slice(int(rows[0]), int(rows[-1]) + 1)
 
 
-def _check_steps(log: Log, time_s: Floats, first: int, clock: Clock) -> None:
+def _check_steps(log: Log, time_s: Floats, first: int, source: str, longest_gap: int) -> None:
     steps_s = np.diff(time_s)
     if (steps_s <= 0.0).any():
         row = int(np.argmax(steps_s <= 0.0))
@@ -146,17 +169,17 @@ def _check_steps(log: Log, time_s: Floats, first: int, clock: Clock) -> None:
             problem = f"{again}; where rows are even all the same, give clock.rate_Hz, no from"
         else:
             problem = f"{where}: time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
-        raise InputError(log.file, clock.source, problem)
+        raise InputError(log.file, source, problem)
     median_s = float(np.median(steps_s))
-    gaps = np.flatnonzero(steps_s > (clock.longest_gap + 1.5) * median_s)
+    gaps = np.flatnonzero(steps_s > (longest_gap + 1.5) * median_s)
     if gaps.size:
         row = int(gaps[0])
         lost = round(steps_s[row] / median_s) - 1
         raise InputError(
             log.file,
-            clock.source,
+            source,
             f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
-            f" longest_gap_rows = {clock.longest_gap} allows no more; cut by start_s or end_s",
+            f" longest_gap_rows = {longest_gap} allows no more; cut by start_s or end_s",
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from coupled.errors import InputError
 from coupled.files import sha256
 from coupled.record.channels import TIME
 from coupled.record.importing.account import ChannelAccount, ImportAccount
-from coupled.record.importing.clock import Grid, lay_grid, on_frames
+from coupled.record.importing.clock import Grid, on_frames
 from coupled.record.importing.judging import judge
 from coupled.record.importing.mapping import (
     CHANNELS,
@@ -23,7 +24,8 @@ from coupled.record.importing.mapping import (
     factor_of,
     read_map,
 )
-from coupled.record.importing.reading import Log, read_log
+from coupled.record.importing.reading import Log
+from coupled.record.importing.several import clock_of, lay_grids, log_of, read_logs
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST
@@ -34,37 +36,44 @@ TURNING = ("roll_rad", "heading_rad")  # angles that jump by a turn
 
 
 def import_log(
-    log_file: Path, map_file: Path, rig: Rig | None = None
+    log_file: Path | Sequence[Path], map_file: Path, rig: Rig | None = None
 ) -> tuple[Record, ImportAccount]:
-    """Return the record of a log, and the account of how it came to be.
+    """Return the record of a log, or of several, and the account of how it came to be.
 
-    The record's manifest holds the account too. A `rig` gives the frame rate, and its travels
-    and force gradients are held against the channels. Raises InputError.
+    The first log's rows make the frames; a channel of a further one is interpolated to them by
+    its own stamps, and the record lasts as long as all logs do. The record's manifest holds the
+    account too. A `rig` gives the frame rate, and its travels and force gradients are held
+    against the channels. Raises InputError.
     """
+    files = [log_file] if isinstance(log_file, Path) else list(log_file)
     log_map = read_map(map_file)
-    log = read_log(log_file, log_map.log)
+    logs = read_logs(files, log_map, map_file)
+    main = logs[files[0].name]
     rate = rig.frame_rate if rig is not None else None
     asked = log_map.clock.frame_rate
     if rate is not None and asked is not None and abs(asked / rate - 1.0) > 1e-3:
         problem = f"is {asked:g}, the rig's {rate:g}; leave it out to take the rig's"
         raise InputError(map_file, "clock.frame_rate_Hz", problem)
-    grid = lay_grid(log, log_map, map_file, rate)
+    grids = lay_grids(logs, log_map, map_file, rate)
+    grid = grids[main.file.name]
     warnings = _clock_warnings(grid)
     names = [name for name in CHANNELS if name in log_map.channels]
     record, logged, filled = {}, {}, {}
     for name in names:
         channel = log_map.channels[name]
+        log = logs[log_of(name, log_map, logs, map_file)]
+        own = grids[log.file.name]
         values = _in_si(log, name, channel, map_file, warnings)
-        if len(values) < grid.kept.stop:
-            problem = f"has {len(values)} rows, the clock {grid.kept.stop}"
+        if len(values) < own.kept.stop:
+            problem = f"has {len(values)} rows, the clock {own.kept.stop}"
             raise InputError(log.file, channel.source, problem)
-        kept = values[grid.kept]
-        filled[name] = _check_gaps(log, log_map, name, grid, kept)
-        record[name] = _on_frames(name, grid, kept, channel.delay)
-        logged[name] = kept[np.isfinite(kept) & grid.inside()]
+        kept = values[own.kept]
+        filled[name] = _check_gaps(log, log_map, name, own, kept)
+        record[name] = _on_frames(name, own, kept, channel.delay)
+        logged[name] = kept[np.isfinite(kept) & own.inside()]
         if logged[name].size < 2:
             raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
-    judged = judge(record, logged, rig, log_file)
+    judged = judge(record, logged, rig, main.file)
     channels = {
         name: ChannelAccount(
             source=log_map.channels[name].source,
@@ -77,10 +86,12 @@ def import_log(
         )
         for name, found in judged.items()
     }
-    account = ImportAccount(grid.account, channels, _unmapped(log, log_map), tuple(warnings))
+    account = ImportAccount(
+        grid.account, channels, _unmapped(logs, log_map, map_file), tuple(warnings)
+    )
     manifest = {
-        "imported_from": log_file.name,
-        "inputs_sha256": {path.name: sha256(path) for path in (log_file, map_file)},
+        "imported_from": files[0].name if len(files) == 1 else [path.name for path in files],
+        "inputs_sha256": {path.name: sha256(path) for path in (*files, map_file)},
         "map": as_table(log_map),
         "channels": [TIME, *names],
         "rows": grid.frames,
@@ -98,7 +109,7 @@ def import_log(
 def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list[str]) -> Floats:
     """Return a channel at the log's rows, in the unit that it ends in."""
     key = f"channels.{name}"
-    values = log.values(channel.source, map_file, f"{key}.from")
+    values = log.values(channel, map_file, key)
     stated = log.units.get(channel.source, "")
     if not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log's units_row gives none")
@@ -119,8 +130,6 @@ def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats
     channel = log_map.channels[name]
     most = log_map.clock.longest_gap if channel.longest_gap is None else channel.longest_gap
     empty = ~np.isfinite(values)
-    if not empty.any():
-        return 0
     if empty.all():
         raise InputError(log.file, channel.source, "is empty")
     valid = np.flatnonzero(~empty)
@@ -131,7 +140,7 @@ def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats
         where = f"has numbers only from {from_s:.3f} to {to_s:.3f} s"
         raise InputError(log.file, channel.source, f"{where}; cut by clock.start_s and end_s")
     holes = np.diff(valid) - 1
-    if holes.max() > most:
+    if holes.max(initial=0) > most:
         row = int(valid[int(np.argmax(holes > most))]) + 1
         length = int(holes[holes > most][0])
         where = f"row {log.line(grid.kept.start + row)}: {length} empty cells"
@@ -169,6 +178,16 @@ def _clock_warnings(grid: Grid) -> list[str]:
     return warnings
 
 
-def _unmapped(log: Log, log_map: LogMap) -> tuple[str, ...]:
-    used = {channel.source for channel in log_map.channels.values()} | {log_map.clock.source}
-    return tuple(name for name in log.columns if name not in used)
+def _unmapped(logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> tuple[str, ...]:
+    """Return the columns that the map leaves out, with their log where there are several."""
+    used = {
+        (log_of(name, log_map, logs, map_file), channel.source)
+        for name, channel in log_map.channels.items()
+    }
+    used |= {(name, clock_of(name, log_map).source) for name in logs}
+    return tuple(
+        column if len(logs) == 1 else f"{name}: {column}"
+        for name, log in logs.items()
+        for column in log.columns
+        if (name, column) not in used
+    )

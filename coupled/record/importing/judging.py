@@ -87,6 +87,8 @@ def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> d
             force = channel(control, "force")
             if force in record and plausible.move_oppositely(record[force], record[moved[0]]):
                 _add(doubts, force, "moves against the deflection: sign?")
+            if force in record and plausible.lacks_its_sign(record[force], record[moved[0]]):
+                _add(doubts, force, "never negative: a size without its sign?")
             _add(doubts, force, _force(record, control, moved[0], data))
     pulled = next((n for n in ("column_computed_m", "column_deflection_m") if n in record), None)
     elevator = record.get("elevator_rad")

@@ -1,7 +1,8 @@
 """The map of a log: which of its columns is which channel, in what unit, sign and time.
 
 A channel of the record is sign · unit · (scale · raw + offset), with `offset` in the log's
-unit; what a sensor reads `delay_s` late is moved forward by that.
+unit; what a sensor reads `delay_s` late is moved forward by that. Where several logs were given,
+a channel says which is its own, and each log has its own stamps, all from one clock.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class Clock(Section):
 
     source: str = named("from", "")
     unit: str = "s"
+    date: str = ""
     rate: float | None = quantity("Hz", None, gt=0, le=1e6)
     frame_rate: float | None = quantity("Hz", None, ge=1, le=2000)
     start: float = quantity("s", 0.0, ge=0)
@@ -59,10 +61,22 @@ def _no_bool(value: object) -> object:
     return value
 
 
-class Channel(Section):
-    """One channel of the record, from one column of the log."""
+class OtherClock(Section):
+    """Where a further log's rows have their time from, if not as the first log's."""
 
     source: str = named("from", min_length=1)
+    unit: str = "s"
+    date: str = ""
+
+
+class Channel(Section):
+    """One channel of the record, from one column of a log."""
+
+    source: str = named("from", min_length=1)
+    log: str = ""
+    element: int | None = quantity("", None, ge=1, le=10_000)
+    sign_bit: int | None = quantity("", None, ge=1, le=52)
+    wraps_at: float | None = quantity("", None, ge=4, le=2.0**53)
     unit: str = ""
     sign: Annotated[Literal[1, -1], BeforeValidator(_no_bool)] = 1
     scale: float = 1.0
@@ -76,6 +90,7 @@ class LogMap(Section):
 
     log: Layout = Layout()
     clock: Clock
+    clocks: dict[str, OtherClock] = {}
     channels: dict[str, Channel]
 
 
@@ -93,8 +108,14 @@ def read_map(path: Path) -> LogMap:
             hint = nearest(name, CHANNELS)
             raise InputError(path, f"channels.{name}", f"no record has such a channel; {hint}")
     made = {name: build(Channel, channels[name], path, f"channels.{name}") for name in channels}
-    found = build(LogMap, {**table, "channels": made}, path, "")
+    clocks = table.get("clocks", {})
+    if not isinstance(clocks, dict):
+        raise InputError(path, "clocks", 'is a table for each further log, as [clocks."state.csv"]')
+    others = {name: build(OtherClock, clocks[name], path, f"clocks.{name}") for name in clocks}
+    found = build(LogMap, {**table, "channels": made, "clocks": others}, path, "")
     _check_clock(found.clock, path)
+    for name, clock in others.items():
+        _check_stamps(clock, path, f"clocks.{name}")
     if not found.log.delimiter.isascii() or found.log.delimiter in '"\r\n':
         problem = f'is {found.log.delimiter!r}; give one plain character, as ";" or "\\t"'
         raise InputError(path, "log.delimiter", problem)
@@ -104,6 +125,9 @@ def read_map(path: Path) -> LogMap:
     for name, channel in found.channels.items():
         if channel.scale == 0.0:
             raise InputError(path, f"channels.{name}.scale", "must not be 0")
+        if channel.sign_bit is not None and channel.wraps_at is not None:
+            problem = "and wraps_at are two ways to keep a sign: give one"
+            raise InputError(path, f"channels.{name}.sign_bit", problem)
         if channel.unit:
             factor_of(name, channel.unit, path)
     return found
@@ -113,12 +137,19 @@ def _check_clock(clock: Clock, path: Path) -> None:
     if bool(clock.source) == (clock.rate is not None):
         problem = "give either from, the column with the time, or rate_Hz of a log without one"
         raise InputError(path, "clock", problem)
-    unit = known_unit(clock.unit, path, "clock.unit")
-    if unit.dimension != _own("s").dimension:
-        fit = ", ".join(units_like(_own("s")))
-        raise InputError(path, "clock.unit", f"{clock.unit!r} is {unit.word}; give one of {fit}")
+    _check_stamps(clock, path, "clock")
     if clock.end is not None and clock.end <= clock.start:
         raise InputError(path, "clock.end_s", f"must lie after start_s = {clock.start:g}")
+
+
+def _check_stamps(clock: Clock | OtherClock, path: Path, key: str) -> None:
+    unit = known_unit(clock.unit, path, f"{key}.unit")
+    if unit.dimension != _own("s").dimension:
+        fit = ", ".join(units_like(_own("s")))
+        raise InputError(path, f"{key}.unit", f"{clock.unit!r} is {unit.word}; give one of {fit}")
+    if clock.date and clock.date != "iso" and "%" not in clock.date:
+        problem = f'is {clock.date[:40]!r}; give "iso", or a pattern as "%d.%m.%Y %H:%M:%S.%f"'
+        raise InputError(path, f"{key}.date", problem)
 
 
 def own_unit(channel: str) -> str:
@@ -165,6 +196,7 @@ def as_table(log_map: LogMap) -> dict[str, Any]:
     keys = {
         Layout: file_keys(Layout, "m"),
         Clock: file_keys(Clock, "m"),
+        OtherClock: file_keys(OtherClock, "m"),
         Channel: file_keys(Channel, "m"),
     }
 
@@ -172,4 +204,6 @@ def as_table(log_map: LogMap) -> dict[str, Any]:
         return {key: getattr(section, field) for key, field in keys[type(section)].items()}
 
     channels = {name: plain(channel) for name, channel in log_map.channels.items()}
-    return {"log": plain(log_map.log), "clock": plain(log_map.clock), "channels": channels}
+    clocks = {name: plain(clock) for name, clock in log_map.clocks.items()}
+    table = {"log": plain(log_map.log), "clock": plain(log_map.clock), "channels": channels}
+    return {**table, "clocks": clocks} if clocks else table

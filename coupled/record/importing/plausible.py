@@ -136,6 +136,13 @@ def move_oppositely(first: Floats, second: Floats) -> bool:
     return scale > 0.0 and float(a @ b) / scale < -0.3
 
 
+def lacks_its_sign(force_N: Floats, deflection: Floats) -> bool:
+    """Tell whether a force is never negative though the control moves to both sides by far."""
+    most, least = float(deflection.max()), float(deflection.min())
+    both = min(most, -least) > 0.2 * max(most, -least)
+    return both and float(force_N.min()) >= 0.0 and float(np.ptp(force_N)) > 0.0
+
+
 def beyond_travel(deflection: Floats, travel: float) -> float | None:
     """Return the greatest deflection over the travel, where it exceeds it by more than noise."""
     most = float(np.max(np.abs(deflection)))

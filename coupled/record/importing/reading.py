@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
-from coupled.record.importing.mapping import Layout
+from coupled.record.importing.cells import element, moments, signed
+from coupled.record.importing.mapping import Channel, Clock, Layout, OtherClock, known_unit
 from coupled.record.importing.separate import read_separately
 
 Floats = NDArray[np.float64]
@@ -54,33 +56,56 @@ class Log:
             raise InputError(map_file, key, f"{self.file.name} has no {name!r}; {hint}")
         return self.columns[name]
 
-    def values(self, name: str, map_file: Path, key: str) -> Floats:
-        """Return a column as doubles, NaN where a cell is empty, shape (rows,)."""
-        column = self.find(name, map_file, key)
-        return numbers(self.file, name, column, gaps=True, line=self.line)
+    def values(self, channel: Channel, map_file: Path, key: str) -> Floats:
+        """Return a channel's column as doubles, signed, NaN where a cell is empty: (rows,)."""
+        name = channel.source
+        column = self.find(name, map_file, f"{key}.from")
+        if channel.element is not None:
+            column = element(column, channel.element, self.file, name, self.line)
+        raw = numbers(self.file, name, column, gaps=True, line=self.line)
+        return signed(raw, channel, self.file, self.line)
 
-    def time(self, name: str, map_file: Path, key: str) -> tuple[Floats, bool]:
-        """Return a clock's column from its first row on, and whether it is in seconds already.
+    def stamps(self, clock: Clock | OtherClock, map_file: Path, key: str) -> Stamps:
+        """Return when each row was taken.
 
-        Taken from the first row before it becomes a double: a clock in ns since 1970 keeps
+        Counted from the first row before it becomes a double: a clock in ns since 1970 keeps
         all its digits.
         """
-        column = self.find(name, map_file, key)
-        dated = column.dtype.is_temporal()
-        if dated:
-            count = column.to_physical()
-            steps = count - count.drop_nulls().head(1).max() if count.len() else count
+        name = clock.source
+        column = self.find(name, map_file, f"{key}.from")
+        if clock.date:
+            column = moments(column, clock.date, self.file, name, self.line)
+            return _counted(column, 1_000_000)
+        if column.dtype == pl.Date:
+            raise InputError(self.file, name, "holds days, without a time of day")
+        if column.dtype.is_temporal():
             unit = getattr(column.dtype, "time_unit", None)
-            per_s = {"ms": 1e3, "us": 1e6, "ns": 1e9, None: 1e9}[unit]
-            if column.dtype == pl.Date:
-                raise InputError(self.file, name, "holds days, without a time of day")
-            return steps.cast(pl.Float64).to_numpy().astype(np.float64) / per_s, True
+            return _counted(column.to_physical(), {"ms": 10**3, "us": 10**6}.get(str(unit), 10**9))
         check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
+        factor = known_unit(clock.unit, map_file, f"{key}.unit").factor
+        exact = Fraction(factor).limit_denominator(10**12)  # 1/1000, not the double next to it
         if column.dtype.is_integer() and column.len() and column[0] is not None:
             wide = column.cast(pl.Int64, strict=False) - int(column[0])
-            return wide.cast(pl.Float64).to_numpy().astype(np.float64), False
-        return (values - values[0] if values.size else values), False
+            steps = wide.cast(pl.Float64).to_numpy().astype(np.float64)
+            return Stamps(Fraction(int(column[0])) * exact, steps * factor)
+        first = float(values[0]) if values.size and np.isfinite(values[0]) else 0.0
+        return Stamps(Fraction(first) * exact, (values - first) * factor)
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """When the rows of a log were taken: the first one exactly, in s, and all from it on, in s."""
+
+    first_s: Fraction
+    from_first_s: Floats
+
+
+def _counted(count: pl.Series, per_s: int) -> Stamps:
+    first = count.drop_nulls().head(1)
+    origin = int(first[0]) if first.len() else 0
+    steps = (count - origin).cast(pl.Float64).to_numpy().astype(np.float64)
+    return Stamps(Fraction(origin, per_s), steps / per_s)
 
 
 def read_log(path: Path, layout: Layout) -> Log:

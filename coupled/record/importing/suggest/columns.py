@@ -1,0 +1,94 @@
+"""The columns of a log as a person who looks for channels sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.record.importing.cells import ISO, moments
+from coupled.record.importing.reading import Log
+from coupled.record.importing.suggest.names import Reading, read_name
+
+Floats = NDArray[np.float64]
+FEW = 0.1  # of its cells may be empty or no numbers
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: what its name says, and what its cells hold.
+
+    `values` are its numbers, NaN where empty, shape (rows,); of a column of lists, of their
+    first elements, and `length` is how many each list has. Dates are in s from the first.
+    """
+
+    log: str
+    name: str
+    reading: Reading
+    kind: Literal["numbers", "lists", "dates", "text"]
+    values: Floats
+    length: int = 0
+
+    @property
+    def moves(self) -> bool:
+        """Whether it ever changes."""
+        return self.values.size > 1 and bool(np.nanmax(self.values) > np.nanmin(self.values))
+
+
+def columns_of(log: Log) -> list[Column]:
+    """Return a log's columns in their order; those that hold no numbers too."""
+    return [_column(log, name) for name in log.columns if name not in log.doubled]
+
+
+def _column(log: Log, name: str) -> Column:
+    cells = log.columns[name]
+    unit = log.units.get(name, "")
+    reading = read_name(name, unit, log.file.stem)
+    if cells.dtype == pl.String:
+        first = cells.drop_nulls().head(1)
+        text = str(first[0]) if first.len() else ""
+        if text[:1] in "[({" and text:
+            return _lists(log, name, reading, cells)
+        if reading.channel == "time" and (":" in text or text.count("-") == 2):
+            return _dates(log, name, reading, cells)
+    elif isinstance(cells.dtype, (pl.List, pl.Array)):
+        return _lists(log, name, reading, cells)
+    elif cells.dtype.is_temporal():
+        counts = cells.to_physical().cast(pl.Float64).to_numpy().astype(np.float64)
+        return Column(log.file.name, name, reading, "dates", counts - counts[:1])
+    values = _doubles(cells)
+    kind: Literal["numbers", "text"] = "numbers"
+    if values.size == 0 or np.mean(np.isnan(values)) > FEW or np.isnan(values).all():
+        filled = cells.is_not_null().to_numpy() & np.isnan(values)
+        kind = "text" if filled.any() or np.isnan(values).all() else "numbers"
+    return Column(log.file.name, name, reading, kind, values)
+
+
+def _doubles(cells: pl.Series) -> Floats:
+    if not (cells.dtype.is_numeric() or cells.dtype == pl.String):
+        return np.full(cells.len(), np.nan)
+    values = cells.cast(pl.Float64, strict=False).to_numpy().astype(np.float64)
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _lists(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
+    if cells.dtype == pl.String:
+        plain = cells.str.strip_chars("[](){} ").str.replace_all(r"\s*[;,]\s*|\s+", ",")
+        cells = plain.str.split(",")
+    lengths = cells.list.len().drop_nulls()
+    values = _doubles(cells.list.get(0, null_on_oob=True))
+    length = int(lengths.to_numpy().min()) if lengths.len() else 0
+    return Column(log.file.name, name, reading, "lists", values, length)
+
+
+def _dates(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
+    try:
+        counts = moments(cells, ISO, log.file, name, log.line)
+    except InputError:
+        return Column(log.file.name, name, reading, "text", np.full(cells.len(), np.nan))
+    times = counts.cast(pl.Float64).to_numpy().astype(np.float64)
+    return Column(log.file.name, name, reading, "dates", 1e-6 * (times - times[0]))

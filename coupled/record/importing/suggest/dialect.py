@@ -1,0 +1,120 @@
+"""How a text log is laid out: what sets its columns apart, where its header and its numbers are."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from coupled.errors import InputError
+from coupled.files import read_bytes
+from coupled.record.importing.mapping import Layout
+from coupled.record.importing.reading import FORMATS
+from coupled.units import parse_unit
+
+LOOKED_AT = 400  # lines; a log does not change its layout further down
+COMMENTS = ("#", "%", "//", "*")
+DELIMITERS = ("\t", ";", ",", " ")  # a semicolon before a comma: the comma may be the decimal one
+MOST_WORDS = 5
+_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?")
+_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+
+
+def guess_layout(path: Path) -> Layout:
+    """Return the layout of a log; the plain one where its format is no text."""
+    if FORMATS.get(path.suffix.lower(), "csv") != "csv":
+        return Layout()
+    encoding, text = _decoded(path, read_bytes(path))
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")[:LOOKED_AT]
+    comment = next((mark for mark in COMMENTS if any(s.startswith(mark) for s in lines)), "")
+    rows = [
+        (number, line)
+        for number, line in enumerate(lines)
+        if line.strip() and not (comment and line.lstrip().startswith(comment))
+    ]
+    if len(rows) < 3:
+        raise InputError(path, "", "has fewer than three rows: too few to propose a map")
+    delimiter, width = _delimiter([line for _, line in rows], path)
+    cells = [_split(line, delimiter) for _, line in rows]
+    first = next(i for i, row in enumerate(cells) if len(row) == width)
+    skipped = rows[first][0] if not comment else _skipped(rows[first][0], lines, comment)
+    cells = cells[first:]
+    header = not all(is_number(cell) or not cell for cell in cells[0])
+    units_row = header and _holds_units(cells[1]) and any(map(is_number, cells[2]))
+    below = cells[(2 if units_row else 1) if header else 0 :]
+    decimal: Literal[".", ","] = "."
+    if delimiter != "," and any(_COMMA.fullmatch(cell) for row in below for cell in row):
+        decimal = ","
+    return Layout(
+        delimiter=delimiter,
+        decimal=decimal,
+        comment=comment,
+        skip_rows=skipped,
+        header=header,
+        units_row=units_row,
+        missing=_missing(below, width),
+        encoding=encoding,
+    )
+
+
+def is_number(cell: str) -> bool:
+    """Tell whether a cell holds one number, with a decimal point or comma."""
+    return _NUMBER.fullmatch(cell.strip()) is not None
+
+
+def _decoded(path: Path, content: bytes) -> tuple[Literal["utf-8", "latin-1", "utf-16"], str]:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        try:
+            return "utf-16", content.decode("utf-16")
+        except UnicodeError:
+            raise InputError(path, "", "begins as UTF-16 does, and is none") from None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeError:
+        return "latin-1", content.decode("latin-1")
+    if "\0" in text:
+        raise InputError(path, "", "holds bytes that are no text: another format?")
+    return "utf-8", text
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+
+
+def _delimiter(lines: Sequence[str], path: Path) -> tuple[str, int]:
+    """Return what sets columns apart, and how many there are: the same in nearly every row."""
+    tail = lines[len(lines) // 3 :]
+    for delimiter in DELIMITERS:
+        widths = Counter(len(_split(line, delimiter)) for line in tail)
+        width, times = widths.most_common(1)[0]
+        if width > 1 and times >= 0.9 * len(tail):
+            return delimiter, width
+    raise InputError(path, "", "has no columns that a tab, semicolon, comma or space sets apart")
+
+
+def _skipped(row: int, lines: Sequence[str], comment: str) -> int:
+    """Return the lines to skip before a row; comments need none."""
+    others = [i for i in range(row) if lines[i].strip() and not lines[i].startswith(comment)]
+    return row if others else 0
+
+
+def _holds_units(row: Sequence[str]) -> bool:
+    words = [cell for cell in row if cell]
+    known = [cell for cell in words if parse_unit(cell) is not None and not is_number(cell)]
+    return bool(known) and not any(is_number(cell) and cell != "1" for cell in words)
+
+
+def _missing(rows: Sequence[Sequence[str]], width: int) -> list[str]:
+    """Return the words that stand in columns of numbers."""
+    words: Counter[str] = Counter()
+    for place in range(width):
+        column = [row[place] for row in rows if len(row) == width and row[place]]
+        numbers = sum(map(is_number, column))
+        if column and 0.5 * len(column) < numbers < len(column):
+            words.update(cell for cell in column if not is_number(cell))
+    return [word for word, _ in words.most_common(MOST_WORDS)]

@@ -1,0 +1,157 @@
+"""What a column's name says: its channel, its unit, and how sure that is.
+
+A name is cut into words at its signs and capitals. A word may name a control, a quantity, or a
+unit; what the words of a name do not say is left open.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from coupled.record.channels import ControlName, channel
+from coupled.record.importing.mapping import CHANNELS, own_unit
+from coupled.units import parse_unit
+
+
+def _set(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+CONTROLS: dict[ControlName, frozenset[str]] = {
+    "column": _set("column col stick yoke elev elevator pitch lon longitudinal"),
+    "wheel": _set("wheel whl aileron ail roll lat lateral"),
+    "pedals": _set("pedals pedal ped rudder rud yaw dir directional"),
+}
+QUANTITIES = {
+    "modifying_force": _set("fmod modifying"),
+    "force": _set("force frc f load loadcell lc pull gauge newton lbf"),
+    "computed": _set(
+        "computed encoder enc pot lvdt servo cmd command commanded control target setpoint ref"
+    ),
+    "deflection": _set("deflection defl grip hand true laser actual measured state sensor"),
+}
+PLACES = _set("position pos angle disp displacement travel")  # of which end they leave open
+# A motion's channel by any of these sets of words, the longest found first.
+MOTION = {
+    "dynamic_pressure_Pa": "qbar|q bar|qc|dynamic pressure|dyn press|impact pressure",
+    "true_airspeed_m_per_s": "tas|true airspeed|airspeed true|vtas|vt",
+    "altitude_m": "altitude|alt|height",
+    "load_factor": "nz|load factor|loadfactor|g load|normal acceleration",
+    "pitch_rate_rad_per_s": "pitch rate|q rate|q",
+    "roll_rate_rad_per_s": "roll rate|p rate|p",
+    "yaw_rate_rad_per_s": "yaw rate|r rate|r",
+    "alpha_rad": "alpha|aoa|angle of attack",
+    "sideslip_rad": "beta|sideslip|aos",
+    "pitch_rad": "theta|pitch|pitch attitude|pitch angle",
+    "roll_rad": "phi|bank|roll|roll attitude|roll angle|bank angle",
+    "heading_rad": "psi|heading|hdg",
+    "elevator_rad": "elevator|elevator position|elevator deflection|de",
+    "aileron_rad": "aileron|aileron position|aileron deflection|da",
+    "rudder_rad": "rudder|rudder position|rudder deflection|dr",
+}
+TIME = _set("time t timestamp stamp clock utc date datetime elapsed sec seconds")
+TORQUE = _set("torque moment nm")
+# A unit at the end of a name, as people write it there, in coupled's spelling.
+SUFFIXES = {
+    **{
+        word: word
+        for word in sorted(_set("lbf kgf N m mm cm in ft rad mrad deg Pa kPa hPa psf psi"))
+    },
+    **{word: word for word in sorted(_set("mbar kt mph s ms us ns g"))},
+    **{"lb": "lbf", "lbs": "lbf", "dan": "daN", "kts": "kt", "knots": "kt", "inch": "in"},
+    **{"inches": "in", "degree": "deg", "degrees": "deg", "newton": "N", "sec": "s", "pct": "%"},
+    **{"feet": "ft", "metres": "m", "meters": "m", "kn": "kN"},
+    **{"deg s": "deg/s", "rad s": "rad/s", "m s": "m/s", "ft s": "ft/s", "mps": "m/s"},
+    **{"deg per s": "deg/s", "rad per s": "rad/s", "m per s": "m/s", "ft per s": "ft/s"},
+    **{"dps": "deg/s", "km h": "km/h"},
+}
+_LOWER = {key.lower(): unit for key, unit in SUFFIXES.items()}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a name says. `channel` is "time", a record's channel, or "" where it says none.
+
+    `sure` is false where the name leaves the control open, or what of it is meant; `either_end`
+    where it is a place that may be the grip's or the computed one.
+    """
+
+    channel: str
+    unit: str = ""
+    sure: bool = True
+    either_end: bool = False
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of a name in lower case: `ColPos_in` is col, pos, in."""
+    spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name)
+    return re.findall(r"[a-z]+|\d+", spaced.lower())
+
+
+def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
+    """Return what a column's name, the unit that the log states, and the log's own name say."""
+    if name in CHANNELS:
+        return Reading(name, listed_unit or own_unit(name))
+    stem, unit = _unit(name)
+    unit = listed_unit if parse_unit(listed_unit) is not None else unit
+    words = words_of(stem)
+    if set(words) & TIME and not set(words) & {"rate"}:
+        return Reading("time", unit if _is(unit, "s") else "")
+    text = " ".join(words)
+    for found, spellings in MOTION.items():
+        if text in spellings.split("|") or any(
+            f" {spelling} " in f" {text} " for spelling in spellings.split("|") if " " in spelling
+        ):
+            return Reading(found, unit)
+    return _moved(words, unit, words_of(log)) or Reading("", unit)
+
+
+def _unit(name: str) -> tuple[str, str]:
+    """Return a name without its unit, and the unit: in brackets, or as the last words."""
+    bracket = re.search(r"[\[({<]\s*([^\])}>]+?)\s*[\])}>]\s*$", name)
+    if bracket and parse_unit(bracket.group(1)) is not None:
+        return name[: bracket.start()], bracket.group(1)
+    words = words_of(name)
+    for count in (3, 2, 1):
+        last = " ".join(words[-count:])
+        if len(words) > count and last in _LOWER:
+            return " ".join(words[:-count]), _LOWER[last]
+    return name, ""
+
+
+def _is(unit: str, other: str) -> bool:
+    given, own = parse_unit(unit) if unit else None, parse_unit(other)
+    return given is not None and own is not None and given.dimension == own.dimension
+
+
+def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
+    """Return a control's channel, where the words name a control or what one has."""
+    present = _singular(words)
+    controls = [control for control, names in CONTROLS.items() if present & names]
+    if is_torque(words) and not _is(unit, "N"):
+        return None
+    quantities = [quantity for quantity, names in QUANTITIES.items() if present & names]
+    if not quantities and present & PLACES:
+        of_log = [q for q in ("computed", "deflection") if set(log_words) & QUANTITIES[q]]
+        quantities = of_log or ["deflection"]
+    if not quantities and _is(unit, "N"):
+        quantities = ["force"]
+    surface = present & {"elevator", "aileron", "rudder"}
+    if not quantities or "rate" in present or (surface and "force" not in quantities):
+        return None
+    if present & {"theta", "phi", "psi", "attitude", "bank", "heading"}:
+        return None
+    control: ControlName = controls[0] if controls else "column"
+    either = not present & frozenset.union(*QUANTITIES.values())
+    sure = len(controls) == 1 and not either
+    return Reading(channel(control, quantities[0]), unit, sure, either_end=either)
+
+
+def is_torque(words: list[str]) -> bool:
+    """Tell whether a name is a torque's: no force without an arm, which no log holds."""
+    return bool(_singular(words) & TORQUE)
+
+
+def _singular(words: list[str]) -> set[str]:
+    return {*words, *(word[:-1] for word in words if word.endswith("s") and len(word) > 3)}

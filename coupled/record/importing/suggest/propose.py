@@ -1,0 +1,235 @@
+"""A map proposed for a log: what is certain is filled in, what is not is asked in its place.
+
+A question is a value that no map may have, `"?"`, with what fits beside it: the map is refused
+until a person has answered. Signs of loads and scales of counts are asked, never guessed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.record.channels import CONTROL_NAMES
+from coupled.record.importing.mapping import CHANNELS, Layout, own_unit
+from coupled.record.importing.plausible import move_oppositely
+from coupled.record.importing.reading import read_log
+from coupled.record.importing.suggest import sizes
+from coupled.record.importing.suggest.columns import Column, columns_of
+from coupled.record.importing.suggest.dialect import guess_layout
+from coupled.record.importing.suggest.names import is_torque, words_of
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
+from coupled.schema import file_keys
+from coupled.units import Unit, parse_unit, units_like
+
+Floats = NDArray[np.float64]
+Line = tuple[str, object, str]  # a key, its value, and a remark
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A map as text, the questions that it still asks, and the columns that it leaves out."""
+
+    text: str
+    questions: tuple[str, ...]
+    mapped: Mapping[str, str]  # channel: column
+    unmapped: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {
+            "channels": dict(self.mapped),
+            "questions": list(self.questions),
+            "unmapped": list(self.unmapped),
+        }
+
+
+def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
+    """Return a map for a log, or for several of one test, the first of which makes the frames.
+
+    A `rig`'s travels narrow the units. Raises InputError for what is no log.
+    """
+    layout = guess_layout(files[0])
+    columns = [column for file in files for column in columns_of(read_log(file, layout))]
+    logs = [file.name for file in files]
+    clock, clocks = _clocks(columns, logs)
+    chosen = _chosen([c for c in columns if c.reading.channel != "time"])
+    sections = [("log", _layout_lines(layout)), ("clock", clock)]
+    sections += [(f"clocks.{json.dumps(name)}", lines) for name, lines in clocks.items()]
+    for channel in CHANNELS:
+        if channel in chosen:
+            control = _control(channel, rig)
+            lines = _channel_lines(channel, chosen[channel], control, logs[0])
+            sections.append((f"channels.{channel}", lines))
+    sections = _signs(sections, chosen)
+    mapped = {channel: chosen[channel].name for channel in CHANNELS if channel in chosen}
+    used = {(c.log, c.name) for c in chosen.values()}
+    left = [c for c in columns if (c.log, c.name) not in used and c.reading.channel != "time"]
+    unmapped = tuple(c.name if len(logs) == 1 else f"{c.log}: {c.name}" for c in left)
+    if not mapped:
+        problem = "none of its columns has the name of a force, a deflection or a motion: "
+        raise InputError(files[0], "", problem + ", ".join(unmapped)[:200])
+    questions = tuple(
+        f"{section}.{key}: {remark}"
+        for section, lines in sections
+        for key, value, remark in lines
+        if value == "?"
+    )
+    return Proposal(_text(sections, logs, unmapped), questions, mapped, unmapped)
+
+
+def _layout_lines(layout: Layout) -> list[Line]:
+    plain = Layout()
+    return [
+        (key, getattr(layout, field), "")
+        for key, field in file_keys(Layout, "m").items()
+        if getattr(layout, field) != getattr(plain, field)
+    ]
+
+
+def _clocks(
+    columns: Sequence[Column], logs: Sequence[str]
+) -> tuple[list[Line], dict[str, list[Line]]]:
+    """Return the lines of `[clock]`, and those of the logs whose stamps are other ones."""
+    found = {name: _clock(columns, name, len(logs) > 1) for name in logs}
+    first = found[logs[0]]
+    return first, {name: found[name] for name in logs[1:] if found[name] != first}
+
+
+def _clock(columns: Sequence[Column], log: str, several: bool) -> list[Line]:
+    for column in columns:
+        if column.log != log or column.reading.channel != "time":
+            continue
+        steps = np.diff(column.values)
+        if column.kind == "text" or not steps.size or np.nanmin(steps) < 0.0:
+            continue
+        lines: list[Line] = [("from", column.name, "")]
+        if column.kind == "dates":
+            return [*lines, ("date", "iso", "")]
+        unit = column.reading.unit
+        if unit:
+            return [*lines, ("unit", unit, "by its name")]
+        return [*lines, ("unit", *_one_of(sizes.time_units(steps), f"steps of {steps[0]:.6g}"))]
+    if several:
+        return [("from", "?", "the column with the time: several logs need their stamps")]
+    return [("rate_Hz", "?", "no column holds the time: how many rows come in a second?")]
+
+
+def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
+    """Return the column of each channel; of several, one whose name is sure, then the first.
+
+    A place that may be at either end is the computed one where the grip has its own.
+    """
+    chosen: dict[str, Column] = {}
+    for column in sorted(columns, key=lambda c: (c.reading.either_end, not c.reading.sure)):
+        channel, unit = column.reading.channel, column.reading.unit
+        if not channel or column.kind in ("text", "dates") or not _fits(unit, channel):
+            continue
+        if channel in chosen and column.reading.either_end:
+            channel = channel.replace("_deflection_", "_computed_")
+        chosen.setdefault(channel, column)
+    return chosen
+
+
+def _fits(unit: str, channel: str) -> bool:
+    if not unit:
+        return True
+    given, own = parse_unit(unit), parse_unit(own_unit(channel))
+    return given is not None and own is not None and given.dimension == own.dimension
+
+
+def _control(channel: str, rig: Rig | None) -> Control | None:
+    name = channel.partition("_")[0]
+    return rig.controls.get(name) if rig is not None and name in CONTROL_NAMES else None
+
+
+def _channel_lines(channel: str, column: Column, control: Control | None, main: str) -> list[Line]:
+    remark = "" if column.reading.sure else "is it this? its name leaves that open"
+    lines: list[Line] = [("from", column.name, remark)]
+    if column.log != main:
+        lines.append(("log", column.log, ""))
+    if column.kind == "lists":
+        lines.append(("element", "?", f"which of the {column.length} in each cell, from 1"))
+    sign = sizes.kept_sign(column.values)
+    magnitude = sign == "" and column.moves and np.nanmin(column.values) >= 0.0
+    if sign:
+        key, _, value = sign.partition(" = ")
+        lines.append((key, "?", f"never negative, and its counts fit {value}: is it so?"))
+    elif magnitude and "force" in channel:
+        lines.append(("sign", "?", "never negative: 1 or -1, if the hand only pulled; a size"))
+    unit = column.reading.unit
+    if unit:
+        lines.append(("unit", unit, ""))
+    elif sizes.are_counts(column.values):
+        known = " or ".join(units_like(_own(channel))[:4])
+        lines.append(("unit", "?", f"whole counts: give {known}, with scale and offset"))
+    else:
+        peak = float(np.nanmax(np.abs(column.values), initial=0.0))
+        fit = sizes.units_that_fit(channel, column.values, control)
+        lines.append(("unit", *_one_of(fit, f"reaches {peak:.4g}")))
+    return lines
+
+
+def _own(channel: str) -> Unit:
+    unit = parse_unit(own_unit(channel))
+    assert unit is not None
+    return unit
+
+
+def _one_of(fit: Sequence[str], size: str) -> tuple[str, str]:
+    """Return the only unit that fits, or the question."""
+    if len(fit) == 1:
+        return fit[0], f"by its size: {size}"
+    return "?", f"{size}: {' or '.join(fit)}" if fit else f"{size}: which unit?"
+
+
+def _signs(
+    sections: list[tuple[str, list[Line]]], chosen: Mapping[str, Column]
+) -> list[tuple[str, list[Line]]]:
+    """Return the sections, with a question where force and deflection move against each other."""
+    for control in CONTROL_NAMES:
+        own = {c: col for c, col in chosen.items() if c.startswith(control) and not col.length}
+        force = own.get(f"{control}_force_N")
+        moved = next((own[c] for c in own if "computed" in c or "deflection" in c), None)
+        if force is None or moved is None or force.log != moved.log:
+            continue
+        if sizes.kept_sign(force.values) or sizes.kept_sign(moved.values):
+            continue  # their raw counts say nothing of a direction
+        there = np.isfinite(force.values) & np.isfinite(moved.values)
+        if there.any() and move_oppositely(force.values[there], moved.values[there]):
+            remark = f"moves against {moved.name}: -1 here, or there? a pull is positive in both"
+            for name, lines in sections:
+                if name == f"channels.{control}_force_N":
+                    lines.append(("sign", "?", remark))
+    return sections
+
+
+def _text(
+    sections: Sequence[tuple[str, list[Line]]], logs: Sequence[str], unmapped: Sequence[str]
+) -> str:
+    rows = [
+        f"# A map for {', '.join(logs)}, proposed from names, units and sizes. Read it through:",
+        '# a "?" asks what the log does not say, and the map is refused until each is answered.',
+    ]
+    for name, lines in sections:
+        if not lines:
+            continue
+        rows += ["", f"[{name}]"]
+        for key, value, remark in lines:
+            text = json.dumps(value, ensure_ascii=False)
+            rows.append(f"{key} = {text}" + (f"  # {remark}" if remark else ""))
+    if unmapped:
+        rows += ["", "# Not used:", *(_left(name) for name in unmapped)]
+    return "\n".join(rows) + "\n"
+
+
+def _left(name: str) -> str:
+    arm = "  (a torque: over its arm, as scale, it is a force)" if is_torque(words_of(name)) else ""
+    return f"# {json.dumps(name, ensure_ascii=False)[1:-1]}{arm}"

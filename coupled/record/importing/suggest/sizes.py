@@ -1,0 +1,91 @@
+"""What the size of a column's numbers says of its unit and sign, where it says one thing only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.record.importing.mapping import factor_of, own_unit
+from coupled.rig.parameters import Control
+from coupled.units import parse_unit
+
+Floats = NDArray[np.float64]
+# The largest that a channel reaches in a test, in its own unit: from a gentle one to the limit.
+_PEAKS = {
+    "m": (0.01, 0.5),
+    "rad": (0.02, 3.5),
+    "N": (1.0, 2500.0),
+    "Pa": (100.0, 60_000.0),
+    "m/s": (10.0, 400.0),
+    "rad/s": (0.01, 3.0),
+    "g": (0.5, 6.0),
+}
+_UNITS = {
+    "m": ("m", "cm", "mm", "in"),
+    "rad": ("rad", "deg"),
+    "N": ("N", "daN", "lbf", "kgf"),
+    "Pa": ("Pa", "hPa", "kPa", "psf"),
+    "m/s": ("m/s", "km/h", "kt", "ft/s"),
+    "rad/s": ("rad/s", "deg/s"),
+    "g": ("g",),
+}
+_ALTITUDES = ("m", "ft")
+RATES_Hz = (5.0, 5000.0)  # what a test is logged at
+TIMES = ("s", "ms", "us", "ns")
+COUNTS = 100.0  # whole numbers that reach further are an encoder's, or a converter's
+
+
+def units_that_fit(channel: str, values: Floats, control: Control | None = None) -> list[str]:
+    """Return the units in which a channel's largest value is a real one.
+
+    `control` is the rig's, whose travel narrows it: a test goes through a tenth of it at least.
+    """
+    if channel == "altitude_m":
+        return list(_ALTITUDES)
+    own = own_unit(channel)
+    if own not in _PEAKS:
+        return [own] if own != "1" else ["1"]
+    least, most = _PEAKS[own]
+    if control is not None and own in ("m", "rad") and "deflection" in channel + "computed":
+        least, most = 0.1 * control.travel, 1.2 * control.travel
+    peak = float(np.nanmax(np.abs(values), initial=0.0))
+    return [u for u in _UNITS[own] if least <= peak * factor_of(channel, u, "") <= most]
+
+
+def time_units(steps: Floats) -> list[str]:
+    """Return the units of time in which the median step is that of a test's log."""
+    step = float(np.median(steps)) if steps.size else 0.0
+    fit = []
+    for name in TIMES:
+        unit = parse_unit(name)
+        if unit is not None and step > 0.0:
+            rate = 1.0 / (step * unit.factor)
+            fit += [name] if RATES_Hz[0] <= rate <= RATES_Hz[1] else []
+    return fit
+
+
+def are_counts(values: Floats) -> bool:
+    """Tell whether a column holds whole numbers as large as those of an encoder."""
+    there = values[np.isfinite(values)]
+    return bool(there.size and np.all(there == np.rint(there)) and np.ptp(there) >= COUNTS)
+
+
+def kept_sign(values: Floats) -> str:
+    """Return in which way counts that are never negative may keep a sign, in words, or "".
+
+    With a bit of its own for the sign, small and large numbers are met and none between.
+    """
+    there = values[np.isfinite(values)]
+    if not there.size or there.min() < 0.0 or not are_counts(values):
+        return ""
+    for bit in range(7, 33):
+        half = 2.0**bit
+        above = there[there >= half]
+        below = there[there < half]
+        if not (above.size and below.size and there.max() < 2.0 * half):
+            continue
+        if below.max() < 0.6 * half and above.max() < 1.6 * half:
+            return f"sign_bit = {bit}"
+        if below.max() < 0.6 * half and above.min() > 1.4 * half:
+            return f"wraps_at = {2 * half:.0f}"
+    return ""

@@ -1,0 +1,191 @@
+"""A map proposed for an unknown log: what is certain is filled in, what is not is asked."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from coupled.errors import InputError
+from coupled.record.channels import record_channels
+from coupled.record.importing.convert import import_log
+from coupled.record.importing.mapping import own_unit
+from coupled.record.importing.suggest.dialect import guess_layout
+from coupled.record.importing.suggest.names import read_name
+from coupled.record.importing.suggest.propose import Proposal, propose
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled
+from tests.support.logs import FORCE_N, GOOD, DEFLECTION_m, TIME_s
+
+SHARED = Path(__file__).parents[4] / "shared" / "real" / "so101" / "raw" / "friction_gravity"
+
+
+def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
+    proposal = propose([path], read_rig(shipped_rigs()[rig]) if rig else None)
+    return proposal, tomllib.loads(proposal.text)
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "unit"),
+    [
+        ("FORCE_LB", "column_force_N", "lbf"),
+        ("wheelForce [daN]", "wheel_force_N", "daN"),
+        ("stick_pos_mm", "column_deflection_m", "mm"),
+        ("Pedal encoder", "pedals_computed_m", ""),
+        ("column_modifying_force_N", "column_modifying_force_N", "N"),
+        ("Pitch Rate (deg/s)", "pitch_rate_rad_per_s", "deg/s"),
+        ("q_deg_s", "pitch_rate_rad_per_s", "deg/s"),
+        ("QBAR", "dynamic_pressure_Pa", ""),
+        ("True Airspeed [kt]", "true_airspeed_m_per_s", "kt"),
+        ("elevator_deg", "elevator_rad", "deg"),
+        ("Nz", "load_factor", ""),
+        ("timestamp", "time", ""),
+        ("Time (ms)", "time", "ms"),
+        ("torque_Nm", "", ""),
+        ("Mode", "", ""),
+        ("hand grip", "column_deflection_m", ""),
+    ],
+)
+def test_a_name_says_what_it_says(name: str, channel: str, unit: str) -> None:
+    found = read_name(name)
+    assert (found.channel, found.unit) == (channel, unit)
+
+
+def test_every_channel_of_a_record_is_known_by_its_own_name() -> None:
+    for name in record_channels(["column", "wheel", "pedals"], flown=True)[1:]:
+        assert read_name(name).channel == name
+        assert read_name(name).unit == own_unit(name)
+
+
+GERMAN = {"delimiter": ";", "decimal": ","}
+
+
+@pytest.mark.parametrize(
+    ("name", "made", "layout"),
+    [
+        ("log.csv", GOOD, {}),
+        ("log.tsv", GOOD.replace(",", "\t"), {"delimiter": "\t"}),
+        ("log.txt", GOOD.replace(",", "  "), {"delimiter": " "}),
+        ("log.csv", GOOD.replace(",", ";").replace(".", ","), GERMAN),
+        ("log.csv", "Rig 7\ntest 3\n" + GOOD, {"skip_rows": 2}),
+        ("log.csv", "# made by x\n# and y\n" + GOOD, {"comment": "#"}),
+        ("log.csv", GOOD.replace("\n", "\nms,lbf,in\n", 1), {"units_row": True}),
+        ("log.csv", GOOD.partition("\n")[2], {"header": False}),
+        (
+            "log.csv",
+            GOOD.replace("0,", "n/a,", 1).replace("D\n", "D\n0,1,2\n"),
+            {"missing": ["n/a"]},
+        ),
+    ],
+)
+def test_a_layout_is_seen(tmp_path: Path, name: str, made: str, layout: dict[str, Any]) -> None:
+    (tmp_path / name).write_text(made)
+    found = guess_layout(tmp_path / name)
+    plain = {"delimiter": ",", "decimal": ".", "comment": "", "skip_rows": 0, "header": True}
+    plain |= {"units_row": False, "missing": []}
+    assert {key: getattr(found, key) for key in plain} == {**plain, **layout}
+
+
+def test_utf_16_and_latin_1_are_seen(tmp_path: Path) -> None:
+    for encoding in ("utf-16", "latin-1"):
+        (tmp_path / "log.csv").write_bytes(GOOD.replace("F", "F°", 1).encode(encoding))
+        assert guess_layout(tmp_path / "log.csv").encoding == encoding
+
+
+def test_a_proposal_without_questions_imports_as_it_is(tmp_path: Path) -> None:
+    table = {
+        "t": TIME_s,
+        "column force [lbf]": FORCE_N / 4.4482216152605,
+        "column encoder [mm]": 1e3 * DEFLECTION_m,
+        "QBAR_psf": np.full(TIME_s.size, 100.0),
+    }
+    pl.DataFrame(table).write_csv(tmp_path / "log.csv")
+    proposal, _ = proposed(tmp_path / "log.csv")
+    assert proposal.questions == ()
+    (tmp_path / "map.toml").write_text(proposal.text)
+    record, _ = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(record["column_computed_m"], DEFLECTION_m, rtol=1e-9, atol=1e-12)
+    assert record["dynamic_pressure_Pa"][0] == pytest.approx(4788.03, rel=1e-5)
+
+
+def test_an_open_unit_is_asked_and_its_map_refused(tmp_path: Path) -> None:
+    pl.DataFrame({"t": TIME_s, "column force": FORCE_N}).write_csv(tmp_path / "log.csv")
+    proposal, table = proposed(tmp_path / "log.csv")
+    assert table["channels"]["column_force_N"]["unit"] == "?"
+    assert "N or daN or lbf" in proposal.questions[0]
+    (tmp_path / "map.toml").write_text(proposal.text)
+    with pytest.raises(InputError, match=r"map.toml: channels.column_force_N.unit: '\?'"):
+        import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+
+
+def test_a_rigs_travel_settles_what_size_alone_leaves_open(tmp_path: Path) -> None:
+    inches = {"t": TIME_s, "column encoder": 5.0 * np.sin(TIME_s)}  # or centimetres
+    pl.DataFrame(inches).write_csv(tmp_path / "log.csv")
+    assert proposed(tmp_path / "log.csv")[1]["channels"]["column_computed_m"]["unit"] == "?"
+    travel = read_rig(shipped_rigs()["737"]).controls["column"].travel
+    assert 0.05 < travel < 0.5
+    _, table = proposed(tmp_path / "log.csv", "737")
+    assert table["channels"]["column_computed_m"]["unit"] in ("?", "in", "cm")
+    millimetres = {"t": TIME_s, "column encoder": 900.0 * travel * np.sin(TIME_s)}
+    pl.DataFrame(millimetres).write_csv(tmp_path / "log.csv")
+    _, table = proposed(tmp_path / "log.csv", "737")
+    assert table["channels"]["column_computed_m"]["unit"] == "mm"
+
+
+def test_signs_and_counts_are_asked_and_not_guessed(tmp_path: Path) -> None:
+    counts = np.rint(10.0 * FORCE_N)
+    table = {
+        "t": TIME_s,
+        "wheel load": np.where(counts < 0, 1024 - counts, counts),
+        "column force [N]": -FORCE_N,
+        "column encoder [m]": DEFLECTION_m,
+    }
+    pl.DataFrame(table).write_csv(tmp_path / "log.csv")
+    proposal, found = proposed(tmp_path / "log.csv")
+    assert found["channels"]["wheel_force_N"]["sign_bit"] == "?"
+    assert found["channels"]["wheel_force_N"]["unit"] == "?"
+    assert found["channels"]["column_force_N"]["sign"] == "?"
+    assert any("fit 10" in question for question in proposal.questions)
+    assert any("moves against column encoder" in question for question in proposal.questions)
+
+
+def test_two_logs_of_an_arm_are_seen_through(tmp_path: Path) -> None:
+    files = [SHARED / "control.csv", SHARED / "state_motor.csv"]
+    if not SHARED.exists():
+        head = {"control.csv": "timestamp,positions", "state_motor.csv": "timestamp,positions"}
+        files = [tmp_path / name for name in head]
+        for file in files:
+            rows = [f'{20_000 * k},"[0.1, {0.01 * (k % 9)}]"' for k in range(200)]
+            file.write_text(head[file.name] + "\n" + "\n".join(rows))
+    text = propose(files).text
+    table = tomllib.loads(text)
+    assert table["clock"] == {"from": "timestamp", "unit": "us"}
+    assert table["channels"]["column_computed_m"]["from"] == "positions"
+    assert table["channels"]["column_deflection_m"]["log"] == "state_motor.csv"
+    assert table["channels"]["column_deflection_m"]["element"] == "?"
+
+
+def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
+    for content in ("", "a,b\n", "hello world of words\n" * 9, "x,y\n" + "1,2\n" * 9):
+        (tmp_path / "log.csv").write_text(content)
+        with pytest.raises(InputError, match=r"log.csv"):
+            propose([tmp_path / "log.csv"])
+
+
+def test_the_command_writes_a_map_and_asks(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(GOOD.replace("F", "FORCE_LB", 1))
+    done = coupled(tmp_path, "import", "log.csv", "--suggest", "map.toml")
+    assert done.returncode == 0, done.stderr
+    assert "column_force_N  FORCE_LB" in done.stdout
+    assert (tmp_path / "map.toml").exists()
+    neither = coupled(tmp_path, "import", "log.csv")
+    assert neither.returncode == 2
+    assert "--suggest" in neither.stderr
+    onto = coupled(tmp_path, "import", "log.csv", "--suggest", "log.csv")
+    assert onto.returncode == 2
