@@ -43,6 +43,7 @@ from coupled.rig.compiled import bound
 from coupled.rig.equations import specified_gradient
 from coupled.rig.frame import addresses, step_frame_at
 from coupled.rig.packing import pack
+from coupled.rig.recorder import lateness, stamp
 from coupled.timing import timed
 
 Progress = Callable[[int, int], None]
@@ -71,6 +72,7 @@ def fly(
     controls = pack(rig, {str(name): action.hand for name, action in actions.items()})
     script = _script(names, actions, frames * substeps + 1, h)
     data = _noise(channels, rig.noise, frames, manoeuvre.seed)
+    noise = data.copy() if lateness(rig) else None
     hands = controls["state"]["hand"]
     looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
     extra: list[tuple[float, ...]] = []
@@ -109,6 +111,8 @@ def fly(
         data = data[: lost[0]]
         ended = EndedEarly("the state is not finite", int(lost[0]) / rig.frame_rate)
     data[:, 0] = np.arange(len(data)) / rig.frame_rate
+    if noise is not None:
+        stamp(rig, channels, data, noise[: len(data)])
     if asked:
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))

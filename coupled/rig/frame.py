@@ -84,7 +84,7 @@ def host_frame(
 
     sampled = s.sensing.computed if p.sensing.skewed else computed
     force_read = read_force(p.sensing, sampled_force(p, s), out[0])
-    computed_read = read_computed(p.sensing, sampled, out[1])
+    computed_read = read_computed(p.sensing, sampled, m.frames, out[1])
     if p.modification.late > 0:
         keep_last(m)
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
@@ -96,6 +96,7 @@ def host_frame(
 
     out[0] = force_read
     out[1] = computed_read
+    out[2] += p.sensing.deflection_zero
     out[2] += transducer(p.linkage, deflection(p.linkage, s.linkage, force))
     out[3] = estimated
     out[4] = first

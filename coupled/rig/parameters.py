@@ -111,6 +111,10 @@ class Sensing(Section):
     gauge_sampling: float = quantity("Hz", 0.0, ge=0)
     computed_skew: float = quantity("s", 0.0, ge=0)
     force_skew: float = quantity("s", 0.0, ge=0)
+    force_zero: float = quantity("N", 0.0)
+    deflection_zero: float = quantity("{d}", 0.0)
+    scale_drift: float = quantity("per_s", 0.0, ge=-0.1, le=0.1)
+    force_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gradient_skew: float = quantity("s", 0.0, ge=0)
 
     @property
@@ -209,6 +213,7 @@ class Flight(Section):
     pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
     cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
     fuel: float = quantity("", 1.0, ge=0, le=100)
+    motion_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gust_rms: float = quantity("m_per_s", 0.0, ge=0, le=30)
     gust_length: float = quantity("m", 150.0, gt=0)
     properties: dict[str, float] = {}

@@ -24,6 +24,7 @@ from coupled.rig.modification import set_gradients
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
+from coupled.rig.sensing import scale_at
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -201,7 +202,7 @@ def _loader(
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
-        read = p.sensing.read_scale * s.loader.computed + misread[k]
+        read = scale_at(p.sensing, k) * s.loader.computed + misread[k]
         out[1, k] = set_product(p, m, s.loader.computed, read)
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])

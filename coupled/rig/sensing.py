@@ -12,6 +12,10 @@ real ones.
 A host reads its channels one after the other. With a skew, the δc or F of the frame at t_k is
 that of t_k − skew, straight between the loader's nodes; what it puts out may come late, too
 (`modification`).
+
+A gauge or a transducer may have a zero that is off, and S₁ may drift: δc read at t_k is then
+S₁·(1 + rate·t_k)·δc over what is assumed. Channels that are stamped late against the others are
+the recorder's doing (`recorder`).
 """
 
 from __future__ import annotations
@@ -29,7 +33,10 @@ class SensingParameters(Protocol):
     """Scales and converter steps, already divided into the quantity's own unit."""
 
     read_scale: float  # S₁ real over assumed, as the host reads v₁
+    scale_drift: float  # by what share that grows in a frame
     force_scale: float  # S₃ real over assumed
+    force_zero: float  # what is read without a force, N
+    deflection_zero: float  # what the transducer at the grip reads at neutral, d
     computed_step: float  # converter step of δc, d; 0 for none
     computed_range: float  # converter range of δc, d
     force_step: float  # of F, N
@@ -71,7 +78,10 @@ def _step(of: str) -> Callable[[Given], float]:
 SENSING = Declaration(
     layout(SensingParameters),
     section="control.sensing",
-    derived={"read_scale": lambda g: g.control.sensing.read_scale}
+    derived={
+        "read_scale": lambda g: g.control.sensing.read_scale,
+        "scale_drift": lambda g: g.control.sensing.scale_drift * g.frame_s,
+    }
     | {f"{of}_range": _range(of) for of in _SCALES}
     | {f"{of}_step": _step(of) for of in _SCALES}
     | {
@@ -107,12 +117,19 @@ def sample(
 
 
 @stage
-def read_computed(p: SensingParameters, computed: float, noise: float) -> float:
+def scale_at(p: SensingParameters, frame: int) -> float:
+    """Return δc as the host reads it at a frame over what it is."""
+    return p.read_scale * (1.0 + p.scale_drift * frame)
+
+
+@stage
+def read_computed(p: SensingParameters, computed: float, frame: int, noise: float) -> float:
     """Return δc as the host reads it, d: v₁ of eq. (2), by the scale that it assumes."""
-    return converted(p.read_scale * computed + noise, p.computed_step, p.computed_range)
+    return converted(scale_at(p, frame) * computed + noise, p.computed_step, p.computed_range)
 
 
 @stage
 def read_force(p: SensingParameters, force: float, noise: float) -> float:
     """Return F as the host reads it, N."""
-    return converted(p.force_scale * force + noise, p.force_step, p.force_range)
+    read = p.force_scale * force + (noise + p.force_zero)
+    return converted(read, p.force_step, p.force_range)

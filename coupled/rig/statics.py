@@ -125,7 +125,7 @@ def _along(controls: ControlArray, pressure: float, computed: Floats, out: Float
         out[0, i] = force
         out[1, i] = x + bend(p.linkage, force)
         read, force_read = p.sensing.read_scale * x, p.sensing.force_scale * force
-        out[2, i] = estimate(p.compensation, read, force_read)
+        out[2, i] = estimate(p.compensation, read, force_read + p.sensing.force_zero)
 
 
 @entry

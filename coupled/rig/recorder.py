@@ -1,0 +1,55 @@
+"""Recorder: channels of a record that are stamped late, or early, against the others.
+
+What is stamped so late was true so much before; between frames it goes along a cubic spline. The
+host knows nothing of it. Before the first frame and after the last a channel stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.record.channels import ELEVATOR, PRESSURE, channel, motion_channels
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+def stamped(signal: Floats, late: float) -> Floats:
+    """Return a signal as recorded, stamped so many frames late; frames along the first axis."""
+    if late == 0.0:
+        return signal
+    from scipy.interpolate import CubicSpline  # a flight without it starts sooner
+
+    at = np.arange(len(signal), dtype=np.float64)
+    return np.asarray(CubicSpline(at, signal)(np.clip(at - late, 0.0, at[-1])))
+
+
+def moved_channels(controls: Sequence[str]) -> tuple[str, ...]:
+    """Return the channels that are of the aircraft's motion, and neither q̄ nor a surface."""
+    every = motion_channels(controls, flown=True)
+    return tuple(
+        name
+        for i, name in enumerate(every)
+        if i not in (PRESSURE, ELEVATOR) and name not in ("aileron_rad", "rudder_rad")
+    )
+
+
+def lateness(rig: Rig) -> dict[str, float]:
+    """Return by how many frames each channel is stamped late, of those that are."""
+    late: dict[str, float] = {}
+    for name, control in rig.controls.items():
+        late[channel(name, "force")] = control.sensing.force_stamp * rig.frame_rate
+    if rig.flight is not None:
+        moved = moved_channels([str(name) for name in rig.controls])
+        late |= dict.fromkeys(moved, rig.flight.motion_stamp * rig.frame_rate)
+    return {name: frames for name, frames in late.items() if frames != 0.0}
+
+
+def stamp(rig: Rig, channels: Sequence[str], data: Floats, noise: Floats) -> None:
+    """Stamp a record's channels, shape (frames, channels), in place; their noise stays."""
+    for name, late in lateness(rig).items():
+        at = channels.index(name)
+        data[:, at] = stamped(data[:, at] - noise[:, at], late) + noise[:, at]
