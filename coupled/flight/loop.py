@@ -105,11 +105,7 @@ def fly(
                     progress(done, frames)
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
-    data = data[:done]
-    lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
-    if lost.size:
-        data = data[: lost[0]]
-        ended = EndedEarly("the state is not finite", int(lost[0]) / rig.frame_rate)
+    data, ended = _finite(data[:done], rig.frame_rate, ended)
     data[:, 0] = np.arange(len(data)) / rig.frame_rate
     if noise is not None:
         stamp(rig, channels, data, noise[: len(data)])
@@ -117,6 +113,16 @@ def fly(
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
     return Record(channels, data, _manifest(manoeuvre, channels, data, ended))
+
+
+def _finite(
+    data: Floats, rate_Hz: float, ended: EndedEarly | None
+) -> tuple[Floats, EndedEarly | None]:
+    """Return a record up to where its state is lost, and why the flight ended."""
+    lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
+    if not lost.size:
+        return data, ended
+    return data[: lost[0]], EndedEarly("the state is not finite", int(lost[0]) / rate_Hz)
 
 
 def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = None) -> Airframe:

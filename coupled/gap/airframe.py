@@ -24,6 +24,7 @@ from coupled.record.channels import SPEED, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
+from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
 from coupled.schema import changed
 
@@ -54,6 +55,7 @@ class Model:
         """Return the compared channels as `rig` has them, shape (frames, channels)."""
         flight = rig.flight
         assert flight is not None
+        flight = changed(flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         for known, flown in self._flown:
             if known == flight:
                 return flown
@@ -113,7 +115,9 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
         loose = spread([carried[:, i]], own)
 
         def predict(other: Rig, i: int = i) -> Floats:
-            return np.asarray(model.motion(other)[:, i])
+            assert other.flight is not None
+            late = other.flight.motion_stamp * other.frame_rate
+            return stamped(np.asarray(model.motion(other)[:, i]), late)
 
         outputs.append(
             Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)

@@ -20,6 +20,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice, search
+from coupled.gap.compensation import compensation_gap
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
@@ -27,7 +28,7 @@ from coupled.gap.result import (
     StageResult,
 )
 from coupled.gap.shrink import floors_of, shrink
-from coupled.gap.stages import Reader, compensation_gap
+from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import remains, where
@@ -187,8 +188,12 @@ class _Judge:
             return StageResult(name, why="constant gradient")
         if name == "compensation":
             able = [r for r in self.readers if "compensation" not in r.missing()]
-            gap = max(compensation_gap(reader) for reader in able)
-            return StageResult(name, gap, limit=GUILTY_FROM, guilty=gap > GUILTY_FROM)
+            improved = self.choice.fit.rig
+            gap, left = (
+                max(compensation_gap(r, rig) for r in able) for rig in (self.rig, improved)
+            )
+            guilty = left > GUILTY_FROM
+            return StageResult(name, gap, limit=GUILTY_FROM, left=left, guilty=guilty)
         if name == "surface" and flown:
             return StageResult(name, why="the aircraft moves it, too")
         if name == "airframe" and flown:

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from coupled.gap.effect import Effect
-from coupled.gap.entries import factor, one
+from dataclasses import replace
+
+from coupled.gap.effect import Effect, Parameter
+from coupled.gap.entries import added, factor, one
+
+
+def _force(name: str, parameter: Parameter, x: str, y: str) -> Effect:
+    """Return an effect of what is read, or recorded, of the force."""
+    return replace(one("sensing", name, parameter, x, y), outputs=("loader", "linkage"))
+
 
 SENSING: tuple[Effect, ...] = (
     one(
@@ -11,5 +19,44 @@ SENSING: tuple[Effect, ...] = (
         "deflection_scale",
         factor("sensing.deflection_scale", 1.03),
         *("computed", "computed_left"),
+    ),
+    _force(
+        "force_scale",
+        factor("sensing.force_scale", 1.03),
+        *("force", "missing"),
+    ),
+    _force(
+        "force_zero",
+        added("offset_N", "sensing.force_zero_N", -100, 100, 1.0),
+        *("force", "missing"),
+    ),
+    replace(
+        one(
+            "sensing",
+            "deflection_zero",
+            added("offset_{d}", "sensing.deflection_zero_{d}", -0.2, 0.2, 1e-3),
+            *("computed", "deflection_left"),
+        ),
+        outputs=("linkage",),
+    ),
+    one(
+        "sensing",
+        "scale_drift",
+        added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
+        *("computed", "computed_left", "loop", 1e4),
+    ),
+    _force(
+        "force_skew",
+        added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01),
+        *("speed", "missing"),
+    ),
+    replace(
+        one(
+            "sensing",
+            "motion_skew",
+            added("delay_s", "flight.motion_stamp_s", -0.4, 0.4, 0.05),
+            *("elevator", "pitch_rate", "loop", 4.0),
+        ),
+        outputs=("airframe",),
     ),
 )

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.output import Output, Predict, echoed, spread, white
+from coupled.gap.sensed import Sensed
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.gap.thresholds import (
     ECHO_SHARE,
@@ -39,7 +40,6 @@ from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
     on_nodes,
-    replay_compensation,
     replay_product,
     replay_schedule,
     replay_surface,
@@ -195,9 +195,11 @@ class Reader:
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
             def predict(rig: Rig) -> Floats:
-                scale = rig.controls[self.control].sensing.read_scale
+                sensed = Sensed(rig, self.control)
+                scale = sensed.scale(len(seen))
                 restart = (every, seen / scale, rate / scale)
-                driven_by = (nodes, gradient, misread, load, second, restart)
+                pull = sensed.force_on_nodes(nodes, f)
+                driven_by = (pull, gradient, misread, load, second, restart)
                 return scale * drive_loader(rig, self.control, *driven_by)[0]
 
             return predict
@@ -234,9 +236,8 @@ class Reader:
         unsure = near & (np.abs(jump) > PRELOAD_UNSURE * white(product))
 
         def predict(rig: Rig, seen: Floats = smooth) -> Floats:
-            data = rig.controls[self.control]
-            digital = data.loader.multiplier == "digital"
-            read = computed if digital else seen / data.sensing.read_scale
+            digital = rig.controls[self.control].loader.multiplier == "digital"
+            read = computed if digital else seen / Sensed(rig, self.control).scale(len(seen))
             return np.where(unsure, product, made(rig, read))
 
         def noisy(rig: Rig, k: int) -> Floats:
@@ -257,8 +258,9 @@ class Reader:
             nodes = on_nodes(self.rig, c)
 
             def predict(rig: Rig) -> Floats:
-                scale = rig.controls[self.control].sensing.read_scale
-                return drive_linkage(rig, self.control, nodes / scale, f, others)
+                sensed = Sensed(rig, self.control)
+                at, pull = nodes / sensed.scale_on_nodes(len(nodes)), sensed.force(f)
+                return sensed.zero + drive_linkage(rig, self.control, at, pull, others)
 
             return predict
 
@@ -290,11 +292,3 @@ class Reader:
         left = measured - position(np.concatenate(([0.0], command[:-1])))
         floor = float(np.hypot(white(left), SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
-
-
-def compensation_gap(reader: Reader) -> float:
-    """Return the rms departure of the host's δ̂ from its own arithmetic, over δc's noise."""
-    computed, force = reader.signal("computed"), reader.signal("force")
-    made = replay_compensation(reader.rig, reader.control, computed, force, reader.others())
-    floor = max(white(computed), ROUNDING_SPAN * float(np.ptp(computed)))
-    return float(np.sqrt(np.mean((reader.signal("estimate") - made) ** 2))) / floor

@@ -1,7 +1,8 @@
 """Recorder: channels of a record that are stamped late, or early, against the others.
 
-What is stamped so late was true so much before; between frames it goes along a cubic spline. The
-host knows nothing of it. Before the first frame and after the last a channel stands.
+What is stamped so late was true so much before; between frames it goes along the cubic through
+the four next to it. The host knows nothing of it. Before the first frame and after the last a
+channel stands.
 """
 
 from __future__ import annotations
@@ -18,13 +19,21 @@ Floats = NDArray[np.float64]
 
 
 def stamped(signal: Floats, late: float) -> Floats:
-    """Return a signal as recorded, stamped so many frames late; frames along the first axis."""
+    """Return a signal as recorded, stamped so many frames late; shape (frames,), four or more."""
     if late == 0.0:
         return signal
-    from scipy.interpolate import CubicSpline  # a flight without it starts sooner
-
-    at = np.arange(len(signal), dtype=np.float64)
-    return np.asarray(CubicSpline(at, signal)(np.clip(at - late, 0.0, at[-1])))
+    last = len(signal) - 1
+    at = np.clip(np.arange(last + 1, dtype=np.float64) - late, 0.0, last)
+    k = np.clip(np.floor(at).astype(np.intp), 1, last - 2)
+    u = at - k
+    weights = (
+        -u * (u - 1.0) * (u - 2.0) / 6.0,
+        (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
+        -(u + 1.0) * u * (u - 2.0) / 2.0,
+        (u + 1.0) * u * (u - 1.0) / 6.0,
+    )
+    near = np.stack([signal[k + i] for i in (-1, 0, 1, 2)])
+    return np.asarray(np.sum(np.stack(weights) * near, axis=0))
 
 
 def moved_channels(controls: Sequence[str]) -> tuple[str, ...]:

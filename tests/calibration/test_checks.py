@@ -416,6 +416,10 @@ FAULTS: dict[str, dict[str, float]] = {
     "relaxation": {"stiffness_N_per_{d}": 3000.0, "time_s": 0.3},
     "force_limit": {"limit_N": 100.0},
     "deflection_scale": {"factor": 1.15},
+    "force_scale": {"factor": 1.8},
+    "force_zero": {"offset_N": 250.0},
+    "deflection_zero": {"offset_{d}": 0.02},
+    "scale_drift": {"per_s": 2e-3},
     "bend": {"bend_{d}_per_N": 2.0 * K_REPORT},
     "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},
     "backlash": {"play_{d}": 0.03},
@@ -440,6 +444,8 @@ UNSEEN = {
     "elevator_effectiveness": "the aircraft's",
     "pitch_damping": "the aircraft's",
     "vertical_gust": "the air's",
+    "force_skew": "the recorder's",
+    "motion_skew": "the recorder's",
 }
 FULL_rad = math.radians(25.0)
 TABLE = Path(__file__).parents[2] / "docs" / "calibration.md"

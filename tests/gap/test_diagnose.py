@@ -41,6 +41,12 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (False, "friction_ripple", {"ripple_N": 3.0, "period_{d}": 6e-3, "phase_rad": 0.5}),
     (False, "relaxation", {"stiffness_N_per_{d}": 300.0, "time_s": 0.6}),
     (False, "force_limit", {"limit_N": 20.0}),
+    (False, "force_scale", {"factor": 1.06}),
+    (False, "force_zero", {"offset_N": 2.0}),
+    (False, "deflection_zero", {"offset_{d}": 1e-3}),
+    (False, "scale_drift", {"per_s": 2e-3}),
+    (False, "force_skew", {"delay_s": 0.02}),
+    (True, "motion_skew", {"delay_s": 0.05}),
     (True, "deflection_scale", {"factor": 1.05}),
     (True, "bend", {"bend_{d}_per_N": 1.6e-4}),
     (False, "stiffening_bend", {"bend_{d}_per_N": 1.5e-4, "limit_{d}": 4e-3}),
@@ -63,6 +69,7 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
 LONG = {"viscous_damping", "gradient_error", "cubic_stiffness", "breakout", "bob_weight"}
 LONG |= {"force_offset", "digital_multiplier", "transport_delay", "deflection_scale"}
 LONG |= {"asymmetric_friction", "load_friction", "relaxation", "friction_ripple"}
+LONG |= {"force_scale", "force_zero", "scale_drift", "force_skew", "motion_skew"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from coupled.rig import sensing
 from coupled.rig.packing import pack
+from coupled.rig.standalone import run_control
 from tests.support.rigs import bench
 
 SCHEDULE = "controls.column.schedule"
@@ -34,8 +36,34 @@ def test_what_is_read_is_the_scale_times_the_quantity_and_the_noise_on_it() -> N
     prefix = "controls.column.sensing"
     rig = bench({f"{prefix}.deflection_scale": 1.1, f"{prefix}.force_scale": 0.9})
     p = pack(rig)[0]["parameters"]["sensing"]
-    assert sensing.read_computed(p, 0.05, 1e-3) == pytest.approx(0.056, rel=1e-12)
+    assert sensing.read_computed(p, 0.05, 0, 1e-3) == pytest.approx(0.056, rel=1e-12)
     assert sensing.read_force(p, -40.0, 0.5) == pytest.approx(-35.5, rel=1e-12)
+
+
+def test_zeros_and_a_scale_that_drifts_are_in_what_is_read_and_recorded() -> None:
+    prefix = "controls.column.sensing"
+    rig = bench(
+        {
+            f"{prefix}.deflection_scale": 1.1,
+            f"{prefix}.scale_drift_per_s": 2e-3,
+            f"{prefix}.force_scale": 0.9,
+            f"{prefix}.force_zero_N": -3.0,
+            f"{prefix}.deflection_zero_m": 2e-3,
+        }
+    )
+    p = pack(rig)[0]["parameters"]["sensing"]
+    frame = round(40.0 * rig.frame_rate)
+    assert sensing.read_computed(p, 0.05, frame, 1e-3) == pytest.approx(0.055 * 1.08 + 1e-3)
+    assert sensing.read_force(p, -40.0, 0.5) == pytest.approx(-38.5, rel=1e-12)
+    flat = np.full(1000, 1000.0)
+    pull = np.full(len(flat) * rig.substeps + 1, 30.0)
+    amiss = run_control(rig, "column", pull, flat)
+    steady = run_control(rig.changed({f"{prefix}.scale_drift_per_s": 0.0}), "column", pull, flat)
+    level = run_control(rig.changed({f"{prefix}.deflection_zero_m": 0.0}), "column", pull, flat)
+    np.testing.assert_allclose(amiss.force, 0.9 * 30.0 - 3.0, rtol=1e-12)
+    np.testing.assert_allclose(amiss.deflection - level.deflection, 2e-3, rtol=1e-9)
+    grown = amiss.computed[1:] / steady.computed[1:]
+    np.testing.assert_allclose(grown, 1.0 + 2e-3 * steady.time_s[1:], rtol=1e-9)
 
 
 def test_scales_and_word_length_set_the_steps() -> None:
