@@ -12,15 +12,25 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    as_completed,
+)
+from concurrent.futures import wait as wait_for
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, TypeVar
 
 from coupled.errors import InputError
 
 _PATIENCE_s = 10.0
+T = TypeVar("T")
 
 
 class Here(Executor):
@@ -31,6 +41,28 @@ class Here(Executor):
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
+
+
+def as_done(
+    pool: Executor, work: Callable[..., T], calls: Iterable[Sequence[Any]], ahead: int
+) -> Iterator[T]:
+    """Yield what `work` gives of each call's arguments, as soon as it is done, in any order.
+
+    No more than `ahead` calls wait for a worker, so that their arguments are made as they are
+    wanted. What a call raises is raised here.
+    """
+    waiting: set[Future[T]] = set()
+    for arguments in calls:
+        waiting.add(pool.submit(work, *arguments))
+        patience_s = None if len(waiting) >= ahead else 0.0
+        done, waiting = wait_for(waiting, patience_s, FIRST_COMPLETED)
+        yield from (future.result() for future in done)
+    yield from (future.result() for future in as_completed(waiting))
+
+
+def cores(workers: int) -> int:
+    """Return how many processes a number of workers means: 0 is one a core."""
+    return workers or os.cpu_count() or 1
 
 
 @contextmanager
@@ -102,7 +134,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     try:
         yield pool
     except (distributed.KilledWorker, CancelledError, OSError):
-        problem = f"{address} was lost; finished flights are kept, and the same command goes on"
+        problem = f"{address} was lost; what is finished is kept, and the same command goes on"
         raise InputError("--cluster", "", problem) from None
     finally:
         pool.shutdown(wait=False)

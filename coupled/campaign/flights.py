@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, as_completed, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -24,6 +24,7 @@ from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, plann
 from coupled.campaign.sweepfile import Survive
 from coupled.errors import InputError
 from coupled.flight.loop import fly
+from coupled.parallel import as_done
 from coupled.record.record import Record
 
 Progress = Callable[[str, int, int], None]
@@ -74,25 +75,13 @@ def fly_sweep(
     """
     todo = [flight for flight in planned_flights(plan) if flight.number not in journal.done]
     every = len(journal.done) + len(todo)
-    for done, entry in enumerate(_entries(plan, todo, pool), 1):
+    packed = pickle.dumps(plan)
+    calls = [(packed, flight) for flight in todo]
+    for done, entry in enumerate(as_done(pool, _fly_packed, calls, _AHEAD), 1):
         journal.add(entry)
         if progress is not None:
             progress(f"{len(journal.done)} of {every} flights", done, len(todo))
     return table(plan, journal.entries())
-
-
-def _entries(
-    plan: SweepPlan, todo: Sequence[PlannedFlight], pool: Executor
-) -> Iterator[JournalEntry]:
-    """Yield each flight as soon as it is done; a bounded number of them waits."""
-    waiting: set[Future[JournalEntry]] = set()
-    packed = pickle.dumps(plan)
-    for flight in todo:
-        waiting.add(pool.submit(_fly_packed, packed, flight))
-        patience_s = None if len(waiting) >= _AHEAD else 0.0
-        done, waiting = wait(waiting, patience_s, FIRST_COMPLETED)
-        yield from (future.result() for future in done)
-    yield from (future.result() for future in as_completed(waiting))
 
 
 def _fly_packed(packed: bytes, flight: PlannedFlight) -> JournalEntry:

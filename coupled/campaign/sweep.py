@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -17,7 +16,7 @@ from coupled.campaign.journal import opened
 from coupled.campaign.plan import SweepPlan, plan_from_table, read_plan
 from coupled.campaign.sensitivity import SobolIndex, sensitivity
 from coupled.campaign.survival import SurvivalLimit, limits
-from coupled.parallel import executor
+from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
 
@@ -88,7 +87,7 @@ def sweep(
     with ExitStack() as stack:
         kept = Path(folder) if folder is not None else None
         place = kept or Path(stack.enter_context(tempfile.TemporaryDirectory())) / "sweep"
-        pool = stack.enter_context(executor(workers or os.cpu_count() or 1, cluster))
+        pool = stack.enter_context(executor(cores(workers or 0), cluster))
         journal = stack.enter_context(opened(place, plan))
         found = len(journal.done)
         if begun is not None:

@@ -86,6 +86,13 @@ def _run() -> int:
     return REFUSED
 
 
+def check_cluster(workers: int | None, cluster: str) -> tuple[int, str]:
+    """Return the number of workers, 0 for one a core, and the address of a cluster or ""."""
+    if cluster and workers is not None:
+        raise InputError("--workers", "", "a cluster has its own; leave it out")
+    return workers or 0, cluster
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         out.print(f"coupled {__version__}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, app, check_cluster
 from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
 from coupled.files import check_target
@@ -30,19 +30,34 @@ def make(
     rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,
     trials: Annotated[int, typer.Option(min=1, help="Version of the trials.")] = 1,
     workers: Annotated[
-        int, typer.Option("--workers", "-j", min=0, max=512, help="Processes; 0: one a core.")
-    ] = 0,
+        int | None,
+        typer.Option(
+            "--workers", "-j", min=0, max=512, help="Processes; 0: one a core.  [default: 0]"
+        ),
+    ] = None,
+    cluster: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, to make them there.")
+    ] = "",
 ) -> None:
     """Write sealed records of an independent twin, with and without effects; the key elsewhere."""
     from coupled.blind.trials.make import make as make_trials
 
+    processes, address = check_cluster(workers, cluster)
     path = key or folder.with_name(folder.name + ".key.json")
     if folder.is_file():
         raise InputError(folder, "", "is a file; give a new folder")
     try:
         with progress() as advance:
             made = make_trials(
-                folder, path, seed, records, rigs, advance, version=trials, workers=workers
+                folder,
+                path,
+                seed,
+                records,
+                rigs,
+                advance,
+                version=trials,
+                workers=processes,
+                cluster=address,
             )
     except KeyboardInterrupt:
         if folder.is_dir():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, app, check_cluster
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
 from coupled.errors import InputError
@@ -101,8 +101,7 @@ def sweep(
     from coupled.plots.saving import check_format
 
     file = find(name, shipped_sweeps(), "sweep")
-    if cluster and workers is not None:
-        raise InputError("--workers", "", "a cluster has its own; leave it out")
+    check_cluster(workers, cluster)
     plan = read_plan(file)
     target = folder or Path("out") / plan.sweep.name
     if target.is_file():

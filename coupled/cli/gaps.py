@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, app, check_cluster
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, shown
@@ -49,6 +49,18 @@ def diagnose(
         Path | None,
         typer.Option(metavar="DIR", help="For a folder: where its diagnoses go, a JSON each."),
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", "-j", min=1, max=512, help="For a folder: processes.  [default: all cores]"
+        ),
+    ] = None,
+    cluster: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS", help="For a folder: of a dask scheduler, to diagnose there."
+        ),
+    ] = "",
     json_file: JsonOption = "",
     report: ReportOption = None,
 ) -> None:
@@ -59,8 +71,11 @@ def diagnose(
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power}
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
-        _diagnose_folder(records, rig, output, name)
+        _diagnose_folder(records, rig, output, name, check_cluster(workers, cluster))
         return
+    if workers is not None or cluster:
+        option = "--cluster" if cluster else "--workers"
+        raise InputError(records[0], option, "is for a folder of records")
     if output is not None:
         raise InputError(output, "--output", "is for a folder of records; give --json FILE")
     if not rig:
@@ -189,7 +204,11 @@ def _draw(folder: Path, whole: Diagnosis) -> None:
 
 
 def _diagnose_folder(
-    folders: list[Path], rig: str, output: Path | None, control: ControlName
+    folders: list[Path],
+    rig: str,
+    output: Path | None,
+    control: ControlName,
+    place: tuple[int, str],
 ) -> None:
     """Diagnose a control in every record of a folder, each alone; print and write a summary."""
     from coupled.cli.tables.gaps import print_summary
@@ -207,7 +226,7 @@ def _diagnose_folder(
     targets = [*(job.out for job in todo), output / "summary.csv"]
     check_targets(targets, [folders[0] / LIST, *read])
     with progress() as advance:
-        found = run_all(todo, advance)
+        found = run_all(todo, advance, *place)
     write_text(output / "summary.csv", summary(found))
     print_summary(out, found)
     say(f"diagnoses: {output}  ({len(found)}, and summary.csv)")

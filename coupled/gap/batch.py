@@ -1,7 +1,8 @@
 """Many records diagnosed by one frozen version: a folder with `records.toml`, each record alone.
 
 Each diagnosis is written as soon as it is made, with the hashes of what made it; a second run
-of the same version does only what is missing. The records are dealt to all cores.
+of the same version does only what is missing. The records are dealt to all cores, or to a
+cluster, whose machines need none of the files.
 """
 
 from __future__ import annotations
@@ -10,11 +11,10 @@ import csv
 import hashlib
 import io
 import json
-import os
 import re
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,17 +23,19 @@ from coupled.errors import InputError, nearest
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
 from coupled.gap.result import FORMAT
-from coupled.parallel import executor
+from coupled.parallel import as_done, cores, executor
 from coupled.record.channels import ControlName
-from coupled.record.record import read_record
+from coupled.record.record import Record, read_record
 from coupled.resources import shipped_rigs
 from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 LIST = "records.toml"
 HEAD = ("record", "rig", "verdict", "effects", "parameters", "guilty", "rivals", "closed")
 Progress = Callable[[str, int, int], None]
+_AHEAD = 4  # records that wait for each worker
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,7 @@ def summary(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
+@lru_cache(maxsize=1)
 def version_hash() -> str:
     """Return the hash of all the package's sources: what a frozen version is."""
     here = Path(coupled.__file__).parent
@@ -146,36 +149,40 @@ def version_hash() -> str:
     return digest.hexdigest()
 
 
-def run(job: Job, version: str) -> Row:
-    """Diagnose one record, write its JSON, and return its line.
-
-    A record that is refused, or whose diagnosis fails, has a verdict that says so, and why.
-    """
-    made = {
+def made_by(job: Job) -> dict[str, str]:
+    """Return what a record's diagnosis is made by and from: hashes of all of it."""
+    return {
         "coupled": coupled.__version__,
-        "sources_sha256": version,
+        "sources_sha256": version_hash(),
         "record_sha256": sha256(job.record),
         "rig": job.rig.stem,
         "rig_sha256": sha256(job.rig),
         "control": job.control,
     }
+
+
+def known_row(job: Job, made: Mapping[str, str]) -> Row | None:
+    """Return the line of a diagnosis that stands there already, made by just this."""
     known = _known(job.out)
-    if known.get("made") == made and known.get("format") == FORMAT:
-        return Row.of(known)
-    document = {"record": job.name} | _document(job) | {"made": made}
-    write_text(job.out, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    return Row.of(document)
+    return Row.of(known) if known.get("made") == made and known.get("format") == FORMAT else None
 
 
-def _document(job: Job) -> dict[str, Any]:
+def answer(
+    number: int, rig: Rig, name: str, record: Record, control: ControlName
+) -> tuple[int, str, dict[str, Any]]:
+    """Return a job's number, the version that did it, and the JSON of the diagnosis.
+
+    Needs no file, so that any machine can do it. A diagnosis that is refused, or fails, has a
+    verdict that says so, and why.
+    """
     try:
-        records = {str(job.record): read_record(job.record)}
-        return diagnose(read_rig(job.rig), records, job.control).as_dict()
+        document = diagnose(rig, {name: record}, control).as_dict()
     except InputError as error:
-        return _nothing("refused", f"{error.key}: {error.problem}".lstrip(": "))
+        document = _nothing("refused", f"{error.key}: {error.problem}".lstrip(": "))
     except Exception as error:
         # A defect of the diagnosis is said in this record's file, and the others go on.
-        return _nothing("failed", f"{type(error).__name__}: {error}")
+        document = _nothing("failed", f"{type(error).__name__}: {error}")
+    return number, version_hash(), document
 
 
 def _nothing(verdict: str, why: str) -> dict[str, Any]:
@@ -192,13 +199,42 @@ def _known(path: Path) -> dict[str, Any]:
     return known if isinstance(known, dict) else {}
 
 
-def run_all(todo: list[Job], progress: Progress, workers: int = 0) -> list[Row]:
-    """Diagnose all records on all cores; the order and the numbers are those of one core."""
-    version = version_hash()
-    found: dict[str, Row] = {}
-    with executor(workers or os.cpu_count() or 1) as pool:
-        waiting = {pool.submit(run, job, version): job.name for job in todo}
-        for done in as_completed(waiting):
-            found[waiting[done]] = done.result()
-            progress(waiting[done], len(found), len(todo))
-    return [found[job.name] for job in todo]
+def _keep(job: Job, made: Mapping[str, str], answered: Mapping[str, Any]) -> Row:
+    document = {"record": job.name} | dict(answered) | {"made": dict(made)}
+    write_text(job.out, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    return Row.of(document)
+
+
+def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str = "") -> list[Row]:
+    """Diagnose all records on all cores, or a dask cluster; the numbers are those of one core.
+
+    Each diagnosis is written here as soon as it is made. Raises InputError, and where a
+    cluster's workers have another version of this package.
+    """
+    found: dict[int, Row] = {}
+    made = {number: made_by(job) for number, job in enumerate(todo)}
+
+    def keep(number: int, answered: Mapping[str, Any]) -> None:
+        found[number] = _keep(todo[number], made[number], answered)
+        progress(todo[number].name, len(found), len(todo))
+
+    def calls() -> Iterator[tuple[int, Rig, str, Record, ControlName]]:
+        for number, job in enumerate(todo):
+            row = known_row(job, made[number])
+            if row is not None:
+                found[number] = row
+                continue
+            try:
+                rig, record = read_rig(job.rig), read_record(job.record)
+            except InputError as error:
+                keep(number, _nothing("refused", f"{error.key}: {error.problem}".lstrip(": ")))
+                continue
+            yield number, rig, str(job.record), record, job.control
+
+    with executor(cores(workers), cluster) as pool:
+        for number, version, document in as_done(pool, answer, calls(), _AHEAD * cores(workers)):
+            if version != version_hash():
+                problem = "its workers have another version of coupled than this machine"
+                raise InputError("--cluster", "", problem)
+            keep(number, document)
+    return [found[number] for number in range(len(todo))]

@@ -9,10 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -28,6 +25,7 @@ from coupled.files import unfinished_name
 from coupled.parallel import Here, executor
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
+from tests.support.cluster import cluster
 from tests.support.commands import coupled, files
 from tests.support.processes import begun, ended, kill
 from tests.support.runs import PUSH, SHORT
@@ -400,36 +398,6 @@ def test_a_parameter_is_drawn_with_its_unit() -> None:
     assert parameter_label("pilot.column.force_N") == "pilot column force, N"
     assert parameter_label("seed") == "seed"
     assert parameter_label("rig.controls.column.rigging.stretch_loss_per_Pa").endswith("loss, 1/Pa")
-
-
-CLUSTER = """
-import logging, sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    workers = int(sys.argv[1])
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
-
-
-@contextmanager
-def cluster(folder: Path, workers: int) -> Iterator[str]:
-    (folder / "cluster.py").write_text(CLUSTER)
-    process: subprocess.Popen[str] = subprocess.Popen(
-        [sys.executable, "cluster.py", str(workers)],
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    pipes: Any = process
-    try:
-        yield pipes.stdout.readline().strip()
-    finally:
-        process.communicate(timeout=30)
 
 
 @pytest.mark.slow

@@ -15,11 +15,15 @@ from rich.console import Console
 from coupled.cli.tables.gaps import print_stages
 from coupled.errors import InputError
 from coupled.gap import batch
-from coupled.gap.batch import Row, jobs, run
+from coupled.gap.batch import jobs, run_all
 from coupled.gap.diagnose import diagnose
+from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.result import FORMAT, StageResult
+from coupled.record.channels import ControlName
 from coupled.record.record import Record, write_record
+from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
+from tests.support.cluster import cluster
 from tests.support.commands import ROOT, coupled
 from tests.support.gaps import made, nominal_rig
 
@@ -112,19 +116,76 @@ def test_a_record_whose_diagnosis_fails_leaves_the_others_theirs(
     tmp_path: Path, clean: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     todo = jobs(folder_of(tmp_path, clean, "a", "b"), tmp_path / "out")
+
+    def fails_on_the_first(rig: Rig, records: dict[str, Record], control: ControlName) -> Diagnosis:
+        if next(iter(records)).endswith("a.csv"):
+            raise ZeroDivisionError("division by zero")
+        return diagnose(rig, records, control)
+
     with monkeypatch.context() as patched:
-        patched.setattr(batch, "diagnose", lambda *given: 1 / 0)
-        failed = run(todo[0], "v")
-    assert failed.verdict == "failed"
-    assert "ZeroDivisionError" in failed.why
+        patched.setattr(batch, "diagnose", fails_on_the_first)
+        rows = run_all(todo, lambda *_: None, workers=1)
+    assert [row.verdict for row in rows] == ["failed", "no_gap"]
+    assert "ZeroDivisionError" in rows[0].why
     assert json.loads((tmp_path / "out" / "a.json").read_text())["format"] == FORMAT
-    rows = [failed, run(todo[1], "v")]
-    assert rows[1].verdict == "no_gap"
     assert [line.split(",")[2] for line in batch.summary(rows).splitlines()[1:]] == [
         "failed",
         "no_gap",
     ]
-    assert isinstance(rows[1], Row)
+    before = (tmp_path / "out" / "b.json").stat().st_mtime_ns
+    assert run_all(todo, lambda *_: None, workers=1) == rows  # all is there: nothing is done anew
+    assert (tmp_path / "out" / "b.json").stat().st_mtime_ns == before
+
+
+def test_a_record_that_cannot_be_read_is_refused_beside_the_others(
+    tmp_path: Path, clean: Record
+) -> None:
+    todo = jobs(folder_of(tmp_path, clean, "a", "b"), tmp_path / "out")
+    (tmp_path / "a.csv").write_text("time_s\nnonsense\n")
+    seen: list[tuple[str, int, int]] = []
+    rows = run_all(todo, lambda *said: seen.append(said), workers=1)
+    assert [row.verdict for row in rows] == ["refused", "no_gap"]
+    assert seen == [("a", 1, 2), ("b", 2, 2)]
+
+
+def test_workers_of_another_version_are_refused(
+    tmp_path: Path, clean: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    todo = jobs(folder_of(tmp_path, clean, "a"), tmp_path / "out")
+    monkeypatch.setattr(batch, "answer", lambda number, *_: (number, "another", {}))
+    with pytest.raises(InputError, match=r"--cluster: its workers have another version"):
+        run_all(todo, lambda *_: None, workers=1)
+    assert not (tmp_path / "out" / "a.json").exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_diagnoses_as_this_machine_does(tmp_path: Path, clean: Record) -> None:
+    folder_of(tmp_path, clean, "a", "b", "c")
+    here = run_all(jobs(tmp_path, tmp_path / "here"), lambda *_: None, workers=1)
+    with cluster(tmp_path, 2) as address:
+        done = coupled(tmp_path, "diagnose", ".", "--output", "there", "--cluster", address)
+        assert done.returncode == 0, done.stderr
+    assert [row.verdict for row in here] == ["no_gap"] * 3
+    for name in "abc":
+        ours, theirs = (tmp_path / place / f"{name}.json" for place in ("here", "there"))
+        assert ours.read_bytes() == theirs.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["a.csv", "--rig", "rigs/mine.toml", "-j", "2"], "--workers: is for a folder"),
+        (["a.csv", "--rig", "rigs/mine.toml", "--cluster", "x"], "--cluster: is for a folder"),
+        ([".", "--output", "o", "--cluster", "x", "-j", "2"], "--workers: a cluster has its own"),
+    ],
+)
+def test_where_a_folder_is_diagnosed_is_for_folders(
+    tmp_path: Path, clean: Record, words: list[str], says: str
+) -> None:
+    folder_of(tmp_path, clean, "a")
+    done = coupled(tmp_path, "diagnose", *words)
+    assert done.returncode == 2
+    assert says in done.stderr
 
 
 @pytest.mark.parametrize("name", ["../evil", "a/b", "", ".hidden", "/evil"])

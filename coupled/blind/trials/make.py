@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,7 +20,7 @@ from coupled.blind.trials.truth import Truth, truth_from
 from coupled.blind.twin.setting import csv_text
 from coupled.errors import InputError
 from coupled.files import check_targets, read_json, read_text, write_text
-from coupled.parallel import executor
+from coupled.parallel import as_done, cores, executor
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
 
@@ -80,13 +79,14 @@ def make(
     *,
     version: int = DEFAULT,
     workers: int = 0,
+    cluster: str = "",
 ) -> Made:
     """Write a set of trials into `folder` and their key to `key`.
 
     What an interrupted make of the same numbers has written is kept, and the rest is made. The
-    same seed gives the same bytes from any number of workers (0: one a core); without a seed it
-    is drawn, and stands in the key alone. Raises InputError for a folder that holds anything
-    else, a set of other numbers included.
+    same seed gives the same bytes from any number of workers (0: one a core), or from a dask
+    `cluster`; without a seed it is drawn, and stands in the key alone. Raises InputError for a
+    folder that holds anything else, a set of other numbers included.
     """
     places = Places(folder, key)
     read_deck(version)
@@ -96,24 +96,25 @@ def make(
         _clear(places)
         return Made(done, before=True)
     numbers = _begin(places, asked, seed is None)
-    _make(places, numbers, progress, workers)
+    with executor(cores(workers), cluster) as pool:
+        _make(places, numbers, progress, pool, AHEAD * cores(workers))
     return Made(numbers, before=False)
 
 
-def _make(places: Places, numbers: Numbers, progress: Progress, workers: int) -> None:
+def _make(
+    places: Places, numbers: Numbers, progress: Progress, workers: Executor, ahead: int
+) -> None:
     deck, pool = _drawn(numbers)
     for name, rig in pool.items():
         remark = "The nominal rig: what a record's real one is held against"
         write_text(places.folder / RIGS / f"{name}.toml", rig_text(rig, remark))
     todo = plans(np.random.default_rng([numbers.seed, 1]), numbers.records, deck)
-    names = [f"r{i + 1:03d}" for i in range(numbers.records)]
+    names = [record_name(i) for i in range(numbers.records)]
     truths: dict[str, Truth] = {}
     progress("records", 0, numbers.records)
-    with executor(workers or os.cpu_count() or 1) as pool_of_workers:
-        ahead = AHEAD * workers if workers else AHEAD * (os.cpu_count() or 1)
-        for name, truth in _trials(places, numbers, todo, pool_of_workers, ahead):
-            truths[name] = truth
-            progress(f"{name} made", len(truths), numbers.records)
+    for name, truth in _trials(places, numbers, todo, workers, ahead):
+        truths[name] = truth
+        progress(f"{name} made", len(truths), numbers.records)
     listed = "".join(f'{name} = "{truths[name].rig}"\n' for name in names)
     write_text(places.folder / LIST, "# record = rig file (rigs/NAME.toml)\n" + listed)
     salt = np.random.default_rng([numbers.seed, 2]).bytes(32).hex()
@@ -127,30 +128,33 @@ def _make(places: Places, numbers: Numbers, progress: Progress, workers: int) ->
 def _trials(
     places: Places, numbers: Numbers, todo: list[Plan], workers: Executor, ahead: int
 ) -> Iterator[tuple[str, Truth]]:
-    """Yield each record's name and truth as it is made; a bounded number waits for a worker."""
-    waiting: set[Future[tuple[str, Truth]]] = set()
+    """Yield each record's name and truth, once both are written; those that are, are kept."""
+    lacking = []
     for i, plan in enumerate(todo):
-        waiting.add(workers.submit(make_one, places, numbers, i, plan))
-        done, waiting = wait(waiting, None if len(waiting) >= ahead else 0.0, FIRST_COMPLETED)
-        yield from (future.result() for future in done)
-    while waiting:
-        done, waiting = wait(waiting, None, FIRST_COMPLETED)
-        yield from (future.result() for future in done)
+        name = record_name(i)
+        path, note = places.folder / RECORDS / f"{name}.csv", places.parts / f"{name}.json"
+        if path.is_file() and note.is_file():
+            yield name, _read_truth(note)
+        else:
+            lacking.append((numbers, i, plan))
+    for i, truth, text in as_done(workers, make_one, lacking, ahead):
+        name = record_name(i)
+        write_text(places.folder / RECORDS / f"{name}.csv", text)
+        write_text(places.parts / f"{name}.json", json.dumps(truth.as_dict(), sort_keys=True))
+        yield name, truth
 
 
-def make_one(places: Places, numbers: Numbers, i: int, plan: Plan) -> tuple[str, Truth]:
-    """Return a record's name and truth, once both are written; those that are, are kept."""
-    name = f"r{i + 1:03d}"
-    path, note = places.folder / RECORDS / f"{name}.csv", places.parts / f"{name}.json"
-    if path.is_file() and note.is_file():
-        return name, _read_truth(note)
+def record_name(i: int) -> str:
+    """Return the name of a set's record, counted from 0."""
+    return f"r{i + 1:03d}"
+
+
+def make_one(numbers: Numbers, i: int, plan: Plan) -> tuple[int, Truth, str]:
+    """Return a record's number and truth, and the record as CSV."""
     deck, pool = _drawn(numbers)
     seed = (numbers.seed, 3, i)
     trial = draw_trial(np.random.default_rng(seed), plan, deck, pool)
-    truth = replace(trial.truth, seed=seed)
-    write_text(path, csv_text(trial.record))
-    write_text(note, json.dumps(truth.as_dict(), sort_keys=True))
-    return name, truth
+    return i, replace(trial.truth, seed=seed), csv_text(trial.record)
 
 
 @lru_cache(maxsize=1)
