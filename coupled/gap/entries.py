@@ -38,6 +38,11 @@ def real_bend(start: float) -> Parameter:
     return replace(number, scanned=False, host="K̂")
 
 
+def bend_beside(start: float) -> Parameter:
+    """Return K of the rig as it is, which starts from the nominal one: the effect is another's."""
+    return replace(real_bend(start), above="loader.bend_{d}_per_N")
+
+
 def switch(key: str, on: Any) -> Parameter:
     """Return a key that is set."""
     return Parameter("", key, "switch", on=on)

@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coupled.gap.effect import Effect, Signature
-from coupled.gap.entries import SETTING, added, factor, limit, one, real_bend, switch
+from coupled.gap.entries import (
+    SETTING,
+    added,
+    bend_beside,
+    factor,
+    limit,
+    one,
+    real_bend,
+    switch,
+    value,
+)
 
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
@@ -20,6 +30,49 @@ LINKAGE: tuple[Effect, ...] = (
         "backlash",
         added("play_{d}", "loader.play_{d}", 0, 0.1, 1e-3),
         *("computed", "deflection_left", "loop"),
+    ),
+    Effect(
+        "soft_backlash",
+        "linkage",
+        (
+            added("play_{d}", "loader.play_{d}", 0, 0.1, 1e-3),
+            replace(
+                limit(
+                    *("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}"),
+                    *(1e3, 1e8, 1e5, 2e4),
+                ),
+                scanned=False,
+                shape=True,
+            ),
+        ),
+        Signature("force", "deflection_left", "loop"),
+    ),
+    Effect(
+        "bend_hysteresis",
+        "linkage",
+        (
+            bend_beside(1e-6),
+            replace(
+                value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3),
+                scanned=False,
+            ),
+            value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0),
+        ),
+        Signature("force", "bent", "loop", 6.0),
+    ),
+    Effect(
+        "structural_mode",
+        "linkage",
+        (
+            bend_beside(1e-6),
+            limit("frequency_Hz", "loader.bend_frequency_Hz", 0.5, 200, 8.0),
+            replace(
+                value("damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05),
+                scanned=False,
+                may_vanish=True,
+            ),
+        ),
+        Signature("force", "bent", "loop", 1.5),
     ),
     replace(
         one(

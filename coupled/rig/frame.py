@@ -15,7 +15,7 @@ from coupled.rig.control import CONTROL, ControlArray, ControlParameters, Contro
 from coupled.rig.gauge import start_gauge
 from coupled.rig.hand import only_scripted
 from coupled.rig.inertia import set_inertia
-from coupled.rig.linkage import carry_bend, deflection, transducer
+from coupled.rig.linkage import deflection, start_bend, transducer
 from coupled.rig.loader import start_loader
 from coupled.rig.mechanism import begin_frame, run_frame, run_node, set_hand
 from coupled.rig.modification import (
@@ -180,7 +180,7 @@ def step_frame(
             set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
             start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
             s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
-            carry_bend(p.linkage, s.linkage, s.hand.force)
+            start_bend(p.linkage, s.linkage, s.hand.force)
     if joined:
         for i in range(len(controls)):
             bend_by_others(controls, i)

@@ -1,11 +1,14 @@
 """Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
 
     servo      x'' = ω²·(δc − x) − 2ζω·x',    |x'| ≤ rate limit
-    backlash   the grip's side follows x once it has taken up the play
+    backlash   the grip's side follows x once it has taken up the play; with a contact that yields
+               the force moves it against spring and damper of the contact, which holds beyond the
+               play alone: k·τ·z' + k·(|z| − play/2)·sgn(z) = F, δ = x + z
     bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit)
     direction  K for a pull, another for a push; both meet at F = 0
     hysteresis δ = x + (1 − s)·bend(F) + s·bend(P), P behind a play of full width w in the force:
                over a cycle between ±A (A > w/2, one K) it takes s·K·w·(2A − w) of work
+    mode       what bends has mass: y'' = ω²·(bend − y) − 2ζω·y', δ = x + y
     structure  + Σ K_ij·F_j of the other controls  (`structure`)
     arc        the transducer reads L·sin(δ/L)  eqs. (15) to (17)
 
@@ -26,6 +29,7 @@ from numpy.typing import NDArray
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Given
 
+CONTACT_s = 2e-3  # chosen: damping of a play's contact over its stiffness
 SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
 
 
@@ -41,6 +45,11 @@ class LinkageParameters(Protocol):
     bend_limit: float  # where the bend saturates, d; 0 for never
     share: float  # of the bend that follows the force through a play
     width: float  # full width of that play, N
+    modal: int  # what bends has mass
+    mode_position: NDArray[np.float64]  # weights of (y, y', bend before, bend after) in the next y
+    mode_speed: NDArray[np.float64]  # and in the next y'
+    contact: float  # stiffness of the play's contact, N/d; 0 for a rigid one
+    carries: int  # whether anything here remembers the force
     arc_length: float  # L of the grip's arc, d; 0 where the transducer reads δ itself
 
 
@@ -51,6 +60,10 @@ class LinkageState(Protocol):
     rate: float  # x', d/s
     grip: float  # behind the play, before the bend, d
     carried: float  # P, the force behind the bend's play, N
+    touch: float  # z, the grip against the servo in a contact that yields, d
+    bent: float  # y, d
+    bent_rate: float  # y', d/s
+    asked: float  # the bend that the mode follows, as it stood at the last node, d
     others: float  # what the other controls' forces bend here, d
 
 
@@ -87,11 +100,19 @@ def _push(g: Given) -> float:
     return loader.bend if loader.bend_push is None else loader.bend_push
 
 
+def _mode(g: Given) -> NDArray[np.float64]:
+    loader = g.control.loader
+    if loader.bend_frequency == 0.0:
+        return np.zeros((2, 4))
+    omega = 2.0 * math.pi * loader.bend_frequency
+    return _weights(omega, loader.bend_damping_ratio, g.substep_s)
+
+
 _weights = lru_cache(maxsize=64)(servo_weights)
 
 
 LINKAGE = Declaration(
-    layout(LinkageParameters, position=(4,), speed=(4,)),
+    layout(LinkageParameters, position=(4,), speed=(4,), mode_position=(4,), mode_speed=(4,)),
     section="control.loader",
     derived={
         "position": lambda g: _servo(g)[0],
@@ -100,6 +121,17 @@ LINKAGE = Declaration(
         "push": _push,
         "share": lambda g: g.control.loader.bend_hysteresis_share,
         "width": lambda g: g.control.loader.bend_hysteresis_width,
+        "modal": lambda g: g.control.loader.bend_frequency > 0.0,
+        "mode_position": lambda g: _mode(g)[0],
+        "mode_speed": lambda g: _mode(g)[1],
+        "contact": lambda g: g.control.loader.play_stiffness,
+        "carries": lambda g: any(
+            (
+                g.control.loader.bend_hysteresis_share,
+                g.control.loader.bend_frequency,
+                g.control.loader.play_stiffness,
+            )
+        ),
         "arc_length": lambda g: g.control.length if g.control.loader.arc_geometry else 0.0,
     },
     state=layout(LinkageState),
@@ -121,6 +153,9 @@ def move_linkage(
         s.position = min(max(s.position, x - step), x + step)
     if abs(s.position) < TINY and abs(s.rate) < TINY:
         s.position = s.rate = 0.0
+    if p.contact > 0.0:
+        s.grip = s.position + s.touch
+        return
     half = 0.5 * p.play
     s.grip = min(max(s.grip, s.position - half), s.position + half)
 
@@ -139,8 +174,11 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
     """Return the bend's derivative by force, d/N.
 
     With hysteresis that of a force which carries all of the bend with it: no force in the play
-    bends more, so a hand that takes this slope implicitly does not overshoot.
+    bends more, so a hand that takes this slope implicitly does not overshoot. What has mass does
+    not bend at once.
     """
+    if p.modal:
+        return 0.0
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
@@ -148,21 +186,57 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
 
 
 @stage
-def carry_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
-    """Let the force at a node, N, take the bend's hysteresis along."""
+def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
+    """Begin at rest under the force at the first node, N."""
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
+    s.asked = s.bent = _still(p, s, force)
 
 
 @stage
-def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
-    """Return the true deflection δ at the grip in d under a force in N."""
+def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
+    """Let the force at a node, N, take along what remembers it, h seconds after the last node."""
+    if p.contact > 0.0:
+        _press(p, s, force, h)
+    half = 0.5 * p.width
+    s.carried = min(max(s.carried, force - half), force + half)
+    if p.modal:
+        a, b, y, v = p.mode_position, p.mode_speed, s.bent, s.bent_rate
+        before, s.asked = s.asked, _still(p, s, force)
+        s.bent = a[0] * y + a[1] * v + a[2] * before + a[3] * s.asked
+        s.bent_rate = b[0] * y + b[1] * v + b[2] * before + b[3] * s.asked
+        if abs(s.bent) < TINY and abs(s.bent_rate) < TINY:
+            s.bent = s.bent_rate = 0.0
+
+
+@stage
+def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
+    """Move the grip in its play by the force, N, until the contact holds it."""
+    half, z = 0.5 * p.play, s.touch
+    yields = force / p.contact
+    if abs(z) < half:  # nothing holds it but the damper
+        s.touch = z + yields * h / CONTACT_s
+    else:
+        rests = (half if z > 0.0 else -half) + yields
+        s.touch = rests + (z - rests) * math.exp(-h / CONTACT_s)
+    s.grip = s.position + s.touch
+
+
+@stage
+def _still(p: LinkageParameters, s: LinkageState, force: float) -> float:
+    """Return the bend under a force in N as it would stay, d."""
     bent = bend(p, force)
     if p.share > 0.0:
         half = 0.5 * p.width
         carried = min(max(s.carried, force - half), force + half)
         bent += p.share * (bend(p, carried) - bent)
-    return s.grip + bent + s.others
+    return bent
+
+
+@stage
+def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
+    """Return the true deflection δ at the grip in d under a force in N."""
+    return s.grip + (s.bent if p.modal else _still(p, s, force)) + s.others
 
 
 @stage

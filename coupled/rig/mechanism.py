@@ -14,7 +14,7 @@ from coupled.rig.control import ControlParameters, ControlState
 from coupled.rig.gauge import gauge_force, move_gauge
 from coupled.rig.hand import ask, hold, move_muscle, only_scripted
 from coupled.rig.inertia import lead_force
-from coupled.rig.linkage import carry_bend, move_linkage
+from coupled.rig.linkage import carry, move_linkage
 from coupled.rig.loader import move_loader, set_external
 from coupled.rig.modification import exchange_last
 from coupled.rig.reach import bounds, seated, set_reach, stop_linkage, within_reach
@@ -109,8 +109,8 @@ def run_node(
             stop_linkage(s.reach, p.linkage, s.linkage, position, grip)
         rate = (held[node] - held[node - 1]) / h
         set_hand(p, s, force[node], held[node], rate)
-    if p.linkage.share > 0.0:
-        carry_bend(p.linkage, s.linkage, s.hand.force)
+    if p.linkage.carries:
+        carry(p.linkage, s.linkage, s.hand.force, h)
     if p.sensing.skewed:
         sample_channels(p, s, first_node + p.clock.substeps - node, False)
 

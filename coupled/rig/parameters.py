@@ -55,7 +55,10 @@ class Loader(Section):
     bend_limit: float = quantity("{d}", 0.0, ge=0)
     bend_hysteresis_share: float = quantity("", 0.0, ge=0, lt=1)
     bend_hysteresis_width: float = quantity("N", 0.0, ge=0)
+    bend_frequency: float = quantity("Hz", 0.0, ge=0)
+    bend_damping_ratio: float = quantity("", 0.05, ge=0)
     play: float = quantity("{d}", 0.0, ge=0)
+    play_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     arc_geometry: bool = False
 
 

@@ -18,7 +18,7 @@ from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
 from coupled.rig.inertia import lead_force, set_inertia
-from coupled.rig.linkage import carry_bend, deflection, move_linkage, transducer
+from coupled.rig.linkage import carry, deflection, move_linkage, start_bend, transducer
 from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import set_gradients
 from coupled.rig.packing import crossed_bends, pack
@@ -235,13 +235,16 @@ def _linkage(
     out: Floats,
 ) -> Floats:
     p, s = parameters[0].linkage, states[0].linkage
+    start_bend(p, s, force[0])
     for k in range(len(force)):
-        carry_bend(p, s, force[k])
         s.others = others[k]
         out[k] = transducer(p, deflection(p, s, force[k]))
         if k + 1 < len(force):
             for node in range(k * substeps, (k + 1) * substeps):
                 move_linkage(p, s, computed[node], computed[node + 1], h)
+                if p.carries:
+                    share = (node + 1 - k * substeps) / substeps
+                    carry(p, s, force[k] + share * (force[k + 1] - force[k]), h)
     return out
 
 

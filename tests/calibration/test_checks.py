@@ -423,6 +423,13 @@ FAULTS: dict[str, dict[str, float]] = {
     "bend": {"bend_{d}_per_N": 2.0 * K_REPORT},
     "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},
     "backlash": {"play_{d}": 0.03},
+    "soft_backlash": {"play_{d}": 0.03, "stiffness_N_per_{d}": 1e4},
+    "bend_hysteresis": {"bend_{d}_per_N": 1.5 * K_REPORT, "share": 0.5, "width_N": 60.0},
+    "structural_mode": {
+        "bend_{d}_per_N": 2.0 * K_REPORT,
+        "frequency_Hz": 2.0,
+        "damping_ratio": 0.05,
+    },
     "servo_lag": {"factor": 0.15},
     "servo_rate_limit": {"rate_{d}_per_s": 0.1},
     "pressure_scale": {"factor": 1.4},

@@ -51,6 +51,13 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (True, "bend", {"bend_{d}_per_N": 1.6e-4}),
     (False, "stiffening_bend", {"bend_{d}_per_N": 1.5e-4, "limit_{d}": 4e-3}),
     (False, "backlash", {"play_{d}": 1e-3}),
+    (False, "soft_backlash", {"play_{d}": 1e-3, "stiffness_N_per_{d}": 6e4}),
+    (False, "bend_hysteresis", {"bend_{d}_per_N": 1e-4, "share": 0.3, "width_N": 8.0}),
+    (
+        False,
+        "structural_mode",
+        {"bend_{d}_per_N": 1e-4, "frequency_Hz": 6.0, "damping_ratio": 0.05},
+    ),
     (False, "servo_lag", {"factor": 0.6}),
     (False, "servo_rate_limit", {"rate_{d}_per_s": 0.06}),
     (True, "cable_stretch", {"loss_per_Pa": 4e-5}),
@@ -70,6 +77,7 @@ LONG = {"viscous_damping", "gradient_error", "cubic_stiffness", "breakout", "bob
 LONG |= {"force_offset", "digital_multiplier", "transport_delay", "deflection_scale"}
 LONG |= {"asymmetric_friction", "load_friction", "relaxation", "friction_ripple"}
 LONG |= {"force_scale", "force_zero", "scale_drift", "force_skew", "motion_skew"}
+LONG |= {"soft_backlash", "bend_hysteresis", "structural_mode", "force_limit"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
 
 
