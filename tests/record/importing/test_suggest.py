@@ -165,10 +165,23 @@ def test_two_logs_of_an_arm_are_seen_through(tmp_path: Path) -> None:
             file.write_text(head[file.name] + "\n" + "\n".join(rows))
     text = propose(files).text
     table = tomllib.loads(text)
-    assert table["clock"] == {"from": "timestamp", "unit": "us"}
+    clock = {"from": "timestamp", "unit": "us"}
+    assert table["clock"] in (clock, clock | {"frame_rate_Hz": 50.0})
     assert table["channels"]["column_computed_m"]["from"] == "positions"
     assert table["channels"]["column_deflection_m"]["log"] == "state_motor.csv"
     assert table["channels"]["column_deflection_m"]["element"] == "?"
+
+
+def test_rows_that_come_unevenly_are_given_a_rate(tmp_path: Path) -> None:
+    steps = np.random.default_rng(1).integers(18_000, 22_000, 400)
+    force = np.sin(np.arange(400))
+    rows = [f"{t},{f:.6f}" for t, f in zip(np.cumsum(steps), force, strict=True)]
+    (tmp_path / "log.csv").write_text("time_us,column_force_N\n" + "\n".join(rows))
+    proposal, table = proposed(tmp_path / "log.csv")
+    assert table["clock"] == {"from": "time_us", "unit": "us", "frame_rate_Hz": 50.0}
+    (tmp_path / "map.toml").write_text(proposal.text)
+    _, account = import_log(tmp_path / "log.csv", tmp_path / "map.toml")
+    assert account.clock.frame_rate_Hz == 50.0
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:

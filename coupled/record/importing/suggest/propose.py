@@ -69,10 +69,10 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
             lines = _channel_lines(channel, chosen[channel], control, logs[0])
             sections.append((f"channels.{channel}", lines))
     sections = _signs(sections, chosen)
-    mapped = {channel: chosen[channel].name for channel in CHANNELS if channel in chosen}
+    mapped = {channel: _named(chosen[channel], logs) for channel in CHANNELS if channel in chosen}
     used = {(c.log, c.name) for c in chosen.values()}
     left = [c for c in columns if (c.log, c.name) not in used and c.reading.channel != "time"]
-    unmapped = tuple(c.name if len(logs) == 1 else f"{c.log}: {c.name}" for c in left)
+    unmapped = tuple(_named(column, logs) for column in left)
     if not mapped:
         problem = "none of its columns has the name of a force, a deflection or a motion: "
         raise InputError(files[0], "", problem + ", ".join(unmapped)[:200])
@@ -83,6 +83,10 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
         if value == "?"
     )
     return Proposal(_text(sections, logs, unmapped), questions, mapped, unmapped)
+
+
+def _named(column: Column, logs: Sequence[str]) -> str:
+    return column.name if len(logs) == 1 else f"{column.log}: {column.name}"
 
 
 def _layout_lines(layout: Layout) -> list[Line]:
@@ -98,12 +102,17 @@ def _clocks(
     columns: Sequence[Column], logs: Sequence[str]
 ) -> tuple[list[Line], dict[str, list[Line]]]:
     """Return the lines of `[clock]`, and those of the logs whose stamps are other ones."""
-    found = {name: _clock(columns, name, len(logs) > 1) for name in logs}
+    found = {name: _clock(columns, name, len(logs) > 1, main=name == logs[0]) for name in logs}
     first = found[logs[0]]
-    return first, {name: found[name] for name in logs[1:] if found[name] != first}
+    plain = [line for line in first if line[0] != "frame_rate_Hz"]
+    return first, {name: found[name] for name in logs[1:] if not _alike(found[name], plain)}
 
 
-def _clock(columns: Sequence[Column], log: str, several: bool) -> list[Line]:
+def _alike(lines: Sequence[Line], others: Sequence[Line]) -> bool:
+    return [line[:2] for line in lines] == [line[:2] for line in others]
+
+
+def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> list[Line]:
     for column in columns:
         if column.log != log or column.reading.channel != "time":
             continue
@@ -111,15 +120,30 @@ def _clock(columns: Sequence[Column], log: str, several: bool) -> list[Line]:
         if column.kind == "text" or not steps.size or np.nanmin(steps) < 0.0:
             continue
         lines: list[Line] = [("from", column.name, "")]
+        fit = [column.reading.unit] if column.reading.unit else sizes.time_units(steps)
         if column.kind == "dates":
-            return [*lines, ("date", "iso", "")]
-        unit = column.reading.unit
-        if unit:
-            return [*lines, ("unit", unit, "by its name")]
-        return [*lines, ("unit", *_one_of(sizes.time_units(steps), f"steps of {steps[0]:.6g}"))]
+            lines.append(("date", "iso", ""))
+            fit = ["s"]
+        elif column.reading.unit:
+            lines.append(("unit", column.reading.unit, "by its name"))
+        else:
+            lines.append(("unit", *_one_of(fit, f"steps of {steps[0]:.6g}")))
+        return lines + (_rate(column.values, fit[0]) if len(fit) == 1 and main else [])
     if several:
         return [("from", "?", "the column with the time: several logs need their stamps")]
     return [("rate_Hz", "?", "no column holds the time: how many rows come in a second?")]
+
+
+def _rate(values: Floats, unit: str) -> list[Line]:
+    """Return the line of the frames' rate, where the rows do not come evenly."""
+    known = parse_unit(unit)
+    time_s = values * known.factor if known is not None else values
+    rate = sizes.even_rate(time_s)
+    if rate is None or not np.isfinite(rate):
+        return []
+    steps_ms = 1e3 * np.diff(time_s)
+    apart = f"the rows come unevenly, {steps_ms.min():.4g} to {steps_ms.max():.4g} ms apart"
+    return [("frame_rate_Hz", rate, apart)]
 
 
 def _chosen(columns: Sequence[Column]) -> dict[str, Column]:

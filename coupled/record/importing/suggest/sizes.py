@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.record.importing.clock import EVEN_frames
 from coupled.record.importing.mapping import factor_of, own_unit
 from coupled.rig.parameters import Control
 from coupled.units import parse_unit
@@ -31,6 +32,10 @@ _UNITS = {
 }
 _ALTITUDES = ("m", "ft")
 RATES_Hz = (5.0, 5000.0)  # what a test is logged at
+COMMON_Hz = (
+    *(10.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 64.0, 75.0, 80.0, 100.0, 120.0, 125.0, 128.0),
+    *(200.0, 240.0, 250.0, 256.0, 400.0, 480.0, 500.0, 1000.0, 2000.0),
+)
 TIMES = ("s", "ms", "us", "ns")
 COUNTS = 100.0  # whole numbers that reach further are an encoder's, or a converter's
 
@@ -62,6 +67,19 @@ def time_units(steps: Floats) -> list[str]:
             rate = 1.0 / (step * unit.factor)
             fit += [name] if RATES_Hz[0] <= rate <= RATES_Hz[1] else []
     return fit
+
+
+def even_rate(time_s: Floats) -> float | None:
+    """Return a rate, in Hz, for frames over rows that come unevenly; None where they come evenly.
+
+    A rate that people choose, where one lies within 3 % of the rows' own.
+    """
+    rate = (time_s.size - 1) / float(np.ptp(time_s))
+    stray = time_s - time_s[0] - np.arange(time_s.size) / rate
+    if float(np.ptp(stray)) * rate < EVEN_frames:
+        return None
+    near = [each for each in COMMON_Hz if abs(each / rate - 1.0) < 0.03]
+    return min(near, key=lambda each: abs(each - rate)) if near else float(f"{rate:.3g}")
 
 
 def are_counts(values: Floats) -> bool:
