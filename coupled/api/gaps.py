@@ -23,12 +23,14 @@ def diagnose(
     records: Given | Sequence[Given] | Mapping[str, Record],
     control: ControlName = "column",
     progress: Callable[[str, int, int], None] | None = None,
+    healthy: Given | Sequence[Given] | Mapping[str, Record] | None = None,
 ) -> Diagnosis:
     """Diagnose a mismatch between simulation and record: where, which effect, how large.
 
     `rig` is the rig that the records should be of: a rig, its file, or the name of a shipped
     one. `records` is one record or several of that rig, as `Record`, as files, or by name;
     each needs `time_s` and what its stages need (force and deflections of the control, q̄).
+    `healthy` are records of the machine when it was well; what differs from those is judged.
 
     `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
     `found.effects` are the effects, each with its parameters, their values and 95 % intervals;
@@ -51,7 +53,8 @@ def diagnose(
         problem = f"is {control!r}; one of {', '.join(CONTROL_NAMES)}"
         raise InputError("diagnose", "control", problem)
     nominal = rig if isinstance(rig, Rig) else load_rig(rig)
-    return diagnose_records(nominal, named_records(records), control, progress)
+    well = None if healthy is None else named_records(healthy)
+    return diagnose_records(nominal, named_records(records), control, progress, well)
 
 
 def named_records(records: Given | Sequence[Given] | Mapping[str, Record]) -> dict[str, Record]:

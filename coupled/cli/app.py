@@ -24,6 +24,7 @@ from coupled.cli.process import (
     REFUSED,
     Stop,
     prepare_streams,
+    prepare_threads,
     said_of,
     silence_streams,
 )
@@ -54,6 +55,7 @@ def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""
     gc.set_threshold(_GARBAGE)
     prepare_streams()
+    prepare_threads()
     with Stop() as stop:
         try:
             code = _run()

@@ -36,6 +36,14 @@ def diagnose(
     ],
     rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")] = "",
     control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    healthy: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="LOG",
+            help="A record of the machine when it was well; may be given often. What differs from"
+            " those is judged.",
+        ),
+    ] = None,
     improve: Annotated[
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
@@ -69,7 +77,7 @@ def diagnose(
     from coupled.record.record import manifest_path
 
     if any(record.is_dir() for record in records):
-        asked = {"--improve": improve, "--plots": plots, "--power": power}
+        asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
         _diagnose_folder(records, rig, output, name, check_cluster(workers, cluster))
         return
@@ -81,7 +89,8 @@ def diagnose(
     if not rig:
         raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
     rig_file = find(rig, shipped_rigs(), "rig")
-    inputs = [*records, *map(manifest_path, records), rig_file]
+    read_too = [*records, *(healthy or [])]
+    inputs = [*read_too, *map(manifest_path, read_too), rig_file]
     if improve is not None and improve.suffix != ".toml":
         raise InputError(improve, "--improve", "is a rig file: its name ends in .toml")
     drawn = _plot_targets(plots)
@@ -92,7 +101,7 @@ def diagnose(
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     targets += check_report(report, [*inputs, *targets])
     check_json(json_file, [*inputs, *targets])
-    whole, read = _diagnose(records, rig_file, name)
+    whole, read = _diagnose(records, rig_file, name, healthy or [])
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
     with Outputs() as outputs:
@@ -117,7 +126,7 @@ def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
 
 
 def _diagnose(
-    files: list[Path], rig_file: Path, control: ControlName
+    files: list[Path], rig_file: Path, control: ControlName, healthy: list[Path]
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
     from coupled.record.record import read_record
@@ -125,12 +134,13 @@ def _diagnose(
 
     nominal = read_rig(rig_file)
     read: dict[str, Record] = {}
-    for file in files:
+    for file in [*files, *healthy]:
         if str(file) in read:
             raise InputError(file, "", "is a duplicate: give each record once")
         read[str(file)] = read_record(file)
+    well = {str(file): read.pop(str(file)) for file in healthy}
     with progress() as advance:
-        whole = find_gap(nominal, read, control, advance)
+        whole = find_gap(nominal, read, control, advance, well)
         advance("flying again, and looking for the next test", 0, 1)
         _ = whole.closed_loop, whole.next_tests  # here, where progress is shown
     return whole, read
@@ -163,6 +173,7 @@ def _write_improved(
     from coupled.files import read_text
     from coupled.gap.summary import change, plain
     from coupled.rig.rigedit import differences, edited
+    from coupled.rig.rigfile import read_rig
 
     names = ", ".join(shown(Path(name).name) for name in records)
     remark = f"{shown(rig_file.name)} with what was found in {names}:\n{whole.summary}\n"
@@ -171,7 +182,7 @@ def _write_improved(
     for setting in whole.settings:
         moved = f"{100 * (setting.factor - 1):+.2f} %, within what it is set to"
         remark += f"changed: {plain(setting.name)} {moved}\n"
-    changes = differences(whole.nominal, whole.improved)
+    changes = differences(read_rig(rig_file), whole.improved)
     write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))
 
 

@@ -59,6 +59,16 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="replace")
 
 
+def prepare_threads() -> None:
+    """Let linear algebra use one thread, unless the user says otherwise.
+
+    The matrices here are small, and its threads would wait for one another longer than they work;
+    what takes long is dealt to processes. Only before numpy is loaded has this an effect.
+    """
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
 def silence_streams() -> None:
     """Drop what waits on a stream that takes no more."""
     for stream in (sys.stdout, sys.stderr):

@@ -29,6 +29,8 @@ class Case:
     outputs: Sequence[Output]
     tell: Tell | None = None
     refloored: Callable[[Rig], Sequence[Output]] | None = None
+    # A model with an error of its own strains its settings: only a stage over its limit is guilty.
+    only_wide: bool = False
 
     @cached_property
     def known(self) -> dict[str, Effect]:

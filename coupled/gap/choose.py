@@ -65,9 +65,10 @@ def search(
     library: Sequence[Effect] = EFFECTS,
     tell: Tell | None = None,
     refloored: Callable[[Rig], Sequence[Output]] | None = None,
+    only_wide: bool = False,
 ) -> Choice:
     """Return the effects that explain a record's gap, each earning its place in turn."""
-    case = Case(nominal, control, outputs, tell, refloored)
+    case = Case(nominal, control, outputs, tell, refloored, only_wide)
     settled = current = case.fit(())
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
@@ -250,7 +251,7 @@ def _strained(case: Case, current: Fit) -> set[str]:
 
     It may then keep a stage within its limit that is off by more.
     """
-    settings = case.known.values()
+    settings = () if case.only_wide else case.known.values()
     return {one.stage for one in settings for p in one.free if one.value_key(p) in current.at_bound}
 
 

@@ -22,6 +22,7 @@ from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice, search
 from coupled.gap.compensation import compensation_gap
 from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.healthy import Baseline
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.result import (
@@ -44,12 +45,20 @@ def diagnose(
     records: Mapping[str, Record],
     control: ControlName = "column",
     tell: Tell | None = None,
+    healthy: Mapping[str, Record] | None = None,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
-    `tell` is called with what is being done, and how much of how much is done. Raises InputError
-    where a record cannot be of this rig, or lets no stage be judged.
+    `tell` is called with what is being done, and how much of how much is done. With records of the
+    machine when it was well (`healthy`), the difference from those is judged (`healthy`). Raises
+    InputError where a record cannot be of this rig, or lets no stage be judged.
     """
+    baseline = None
+    if healthy:
+        well = diagnose(rig, healthy, control, tell)
+        case = Case(rig, control, well.outputs)
+        baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
+        rig = baseline.rig
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
@@ -57,7 +66,8 @@ def diagnose(
     readers = [
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]
-    outputs = [output.halved(rig) for output in _outputs(readers)]
+    raised = list if baseline is None else baseline.raised
+    outputs = [output.halved(rig) for output in raised(_outputs(readers))]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
@@ -65,9 +75,9 @@ def diagnose(
     library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()))]
 
     def refloored(other: Rig) -> Sequence[Output]:
-        return _outputs([replace(reader, rig=other) for reader in readers])
+        return raised(_outputs([replace(reader, rig=other) for reader in readers]))
 
-    choice = search(rig, control, outputs, library, tell, refloored)
+    choice = search(rig, control, outputs, library, tell, refloored, baseline is not None)
     case = Case(rig, control, outputs, tell, refloored)
     stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
     fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values)
@@ -95,6 +105,7 @@ def diagnose(
         records=dict(records),
         outputs=tuple(outputs),
         choice=choice,
+        baseline=baseline,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from coupled.gap.choose import Choice
 from coupled.gap.flown import ChannelAgain, closed_loop, nearer
+from coupled.gap.healthy import Baseline
 from coupled.gap.output import Output
 from coupled.gap.power import EffectPower, power
 from coupled.gap.proposal import ProposedTest, in_one_line, next_tests
@@ -35,6 +36,7 @@ class Diagnosis(Findings):
     records: Mapping[str, Record] = field(repr=False, compare=False)
     outputs: tuple[Output, ...] = field(repr=False, compare=False)
     choice: Choice = field(repr=False, compare=False)
+    baseline: Baseline | None = field(default=None, repr=False, compare=False)
 
     @property
     def first(self) -> Record:
@@ -71,7 +73,8 @@ class Diagnosis(Findings):
     @cached_property
     def summary(self) -> str:
         """What is wrong, how large, how sure, how much it explains, and what to record next."""
-        return summary(self, self.shrink, self.next_test)
+        said = summary(self, self.shrink, self.next_test)
+        return said if self.baseline is None else f"{self.baseline.words} {said}"
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
         """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
@@ -86,6 +89,8 @@ class Diagnosis(Findings):
             "shrink": self.shrink.as_dict(),
             "settings": {setting.name: setting.factor for setting in self.settings},
         }
+        if self.baseline is not None:
+            found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
         if self.next_tests:

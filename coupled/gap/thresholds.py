@@ -30,6 +30,10 @@ GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at 
 NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
 SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps stands at 1.15
 
+# Records of the healthy machine (`healthy`).
+HEALTHY_ALONE = 0.2  # chosen: relative scatter of a model's error where one record shows it
+HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is as it was
+
 # Inputs of the stages (`stages`, `airframe`, `surfaces`).
 ECHO_SHARE = 0.1  # of G_T's noise that echoes q̄'s, from which the host made it of q̄ as recorded
 PRELOAD_UNSURE = 8.0  # chosen: of a channel's noise about neutral, where the preload's side is open
