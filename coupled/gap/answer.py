@@ -78,8 +78,15 @@ def effects_of(
     What stands beside a remainder may only imitate what is missing: the more it leaves, and the
     less credible it is, the less sure.
     """
-    left = {stage.name for stage in stages if stage.unexplained}
-    remains = {one.stage: one.remains for one in budget}
+    unexplained = {stage.name for stage in stages if stage.unexplained}
+    # What has no residual of its own is as doubtful as those in which it shows.
+    shown = {stage.name: set(stage.shown_in) or {stage.name} for stage in stages}
+    left = {name for name, others in shown.items() if others & unexplained}
+    known = {one.stage: one.remains for one in budget}
+    remains = {
+        name: max((known.get(other, 0.0) for other in (name, *others & unexplained)), default=0.0)
+        for name, others in shown.items()
+    }
     records = [reader.record for reader in readers]
 
     def result(step: Found) -> EffectResult:

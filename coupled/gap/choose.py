@@ -87,6 +87,10 @@ def search(
             current = case.fit(rest, start=current.values)
             if needless is best.effect:
                 break
+    empty = [step for step in steps if says_nothing(case, step.effect, current)]
+    if empty:
+        steps = [step for step in steps if step not in empty]
+        current = case.fit([step.effect for step in steps], start=current.values)
     if len(steps) > 1:
         steps = [_again(case, settled, current, step) for step in steps]
     tried = next((gains for gains in rounds if gains), {})
@@ -231,10 +235,26 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         ]
         fitted = min(tries, key=lambda one: one.cost)
         bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
-        if not bound and not _within_tolerance(case, effect, fitted):
+        if bound or says_nothing(case, effect, fitted):
+            continue
+        if not _within_tolerance(case, effect, fitted):
             found.append((effect, fitted))
     ranked = ranked_by_gain(case.outputs, current, found)
     return ranked if guilty or _surely_beyond(case, ranked) else []
+
+
+def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect's interval holds the size at which it does nothing.
+
+    By its first number, the level; the others shape it. Of a limit, none is no size.
+    """
+    if not effect.free or effect.free[0].inverse:
+        return False
+    level = effect.free[0]
+    key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
+    if key not in fitted.low:
+        return False
+    return fitted.low[key] <= nothing <= fitted.high[key]
 
 
 def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:

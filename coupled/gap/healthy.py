@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from coupled.gap.case import Case
 from coupled.gap.fit import Fit
 from coupled.gap.output import Output, Part
+from coupled.gap.smooth import smoothed
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.rig.rig import Rig
 
@@ -31,12 +32,14 @@ Floats = NDArray[np.float64]
 class ModelError:
     """What a rig leaves of a channel of the healthy machine beside noise.
 
-    `rms` and `moves`, the channel's standard deviation, are in its unit. `by_stretch` and
-    `by_record` are relative standard deviations of the rms: of one stretch, and of one record.
+    `rms` and `moves`, the channel's standard deviation, are in its unit, `rate` that of its change
+    from frame to frame. `by_stretch` and `by_record` are relative standard deviations of the rms:
+    of one stretch, and of one record.
     """
 
     rms: float
     moves: float
+    rate: float
     by_stretch: float
     by_record: float
 
@@ -50,20 +53,24 @@ class ModelError:
         blocks = np.concatenate(
             [_by_stretch(o, left) for o, left in zip(outputs, lefts, strict=True)]
         )
-        alone = len(each) == 1
+        few = HEALTHY_ALONE / math.sqrt(len(each))
+        scatter = float(np.std(each, ddof=1) / np.mean(each)) if len(each) > 1 else 0.0
         return cls(
             rms=math.sqrt(max(power - noise, 0.0)),
-            moves=float(np.std(np.concatenate([output.measured for output in outputs]))),
+            moves=math.sqrt(float(np.mean([np.var(output.measured) for output in outputs]))),
+            rate=math.sqrt(float(np.mean([_rate(output) ** 2 for output in outputs]))),
             by_stretch=0.5 * float(np.std(blocks) / max(np.mean(blocks), 1e-300)),
-            by_record=HEALTHY_ALONE if alone else float(np.std(each, ddof=1) / np.mean(each)),
+            by_record=max(scatter, few),
         )
 
     def raised(self, output: Output) -> Output:
         """Return an output whose floor holds the model's error too.
 
-        Of a larger motion than the healthy machine's, the error is taken to be larger as much.
+        Of a larger or faster motion than the healthy machine's, the error is taken to be larger
+        as much.
         """
         larger = max(1.0, float(np.std(output.measured)) / max(self.moves, 1e-300))
+        larger = max(larger, _rate(output) / max(self.rate, 1e-300))
         error = self.rms * larger
         floor = math.hypot(output.floor, error)
         share = (error / floor) ** 2
@@ -76,6 +83,11 @@ class ModelError:
             smoothed=(1.0 - share) * output.smoothed,
             _known=[],
         )
+
+
+def _rate(output: Output) -> float:
+    """Return the standard deviation of a channel's change from frame to frame, noise taken off."""
+    return float(np.std(np.diff(smoothed(output.measured))))
 
 
 def tolerances(case: Case, found: Fit) -> dict[str, float]:
