@@ -46,6 +46,7 @@ ORDER += [
     "plots",
     "reports",
     "api",
+    "live",
     "cli/tables",
     "cli/terminal",
     "cli",

@@ -272,6 +272,12 @@ class JSBSimAirframe:
         node = self._node(name, key, file)
         return Lever(node.set_double_value, node.get_double_value)
 
+    def reader(self, name: str) -> Callable[[], float] | None:
+        """Return what reads a property, in JSBSim's unit; None where the model has none such."""
+        node: Any = self._properties.get_node(name) if self.has(name) else None
+        read: Callable[[], float] | None = None if node is None else node.get_double_value
+        return read
+
     def set_gust(self, up_m_per_s: float) -> None:
         """Let a gust rise at this speed from the next step on, beside any wind."""
         self._fdm[GUST_DOWN] = -up_m_per_s / FOOT_m

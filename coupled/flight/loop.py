@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,9 +40,10 @@ from coupled.record.channels import (
 from coupled.record.record import EndedEarly, Record
 from coupled.resources import aircraft_folder
 from coupled.rig.compiled import bound
+from coupled.rig.control import ControlArray
 from coupled.rig.equations import specified_gradient
 from coupled.rig.frame import addresses, step_frame_at
-from coupled.rig.packing import pack
+from coupled.rig.packing import Hand, pack
 from coupled.rig.recorder import lateness, stamp
 from coupled.timing import timed
 
@@ -50,18 +51,54 @@ Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Aboard:
+    """A flight's arrays, which who goes along may read and change between frames.
+
+    controls  the rig's controls as the kernels hold them, shape (n,)
+    script    the hands' force in N and held deflection on all nodes, shape (n, 2, nodes)
+    data      the record, shape (frames, channels); rows to come hold noise
+    hands     what each pilot's hand is, by the control
+    """
+
+    manoeuvre: Manoeuvre
+    airframe: Airframe
+    channels: tuple[str, ...]
+    controls: ControlArray
+    script: Floats
+    data: Floats
+    hands: dict[str, Hand]
+
+
+class Companion(Protocol):
+    """Who goes along with a flight, frame by frame: a live host."""
+
+    elsewhere: bool  # hand and loader are real: the rig's are not simulated
+
+    def board(self, aboard: Aboard) -> None:
+        """Begin, with the aircraft in trim."""
+
+    def before(self, k: int, motion: tuple[float, ...]) -> str:
+        """Do what precedes frame k; return why the flight is to end, or an empty string."""
+
+    def after(self, k: int, commands: tuple[float, float, float]) -> None:
+        """Take the surface commands of frame k before the aircraft has them."""
+
+
 def fly(
     manoeuvre: Manoeuvre,
     progress: Progress | None = None,
     air_m_per_s: Sequence[float] | None = None,
+    companion: Companion | None = None,
 ) -> Record:
     """Fly a manoeuvre and return its record, SI, one row a frame.
 
     `progress` is called now and then with frames done and frames in all. The manifest says
     what went in, and under `ended_early` why and when a flight ended before its time.
-    `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame.
+    `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame. A
+    `companion` is called before and after each frame.
     """
-    rig, properties = manoeuvre.rig, manoeuvre.record_properties
+    rig = manoeuvre.rig
     with timed("trim"):
         airframe = make_airframe(manoeuvre, air_m_per_s)
     frames, substeps = manoeuvre.frames, rig.substeps
@@ -69,7 +106,8 @@ def fly(
     actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
     names = list(rig.controls)
     channels = record_channels(names, rig.flight is not None)
-    controls = pack(rig, {str(name): action.hand for name, action in actions.items()})
+    grips = {str(name): action.hand for name, action in actions.items()}
+    controls = pack(rig, grips)
     script = _script(names, actions, frames * substeps + 1, h)
     data = _noise(channels, rig.noise, frames, manoeuvre.seed)
     noise = data.copy() if lateness(rig) else None
@@ -78,16 +116,22 @@ def fly(
     extra: list[tuple[float, ...]] = []
 
     read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
-    arrays = addresses(controls, script, data)
+    elsewhere = companion is not None and companion.elsewhere
+    arrays = addresses(controls, script, data, elsewhere)
     place = int(arrays.ctypes.data)
     rig_frame = bound(step_frame_at, place, 0, read(), 1.0)
-    flown, asked = rig.flight is not None, bool(properties)
+    flown, asked = rig.flight is not None, bool(manoeuvre.record_properties)
     ended: EndedEarly | None = None
     done = 0
+    if companion is not None:
+        companion.board(Aboard(manoeuvre, airframe, channels, controls, script, data, grips))
     try:
         with timed("fly"):
             for k in range(frames):
                 motion = read()
+                if companion is not None and (why := companion.before(k, motion)):
+                    ended = EndedEarly(why, k / rig.frame_rate)
+                    break
                 # Not above it: near the ground, or not a number.
                 if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
                     ended = EndedEarly(why, k / rig.frame_rate)
@@ -97,6 +141,8 @@ def fly(
                         state["command"] = look(k / rig.frame_rate, motion)
                 load = motion[LOAD] if flown else 1.0
                 commands = rig_frame(place, k, motion, load)
+                if companion is not None:
+                    companion.after(k, commands)
                 if asked:
                     extra.append(airframe.extra())
                 step(commands)
@@ -105,11 +151,24 @@ def fly(
                     progress(done, frames)
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
-    data, ended = _finite(data[:done], rig.frame_rate, ended)
-    data[:, 0] = np.arange(len(data)) / rig.frame_rate
+    return _flown(manoeuvre, channels, (data[:done], noise), extra, ended)
+
+
+def _flown(
+    manoeuvre: Manoeuvre,
+    channels: tuple[str, ...],
+    flown: tuple[Floats, Floats | None],
+    extra: Sequence[tuple[float, ...]],
+    ended: EndedEarly | None,
+) -> Record:
+    """Return the record of the frames flown, with their noise, up to the first without a number."""
+    frame_rate, properties = manoeuvre.rig.frame_rate, manoeuvre.record_properties
+    data, noise = flown
+    data, ended = _finite(data, frame_rate, ended)
+    data[:, 0] = np.arange(len(data)) / frame_rate
     if noise is not None:
-        stamp(rig, channels, data, noise[: len(data)])
-    if asked:
+        stamp(manoeuvre.rig, channels, data, noise[: len(data)])
+    if properties:
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
     return Record(channels, data, _manifest(manoeuvre, channels, data, ended))
@@ -171,14 +230,13 @@ def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Acti
 
 def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
     """Return the hands' script on all nodes, shape (controls, 2, nodes): N and d."""
-    times = _times(nodes, h)
-    script = np.zeros((len(names), 2, nodes))
+    script = np.zeros((len(names), 2, nodes))  # takes no memory where nothing is written
     for name, action in actions.items():
         force, held = script[names.index(name)]
         if action.force is not None:
-            force[:] = action.force(times)
+            force[:] = action.force(_times(nodes, h))
         if action.held is not None:
-            held[:] = action.held(times)
+            held[:] = action.held(_times(nodes, h))
     return script
 
 

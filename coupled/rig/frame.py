@@ -148,6 +148,46 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
         bend_by_others(controls, i)
 
 
+@stage
+def start_controls(controls: ControlArray, script: Floats) -> None:
+    """Begin with each hand on its grip: gauge, delay and structure have its first force."""
+    for i in range(len(controls)):
+        p, s = controls[i].parameters, controls[i].state
+        free(s.reach)
+        set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
+        start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
+        s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
+        start_bend(p.linkage, s.linkage, s.hand.force)
+
+
+@stage
+def host_frames(
+    controls: ControlArray, row: Floats, motion: tuple[float, ...]
+) -> tuple[float, float, float]:
+    """Do what host and recorder do at t_k for all controls; return the surface commands."""
+    first_command = second_command = third_command = 0.0
+    pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
+    # Here, not after the flight: a frame then leaves no object behind.
+    for i in range(len(motion)):
+        row[pressure_at + i] += motion[i]
+    if controls[0].parameters.crossing.joined != 0:
+        for i in range(len(controls)):
+            bend_by_others(controls, i)
+        read_others(controls, row)
+    for i in range(len(controls)):
+        p, s = controls[i].parameters, controls[i].state
+        first = 1 + CHANNELS_PER_CONTROL * i
+        out = row[first : first + CHANNELS_PER_CONTROL]
+        command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)
+        if i == 0:
+            first_command = command
+        elif i == 1:
+            second_command = command
+        else:
+            third_command = command
+    return first_command, second_command, third_command
+
+
 @entry
 def step_frame(
     controls: ControlArray,
@@ -166,53 +206,32 @@ def step_frame(
     motion    of the airframe at t_k, q̄ in Pa first
     The commands are in ±1, one a control, 0 for a control that is absent.
     """
-    first_command = second_command = third_command = 0.0
-    row = record[k]
-    pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
-    joined = controls[0].parameters.crossing.joined != 0
-    # Here, not after the flight: a frame then leaves no object behind.
-    for i in range(len(motion)):
-        row[pressure_at + i] += motion[i]
     if k == 0:
-        for i in range(len(controls)):
-            p, s = controls[i].parameters, controls[i].state
-            free(s.reach)
-            set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
-            start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
-            s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
-            start_bend(p.linkage, s.linkage, s.hand.force)
-    if joined:
-        for i in range(len(controls)):
-            bend_by_others(controls, i)
-        read_others(controls, row)
+        start_controls(controls, script)
+    commands = host_frames(controls, record[k], motion)
+    if controls[0].parameters.crossing.joined != 0:
+        run_joined(controls, script, k, load_factor)
+        return commands
     for i in range(len(controls)):
         p, s = controls[i].parameters, controls[i].state
-        force, held = script[i, 0], script[i, 1]
-        node = k * p.clock.substeps
-        first = 1 + CHANNELS_PER_CONTROL * i
-        out = row[first : first + CHANNELS_PER_CONTROL]
-        command = host_frame(p, s, s.hand.force, row[pressure_at], motion[0], out)
-        if not joined:
-            run_frame(p, s, force, held, node, load_factor)
-        if i == 0:
-            first_command = command
-        elif i == 1:
-            second_command = command
-        else:
-            third_command = command
-    if joined:
-        run_joined(controls, script, k, load_factor)
-    return first_command, second_command, third_command
+        run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
+    return commands
 
 
-def addresses(controls: ControlArray, script: Floats, record: Floats) -> NDArray[np.int64]:
-    """Return addresses and sizes of `step_frame`'s arrays for `step_frame_at`; keep all alive."""
+def addresses(
+    controls: ControlArray, script: Floats, record: Floats, elsewhere: bool = False
+) -> NDArray[np.int64]:
+    """Return addresses and sizes of `step_frame`'s arrays for `step_frame_at`; keep all alive.
+
+    `elsewhere`: hand and loader are not simulated, but measured; only the host's part is done.
+    """
     assert all(array.flags.c_contiguous for array in (controls, script, record))
     return np.array(
         [
             *(controls.ctypes.data, len(controls)),
             *(script.ctypes.data, script.shape[2]),
             *(record.ctypes.data, *record.shape),
+            elsewhere,
         ]
     )
 
@@ -225,8 +244,10 @@ def step_frame_at(
 
     To hand over three arrays at every frame costs as much as half of the physics.
     """
-    at = carray(pointer(address), 7, np.int64)
+    at = carray(pointer(address), 8, np.int64)
     controls = carray(pointer(at[0]), (at[1],), CONTROL)
     script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
     record = carray(pointer(at[4]), (at[5], at[6]), np.float64)
+    if at[7] != 0:
+        return host_frames(controls, record[k], motion)
     return step_frame(controls, script, record, k, motion, load_factor)

@@ -1,0 +1,82 @@
+"""From the words of the command line to what attaches: what is flown, a loader, a hand."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import replace
+
+from coupled.api.rigs import load_rig
+from coupled.errors import InputError, nearest
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
+from coupled.flight.runfile import read_run
+from coupled.live.hands import LiveHand
+from coupled.live.link import Link, split_address
+from coupled.live.udp import UdpLink
+from coupled.rig.rig import Rig
+
+LONGEST_s = 7200.0  # of a flight, as of a run
+HANDS = ("pilot", "page", "stick")
+
+
+def needs(package: str, what: str) -> None:
+    """Raise InputError, which says how to get it, where a package of the extra lacks."""
+    if importlib.util.find_spec(package) is None:
+        problem = f"needs {package}, which is not installed: pip install 'coupled[live]'"
+        raise InputError(what, "", problem)
+
+
+def open_link(url: str, rig: Rig, lockstep: bool, deflection: bool) -> Link | None:
+    """Return the loader at `url`, or None for the simulated one; raises InputError.
+
+    `deflection` says that a loader of the open protocol measures δ.
+    """
+    if url == "sim":
+        return None
+    scheme, host, port = split_address(url)
+    if scheme == "udp":
+        return UdpLink(host, port, rig, deflection, lockstep)
+    raise InputError("--loader", "", f"is {url!r}; {nearest(scheme, ('sim', 'udp', 'cls2sim'))}")
+
+
+def run_live(run: str, case: str, duration_s: float | None, hand: str) -> Manoeuvre:
+    """Return the case of a run that is flown live, the first unless named.
+
+    `duration_s` is in place of the run's; `hand` is `pilot` for the run's own, or else every
+    control has a live hand. Raises InputError.
+    """
+    _check(duration_s, hand)
+    cases: Mapping[str, Manoeuvre] = {each.label: each for each in read_run(run)}
+    if case and case not in cases:
+        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, cases)}")
+    flown = cases[case] if case else next(iter(cases.values()))
+    if duration_s is not None:
+        flown = replace(flown, duration_s=duration_s)
+    if hand != "pilot":
+        flown = replace(flown, pilots=dict.fromkeys(flown.rig.controls, LiveHand()))
+    return flown
+
+
+def rig_live(rig: str, duration_s: float | None, hand: str) -> Manoeuvre:
+    """Return a rig under a live hand on each control, to be flown until it is stopped.
+
+    It ends after `duration_s`, two hours unless given. A bench has the q̄ of its schedule's
+    middle. Raises InputError.
+    """
+    _check(duration_s, hand)
+    loaded, bench = load_rig(rig), None
+    if loaded.flight is None:
+        pressures = next(iter(loaded.controls.values())).schedule.dynamic_pressure
+        middle = 0.5 * (pressures[0] + pressures[-1])
+        bench = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[middle])
+    pilots = dict.fromkeys(loaded.controls, LiveHand())
+    longest = LONGEST_s if duration_s is None else duration_s
+    return Manoeuvre(loaded, pilots, longest, bench=bench, name=f"{loaded.name}-live")
+
+
+def _check(duration_s: float | None, hand: str) -> None:
+    if hand not in HANDS:
+        raise InputError("--hand", "", f"is {hand!r}; {nearest(hand, HANDS)}")
+    if duration_s is not None and not 0.0 < duration_s <= LONGEST_s:
+        problem = f"is {duration_s:g} s; give more than 0, at most {LONGEST_s:g}"
+        raise InputError("--duration", "", problem)

@@ -1,0 +1,164 @@
+"""A real loader attached: its answers watched, its orders limited, its forces faded in and out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from coupled.errors import InputError
+from coupled.flight.loop import Aboard
+from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, WATCHDOG_s
+from coupled.live.safety import Fade, Limiter, Limits
+from coupled.record.channels import channel
+from coupled.rig.frame import addresses, step_frame_at
+
+ANSWER_s = 10.0  # how long the host waits for a loader's first answer
+GONE_s = 30.0  # and for one again, before the flight ends
+GONE = f"the loader has not answered for {GONE_s:g} s"
+_IDLE = Order(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass
+class Losses:
+    """When a loader was not heard: from when to when, s; and frames without a new packet."""
+
+    spells: list[list[float | None]] = field(default_factory=list)
+    stale_frames: int = 0
+
+
+class Attached:
+    """The loader at the other end of `link`; `warn` hears what a pilot must know at once."""
+
+    def __init__(
+        self,
+        link: Link,
+        limits: Limits,
+        aboard: Aboard,
+        paced: bool,
+        warn: Callable[[str], None],
+    ) -> None:
+        rig = aboard.manoeuvre.rig
+        self.link, self._aboard, self._paced, self._warn = link, aboard, paced, warn
+        self.frame_s = 1.0 / rig.frame_rate
+        self._limiters = [Limiter(limits, c.travel, self.frame_s) for c in rig.controls.values()]
+        self._fade = Fade(limits.fade_s, self.frame_s)
+        names, at = list(rig.controls), aboard.channels.index
+        self._force_at = [at(channel(name, "modifying_force")) for name in names]
+        self._gradient_at = [at(channel(name, "gradient")) for name in names]
+        self._deflection_at = [at(channel(name, "deflection")) for name in names]
+        self._measured: tuple[Measured, ...] = (Measured(0.0, 0.0, 0.0),) * len(names)
+        self._orders = (_IDLE,) * len(names)
+        self._seen = 0.0
+        self.lost = False
+        self.losses = Losses()
+
+    @property
+    def limited_frames(self) -> int:
+        """Return in how many frames the limits cut an order."""
+        return sum(limiter.limited for limiter in self._limiters)
+
+    def meet(self) -> None:
+        """Wait for the loader's first answer, and let its forces in, the aircraft in trim."""
+        begun = time.monotonic()
+        while (sample := self.link.receive(0.02)) is None:
+            self.link.send(self._orders, OFF)
+            if time.monotonic() - begun > ANSWER_s:
+                problem = f"does not answer within {ANSWER_s:g} s; start the loader first"
+                raise InputError(self.link.name, "", problem)
+        self._take(sample.controls)
+        controls = self._aboard.controls.copy()
+        row = np.zeros((1, len(self._aboard.channels)))
+        place = addresses(controls, self._aboard.script, row, elsewhere=True)
+        motion = self._aboard.airframe.motion()
+        while True:
+            self._put(controls)
+            row[:] = 0.0
+            step_frame_at(int(place.ctypes.data), 0, motion, 1.0)
+            self.order(controls, row[0])
+            if self._fade.share >= 1.0:
+                return
+            self._wait_frame()
+            self.listen(0.0)
+            if time.monotonic() - self._seen > ANSWER_s:
+                problem = "has stopped answering while its forces came in"
+                raise InputError(self.link.name, "", problem)
+
+    def _wait_frame(self) -> None:
+        if self._paced:
+            time.sleep(self.frame_s)
+
+    def listen(self, time_s: float) -> str:
+        """Take the loader's newest sample; return why the flight is to end, if it is."""
+        sample = self.link.receive(0.0 if self._paced else WATCHDOG_s)
+        now = time.monotonic()
+        if sample is not None:
+            self._take(sample.controls)
+            if self.lost:
+                self.lost = False
+                self.losses.spells[-1][1] = time_s
+                self._warn("the loader answers again: its forces come back")
+        else:
+            self.losses.stale_frames += 1
+            if not self.lost and now - self._seen > WATCHDOG_s:
+                self.lost = True
+                self.losses.spells.append([time_s, None])
+                self._warn("the loader does not answer: its forces go, the surface is held")
+            if now - self._seen > GONE_s:
+                return GONE
+        self._put(self._aboard.controls)
+        return ""
+
+    def _take(self, measured: tuple[Measured, ...]) -> None:
+        """Take what was measured; where δ was not, the last one stands."""
+        self._seen = time.monotonic()
+        self._measured = tuple(
+            now if math.isfinite(now.deflection) else now._replace(deflection=last.deflection)
+            for now, last in zip(measured, self._measured, strict=True)
+        )
+
+    def _put(self, controls: Any) -> None:
+        """Give the kernels what was measured; a loader that is lost stays where it was."""
+        state = controls["state"]
+        for i, measured in enumerate(self._measured):
+            state["hand"]["force"][i] = measured.force
+            state["loader"]["computed"][i] = measured.computed
+
+    def order(self, controls: Any, row: Any) -> None:
+        """Send what a frame asks of the loader; the row gets what was sent, and δ as measured."""
+        share, orders = self._fade.move(not self.lost), []
+        for i, limiter in enumerate(self._limiters):
+            m = controls["state"]["modification"][i]
+            asked = Order(
+                float(m["first"]),
+                float(m["second"]),
+                float(m["break_computed"]),
+                float(m["breakout"]),
+                float(row[self._force_at[i]]),
+                float(row[self._gradient_at[i]]),
+                0.0,
+            )
+            sent = limiter.order(asked, share)
+            orders.append(sent)
+            row[self._force_at[i]] = sent.force
+            row[self._deflection_at[i]] = self._measured[i].deflection
+        self._orders = tuple(orders)
+        self.link.send(self._orders, RUN if share == 1.0 else FADING if share > 0.0 else OFF)
+
+    def farewell(self) -> None:
+        """Fade the loader's forces out, however the flight ended, and say that they are off."""
+        asked = self._orders
+        while self._fade.share > 0.0:
+            self._wait_frame()
+            self.link.receive(0.0 if self._paced else 1e-3)
+            share = self._fade.move(on=False)
+            pairs = zip(self._limiters, asked, strict=True)
+            orders = tuple(limiter.order(order, share) for limiter, order in pairs)
+            self.link.send(orders, FADING if share > 0.0 else OFF)
+        for _ in range(3):  # a datagram may be lost
+            self.link.send((_IDLE,) * len(asked), OFF)
+        self.link.close()

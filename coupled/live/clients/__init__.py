@@ -1,0 +1,1 @@
+"""Reference clients of the open protocol, to be copied: they need nothing of this package."""

@@ -1,0 +1,220 @@
+"""The host computer of a live flight: what goes along with the frames of a batch flight.
+
+Before frame k it waits for the frame's deadline, makes the changes that were asked for, and takes
+what the loader or the hand says. The batch flight's own kernel then does the host's part of the
+frame. After it the orders go to the loader, and what was flown to estimate, views and page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from coupled.errors import InputError
+from coupled.flight.loop import Aboard
+from coupled.live.attached import Attached
+from coupled.live.hands import Follower, Wishes
+from coupled.live.link import Link
+from coupled.live.pacing import Pacer
+from coupled.live.safety import Limits
+from coupled.live.service import Adaptation, BendEstimator
+from coupled.live.switches import Switches
+from coupled.record.channels import channel
+
+STOPPED = "stopped"
+Motion = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word of the user: `stop`, `mark` with a `text`, `set` of the switch `text`, `event`."""
+
+    what: str
+    text: str = ""
+    control: str = ""
+    value: float = 0.0
+
+
+class Watcher(Protocol):
+    """What looks on, a view or the page: it neither waits nor raises."""
+
+    def board(self, host: Host) -> None:
+        """Begin."""
+
+    def look(self, host: Host, k: int) -> None:
+        """Take what frame k was."""
+
+    def words(self) -> Sequence[Word]:
+        """Return what its user asked for since the last call."""
+
+    def close(self) -> None:
+        """End."""
+
+
+@dataclass
+class Plan:
+    """What a live flight is flown with; without anything it is a batch flight in real time.
+
+    `paced` is real time, else lock-step: as fast as the loader answers. `link` is a real loader;
+    without it `wishes` moves the hands on the simulated one. `adapt` gives K of service to the
+    compensation. `warn` hears what a pilot must know at once. `triggers` are events that a user
+    may let happen, by name.
+    """
+
+    paced: bool = True
+    link: Link | None = None
+    wishes: Wishes | None = None
+    limits: Limits = field(default_factory=Limits)
+    adapt: bool = False
+    watchers: Sequence[Watcher] = ()
+    warn: Callable[[str], None] = lambda text: None
+    triggers: dict[str, Callable[[], None]] = field(default_factory=dict)
+
+
+@dataclass
+class Happened:
+    """What was done and found on a live flight; times in s."""
+
+    marks: list[tuple[float, str]] = field(default_factory=list)
+    events: list[tuple[float, str]] = field(default_factory=list)
+    alarms: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K
+    adapted: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K̂
+
+
+class Host:
+    """The companion of a live flight."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.elsewhere = plan.link is not None
+        self.happened = Happened()
+        self.attached: Attached | None = None
+        self.time_s = 0.0
+        self.aboard: Aboard | None = None
+
+    def board(self, aboard: Aboard) -> None:
+        """Begin, with the aircraft in trim: meet the loader and let its forces in."""
+        plan, rig = self.plan, aboard.manoeuvre.rig
+        self.aboard, self.frame_s = aboard, 1.0 / rig.frame_rate
+        self.names = [str(name) for name in rig.controls]
+        self.substeps, controls = rig.substeps, list(rig.controls.values())
+        self.switches = Switches(rig, aboard.controls, aboard.hands, self.elsewhere)
+        self.pacer = Pacer(self.frame_s, len(aboard.data))
+        self._followers = [Follower(control.travel, self.frame_s) for control in controls]
+        self._columns = [
+            [aboard.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
+            for name in self.names
+        ]
+        measured = plan.link is None or plan.link.measures_deflection
+        pairs = zip(self.names, controls, strict=True)
+        known = [(name, c) for name, c in pairs if measured and c.compensation.bend > 0.0]
+        self.service = {name: BendEstimator(control, self.frame_s) for name, control in known}
+        self._adaptations = {
+            name: Adaptation(control.compensation.bend, max(control.schedule.total_gradient))
+            for name, control in known
+            if plan.adapt
+        }
+        if plan.link is not None:
+            self.attached = Attached(plan.link, plan.limits, aboard, plan.paced, plan.warn)
+            self.attached.meet()
+        for watcher in plan.watchers:
+            watcher.board(self)
+
+    def before(self, k: int, motion: Motion) -> str:
+        """Wait for the frame, and take what user, loader and hand say."""
+        self.time_s = k * self.frame_s
+        if self.plan.paced:
+            self.pacer.wait()
+        for watcher in self.plan.watchers:
+            for word in watcher.words():
+                if word.what == "stop":
+                    return STOPPED
+                self._obey(word)
+        if self.attached is not None:
+            return self.attached.listen(self.time_s)
+        if self.plan.wishes is not None:
+            self._lead(self.plan.wishes, k)
+        return ""
+
+    def _obey(self, word: Word) -> None:
+        if word.what == "mark":
+            self.happened.marks.append((self.time_s, word.text[:200]))
+        elif word.what == "event" and word.text in self.plan.triggers:
+            self.plan.triggers[word.text]()
+            self.happened.events.append((self.time_s, word.text))
+        elif word.what == "set":
+            try:
+                self.switches.set(self.time_s, word.control, word.text, word.value)
+            except InputError as error:
+                self.plan.warn(str(error))
+
+    def _lead(self, wishes: Wishes, k: int) -> None:
+        """Write the hands' way over the frame to come."""
+        assert self.aboard is not None
+        first, last = k * self.substeps, (k + 1) * self.substeps
+        for i, (name, follower) in enumerate(zip(self.names, self._followers, strict=True)):
+            before = follower.at
+            way = np.linspace(before, follower.move(wishes.read(name)), last - first + 1)
+            self.aboard.script[i, 1, first + 1 : last + 1] = way[1:]
+
+    def after(self, k: int, commands: tuple[float, float, float]) -> None:
+        """Send the orders; take the frame into account."""
+        assert self.aboard is not None
+        row = self.aboard.data[k]
+        if self.attached is not None:
+            self.attached.order(self.aboard.controls, row)
+        for name, at in zip(self.names, self._columns, strict=True):
+            if name in self.service:
+                self._serve(name, *(float(row[column]) for column in at))
+        for watcher in self.plan.watchers:
+            watcher.look(self, k)
+
+    def _serve(self, name: str, force: float, computed: float, deflection: float) -> None:
+        estimator = self.service[name]
+        alarmed = estimator.now.alarm
+        found = estimator.look(force, computed, deflection)
+        if found.alarm and not alarmed and found.bend is not None:
+            self.happened.alarms.append((self.time_s, name, found.bend))
+            self.plan.warn(f"K of the {name} is no longer the calibrated one")
+        if name in self._adaptations:
+            assumed = self._adaptations[name].look(self.time_s, found)
+            if assumed is not None:
+                self.switches.put(name, "assumed_bend", assumed)
+                self.happened.adapted.append((self.time_s, name, assumed))
+
+    def farewell(self) -> None:
+        """Fade the loader's forces out, and end what looks on; called however a flight ended."""
+        try:
+            if self.attached is not None:
+                self.attached.farewell()
+            elif self.plan.link is not None:
+                self.plan.link.close()
+        finally:
+            for watcher in self.plan.watchers:
+                watcher.close()
+            if self.plan.wishes is not None:
+                self.plan.wishes.close()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the manifest holds of the live flight beside a batch flight's."""
+        link, attached = self.plan.link, self.attached
+        found: dict[str, Any] = {
+            "paced": self.plan.paced,
+            "loader": "sim" if link is None else link.name,
+            "lateness": self.pacer.result().as_dict() if self.plan.paced else None,
+            "switched": [asdict(change) for change in self.switches.changes],
+            "bend_in_service": {n: e.now.as_dict() for n, e in self.service.items()},
+            "adapt": self.plan.adapt,
+            **asdict(self.happened),
+        }
+        if link is not None and attached is not None:
+            found |= {
+                "dropped_packets": dict(link.dropped),
+                "limits": asdict(self.plan.limits),
+                "limited_frames": attached.limited_frames,
+                **asdict(attached.losses),
+            }
+        return found

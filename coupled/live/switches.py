@@ -1,0 +1,98 @@
+"""What may be changed while flying: corrections, K and K̂, friction and breakout.
+
+A change is one of a key of the rig file, checked as the file is and packed as at the start, so
+that a flight goes on as a batch flight of the changed rig would. K, friction and breakout are the
+simulated loader's; a real loader has its own, and only the host's side can be changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from coupled.errors import InputError, nearest
+from coupled.record.channels import unit_of
+from coupled.rig.control import ControlArray
+from coupled.rig.packing import Hand, pack
+from coupled.rig.rig import Rig
+
+# By the words of the page: the keys of the rig file, d being the control's unit.
+KEYS: dict[str, tuple[str, ...]] = {
+    "deflection": ("compensation.deflection",),
+    "gradient": ("compensation.gradient",),
+    "assumed_bend": ("compensation.bend_{d}_per_N",),
+    "bend": ("loader.bend_{d}_per_N", "loader.bend_push_{d}_per_N"),
+    "friction": ("loader.friction_N", "loader.breakaway_N"),
+    "breakout": ("loader.breakout_N",),
+}
+YES_NO = ("deflection", "gradient")
+HARDWARE = ("bend", "friction", "breakout")
+_BESIDE = {"bend": None, "friction": 0.0}  # what the second key of a word is set to
+_WIDEST = {"friction": 200.0, "breakout": 200.0}  # N
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change made in flight, at `time_s`: `what` of a control, to `value` in SI."""
+
+    time_s: float
+    control: str
+    what: str
+    value: float | bool
+
+
+class Switches:
+    """A flight's switches.
+
+    `rig` is what is flown, `controls` the same as the kernels hold it, `hands` those of its
+    pilots, and `elsewhere` whether its loader is real.
+    """
+
+    def __init__(
+        self, rig: Rig, controls: ControlArray, hands: Mapping[str, Hand], elsewhere: bool
+    ) -> None:
+        self.rig = rig
+        self._controls, self._hands, self._elsewhere = controls, hands, elsewhere
+        self.changes: list[Change] = []
+
+    def values(self, control: str) -> dict[str, float | bool]:
+        """Return what stands now of a control, SI."""
+        data = self.rig.controls[self._control(control)]
+        return {
+            "deflection": data.compensation.deflection,
+            "gradient": data.compensation.gradient,
+            "assumed_bend": data.compensation.bend,
+            "bend": data.loader.bend,
+            "friction": data.loader.friction,
+            "breakout": data.loader.breakout,
+        }
+
+    def set(self, time_s: float, control: str, what: str, value: float | bool) -> None:
+        """Make a change, and remember it; raise InputError for one that cannot be made."""
+        self.put(control, what, value)
+        self.changes.append(Change(time_s, control, what, value))
+
+    def put(self, control: str, what: str, value: float | bool) -> None:
+        """Make a change that is not remembered, as an adaptation makes them."""
+        name, place = self._control(control), f"{control}.{what}"
+        if what not in KEYS:
+            raise InputError("switch", place, f"is none; {nearest(what, KEYS)}")
+        if what in HARDWARE and self._elsewhere:
+            raise InputError("switch", place, "is the real loader's own; change it there")
+        if what in _WIDEST and value > _WIDEST[what]:
+            raise InputError("switch", place, f"is {value:g} N; at most {_WIDEST[what]:g}")
+        at = f"controls.{name}"
+        first, *others = (f"{at}.{key.format(d=unit_of(name))}" for key in KEYS[what])
+        changes: dict[str, Any] = {first: bool(value) if what in YES_NO else float(value)}
+        self._pack(self.rig.changed(changes | dict.fromkeys(others, _BESIDE.get(what))))
+
+    def _pack(self, rig: Rig) -> None:
+        self._controls["parameters"][:] = pack(rig, self._hands)["parameters"]
+        self.rig = rig
+
+    def _control(self, control: str) -> Any:
+        if control not in self.rig.controls:
+            hint = nearest(control, self.rig.controls)
+            raise InputError("switch", control, f"no such control; {hint}")
+        return control

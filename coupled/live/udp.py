@@ -1,0 +1,115 @@
+"""A loader that speaks the open protocol (`wire`) over UDP."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import select
+import socket
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+from coupled.errors import InputError
+from coupled.live.link import Order, Reach, Sample
+from coupled.live.wire import ORDER, BadPacketError, Header, newer, pack_orders, unpack_state
+from coupled.rig.rig import Rig
+
+LARGEST_bytes = 512
+MOST_PACKETS = 64  # taken in one look: a flood must not hold up the frame
+STRONGEST_N = 2500.0  # beyond what a person holds, F is a fault
+BEYOND = 1.25  # of the travel: δ passes δc's stop by what the structure bends
+
+
+def reaches(rig: Rig) -> list[Reach]:
+    """Return what no measurement of a rig's controls exceeds, in the rig's order."""
+    return [
+        Reach(STRONGEST_N, BEYOND * control.travel + 200.0 * control.loader.bend)
+        for control in rig.controls.values()
+    ]
+
+
+def resolved(host: str, port: int, name: str) -> tuple[int, tuple[object, ...]]:
+    """Return the address family and the address of a host; raises InputError."""
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    except OSError as error:
+        raise InputError(name, "", f"no such host: {error.strerror or error}") from None
+    family, *_, address = found[0]
+    return family, address
+
+
+class UdpLink:
+    """The host's end of the open protocol; it binds a free port and hears one address only.
+
+    `deflection` says that the loader measures δ; in `lockstep` only the answer to the last orders
+    is taken.
+    """
+
+    measures_force = True
+
+    def __init__(
+        self, host: str, port: int, rig: Rig, deflection: bool = True, lockstep: bool = False
+    ) -> None:
+        self._lockstep = lockstep
+        self.name = f"udp://{host}:{port}"
+        self.measures_deflection = deflection
+        self.dropped: Counter[str] = Counter()
+        self._reaches = reaches(rig)
+        self._session = secrets.randbits(32)
+        self._sequence = 0
+        self._last: int | None = None  # of the loader's sequence numbers
+        family, self._address = resolved(host, port, self.name)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def receive(self, wait_s: float) -> Sample | None:
+        """Return the newest valid sample since the last call, waiting for one so long at most."""
+        until = time.monotonic() + wait_s
+        found = self._drain()
+        while found is None and (left := until - time.monotonic()) > 0.0:
+            if not select.select([self._socket], [], [], left)[0]:
+                return None
+            found = self._drain()
+        return found
+
+    def _drain(self) -> Sample | None:
+        found = None
+        for _ in range(MOST_PACKETS):
+            try:
+                packet, sender = self._socket.recvfrom(LARGEST_bytes + 1)
+            except BlockingIOError:
+                break
+            except OSError:  # the other end refused a packet: it is not there yet, or any more
+                continue
+            try:
+                found = self._taken(packet, sender)
+            except BadPacketError as reason:
+                self.dropped[str(reason)] += 1
+        return found
+
+    def _taken(self, packet: bytes, sender: Sequence[object]) -> Sample:
+        if tuple(sender[:2]) != tuple(self._address[:2]):
+            raise BadPacketError("from elsewhere")
+        header, sample = unpack_state(packet, self._reaches)
+        if header.session != self._session:
+            raise BadPacketError("of another flight")
+        if self._last is not None and not newer(header.sequence, self._last):
+            raise BadPacketError("replayed or late")
+        self._last = header.sequence
+        if self._lockstep and header.echo != self._sequence:
+            raise BadPacketError("answers older orders")
+        return sample
+
+    def send(self, orders: tuple[Order, ...], mode: int) -> None:
+        """Send the orders of a frame; a wire that takes none drops them."""
+        self._sequence = (self._sequence + 1) % (1 << 32)
+        now = time.monotonic_ns() // 1000
+        numbers = (self._session, self._sequence, self._last or 0, now)
+        header = Header(ORDER, len(orders), mode, *numbers)
+        with contextlib.suppress(OSError):
+            self._socket.sendto(pack_orders(header, orders), self._address)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()

@@ -1,0 +1,75 @@
+"""Real time by absolute deadlines, on a clock of the test's own."""
+
+from __future__ import annotations
+
+import pytest
+
+from coupled.live.pacing import EDGES_ms, Pacer
+
+FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
+
+
+class Clock:
+    """A clock that only sleeping and work move; a sleep may take longer than asked."""
+
+    def __init__(self, overslept: float = 0.0) -> None:
+        self.now, self.overslept = 100.0, overslept
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds > 0.0
+        self.now += seconds + self.overslept
+
+
+def test_lateness_does_not_add_up() -> None:
+    clock = Clock(overslept=2.0**-12)
+    pacer = Pacer(FRAME_s, 100, clock, clock.sleep)
+    for _ in range(100):
+        pacer.wait()
+        clock.now += 2.0**-10  # work
+    found = pacer.result()
+    assert clock.now - 100.0 == 99 * FRAME_s + 2.0**-12 + 2.0**-10
+    assert found.late_ms[1:] == pytest.approx(1e3 * 2.0**-12)
+    assert found.work_ms == pytest.approx(1e3 * 2.0**-10)
+    assert found.missed == 0
+
+
+def test_a_late_frame_is_flown_at_once_and_the_next_keeps_its_deadline() -> None:
+    clock = Clock()
+    pacer = Pacer(FRAME_s, 10, clock, clock.sleep)
+    pacer.wait()
+    clock.now += 1.5 * FRAME_s  # the first frame's work
+    pacer.wait()
+    assert pacer.late_s == 0.5 * FRAME_s
+    pacer.wait()
+    assert pacer.late_s == 0.0
+    assert clock.now == 100.0 + 2 * FRAME_s
+
+
+def test_missed_deadlines_are_counted_and_not_made_up_for() -> None:
+    clock = Clock()
+    pacer = Pacer(FRAME_s, 10, clock, clock.sleep)
+    pacer.wait()
+    clock.now += 4.25 * FRAME_s
+    begun = []
+    for _ in range(3):
+        pacer.wait()
+        begun.append(clock.now)
+    assert pacer.missed == 3
+    assert begun == [100.0 + n * FRAME_s for n in (4.25, 5.0, 6.0)]
+    said = pacer.result().as_dict()
+    assert said["late_over_a_frame"] == 1
+    assert said["missed_deadlines"] == 3
+    assert said["late_largest_ms"] == pytest.approx(3.25e3 * FRAME_s, rel=1e-4)
+
+
+def test_the_histogram_counts_every_frame() -> None:
+    clock = Clock(overslept=3e-4)
+    pacer = Pacer(FRAME_s, 50, clock, clock.sleep)
+    for _ in range(50):
+        pacer.wait()
+    said = pacer.result().as_dict()
+    assert sum(said["histogram_frames"]) == 50 == said["frames"]
+    assert said["histogram_frames"][EDGES_ms.index(0.2)] == 49  # the first is not waited for
