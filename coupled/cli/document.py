@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,16 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
 from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
 from coupled.errors import InputError, shown
-from coupled.files import check_target, write_text
+from coupled.files import check_target, sha256, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import ControlName
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
     from coupled.calibration.aircraftdata import AircraftData
+    from coupled.calibration.qualification import Issue
     from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
     epilog="[dim]Examples: coupled document · coupled document 737 --control column"
     " · coupled document new.toml --readings my.csv --output doc"
     " · coupled document 737 --control column --aircraft measured.csv"
+    " · coupled document 737 --revision B --date 2031-05-17 --report out/737.html"
     " · coupled document t37 --control column --write new.toml[/]"
 )
 def document(
@@ -54,7 +58,10 @@ def document(
         typer.Option("--output", "-o", help="Folder (default: out/RIG-document)."),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Print every check.")] = False,
+    date: Annotated[str, typer.Option(help="Of this issue, printed as given.")] = "",
+    revision: Annotated[str, typer.Option(help="Of the document, printed as given.")] = "",
     json_file: JsonOption = "",
+    report: ReportOption = None,
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks."""
     from coupled.calibration.documentation import controls_of, surface_travels
@@ -73,7 +80,8 @@ def document(
     if folder.is_file():
         raise InputError(folder, "--output", "is a file; give a folder")
     check_target(pdf, inputs)
-    check_json(json_file, [*inputs, pdf, *([write] if write else [])])
+    own = [*inputs, pdf, *([write] if write else [])]
+    check_json(json_file, [*own, *check_report(report, own)])
     say_stale(data)
     text = ""
     if write is not None:
@@ -88,12 +96,19 @@ def document(
             documents.append(gather(data, name, travels.get(name), advance, wanted, known))
     from coupled.plots.documentation import draw_pages
 
+    issue = _issue(file, text, reference, aircraft, (date, revision))
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
     with Outputs() as outputs:
-        written = draw_pages(documents, fits, outputs.folder(folder), outputs.at(pdf))
+        written = draw_pages(documents, fits, issue, outputs.folder(folder), outputs.at(pdf))
         if write is not None:
             write_text(outputs.at(write), text)
         keep_json(table, json_file, outputs)
+        if report is not None:
+            from coupled.reports.forces import force_report
+
+            write_report(
+                report, outputs, inputs, lambda made: force_report(documents, fits, issue, made)
+            )
     if json_file != "-":
         for found in documents:
             print_checks(out, found.control, found.checks, every)
@@ -102,7 +117,30 @@ def document(
         say(f"{len(written)} figures and {pdf.name} in {folder}")
         if write is not None:
             say(f"rig: {write}")
+        say_report(report)
     print_json(table, json_file)
+
+
+def _issue(
+    rig_file: Path,
+    written: str,
+    specified: Path | None,
+    aircraft: Path | None,
+    given: tuple[str, str],
+) -> Issue:
+    """Return what the cover says; `written` is the text of a rig that is made here, if any."""
+    from coupled.calibration.qualification import Issue
+
+    reference = "what the rig's own file specifies"
+    if specified is not None:
+        reference = f"what {shown(specified.name)} specifies"
+    if aircraft is not None:
+        reference += f"; static checks of the first control: {shown(aircraft.name)}, the aircraft's"
+    name, digest = shown(rig_file.name), sha256(rig_file)
+    if written:
+        name += ", with mass, damping and a lead that go with the gradient"
+        digest = hashlib.sha256(written.encode()).hexdigest()
+    return Issue(name, digest, reference, *given)
 
 
 def _remedied(

@@ -10,7 +10,16 @@ from matplotlib.figure import Figure
 
 from coupled.calibration.checks import Swing, swing_of
 from coupled.campaign.tolerances import TIME_SHARE, SURFACE_rad, force_band
-from coupled.plots.pages import BLUE, ORANGE, leg_names, panels, pressure, scale, title, with_legend
+from coupled.plots.pages import (
+    BLUE,
+    ORANGE,
+    case_panels,
+    leg_names,
+    pressure,
+    scale,
+    title,
+    with_legend,
+)
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
@@ -23,7 +32,7 @@ def draw_static_checks(found: Documentation) -> Figure:
     factor, unit = scale(found.control)
     data = found.rig.controls[found.control]
     rows = 1 if found.surface_rad is None else 2
-    figure, grid = panels(rows, len(found.conditions), 3.0)
+    figure, grid = case_panels(rows, len(found.conditions), 3.0)
     for i, condition in enumerate(found.conditions):
         axes = grid[0, i]
         for leg, name in zip(condition.specified, ("tolerance", "", "", ""), strict=True):
@@ -54,7 +63,8 @@ def draw_static_checks(found: Documentation) -> Figure:
             below.set_title(_verdict(found, condition.pressure_Pa, ("surface",)), fontsize=9)
         for panel in grid[:, i]:
             panel.grid(alpha=0.25)
-        grid[-1, i].set_xlabel(f"true deflection δ, {unit}")
+        for panel in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
+            panel.set_xlabel(f"true deflection δ, {unit}")
     grid[0, 0].set_ylabel("force at the grip F, N")
     if rows > 1:
         grid[1, 0].set_ylabel(f"{data.surface} from trim, °")
@@ -81,7 +91,7 @@ def _verdict(found: Documentation, pressure_Pa: float, kinds: Sequence[str]) -> 
 
 def draw_releases(found: Documentation) -> Figure:
     """Draw the dynamic control check: releases, with the tolerance of crossings and overshoots."""
-    figure, grid = panels(2, len(found.conditions), 2.7)
+    figure, grid = case_panels(2, len(found.conditions), 2.7)
     for i, condition in enumerate(found.conditions):
         for axes, (side, both) in zip(grid[:, i], condition.let_go.items(), strict=True):
             now, wanted = both.felt, both.specified
@@ -100,7 +110,8 @@ def draw_releases(found: Documentation) -> Figure:
             word = "pass" if worst.passed else f"FAIL: {worst.name.removesuffix(', ' + side)}"
             axes.set_title(f"{pressure(condition.pressure_Pa)}, {side}: {word}", fontsize=9)
             axes.set_xlim(0.0, _span(wanted, swing))
-        grid[1, i].set_xlabel("time from the release, s")
+        for axes in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
+            axes.set_xlabel("time from the release, s")
     for axes in grid[:, 0]:
         axes.set_ylabel("δ, % of displacement")
     what = "release, 14 CFR Part 60, 2.b"

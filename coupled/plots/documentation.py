@@ -11,8 +11,10 @@ import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
+from coupled.calibration.qualification import Issue, Kind
 from coupled.files import write_whole
 from coupled.plots.checks import draw_releases, draw_static_checks
+from coupled.plots.cover import draw_check_table, draw_cover
 from coupled.plots.pages import (
     BLUE,
     GRAY,
@@ -128,11 +130,13 @@ def save_pages(figures: Sequence[Figure], path: Path) -> None:
 def draw_pages(
     documents: Sequence[Documentation],
     fits: Mapping[ControlName, tuple[CalibrationResult, str] | None],
+    issue: Issue,
     folder: Path,
     pdf: Path,
 ) -> list[Path]:
-    """Draw each control's pages as PNG in a folder, and all of them in one PDF."""
+    """Draw each control's pages as PNG in a folder; the PDF has a cover and the checks before."""
     pages: dict[Path, Figure] = {}
+    numbers: dict[tuple[ControlName, Kind], int] = {}
     for found in documents:
         drawn = {
             "forces": draw_forces(found),
@@ -143,8 +147,13 @@ def draw_pages(
         fit = fits.get(found.control)
         if fit is not None:
             drawn["readings"] = draw_readings(*fit)
+        order = {name: number for number, name in enumerate(drawn, len(pages) + 1)}
+        numbers[found.control, "static"] = order["static"]
+        numbers[found.control, "release"] = order["release"]
         pages |= {folder / f"{found.control}-{name}.png": page for name, page in drawn.items()}
-    for path, page in pages.items():
+    for number, (path, page) in enumerate(pages.items(), 1):
+        page.suptitle(f"Figure {number}. {page.get_suptitle()}", fontsize=12)
         save(page, path)
-    save_pages(list(pages.values()), pdf)
+    before = [draw_cover(documents, issue), *draw_check_table(documents, issue, numbers)]
+    save_pages([*before, *pages.values()], pdf)
     return list(pages)

@@ -34,6 +34,17 @@ def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
+def case_panels(rows: int, cases: int, height: float) -> tuple[Figure, Any]:
+    """Return a figure with a column a case, and its axes by row and case.
+
+    The rows of a single case stand side by side.
+    """
+    if cases > 1:
+        return panels(rows, cases, height)
+    figure, grid = panels(1, rows, 0.9 * height)
+    return figure, grid.T
+
+
 def pressure(pressure_Pa: float) -> str:
     """Return a dynamic pressure as a title has it."""
     return f"q̄ = {pressure_Pa / 1000.0:.2f} kPa"

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.calibration.figures import HEADS, basis, remarks, rows
+from coupled.calibration.qualification import written
 from coupled.record.channels import unit_of
 
 if TYPE_CHECKING:
@@ -126,18 +127,13 @@ def print_checks(
         table.add_column(head, justify="left" if head == "" else "right", no_wrap=True)
     for c in shown:
         numbers = (c.pressure_Pa / 1000.0, c.measured, c.reference, c.tolerance)
-        cells = [f"{numbers[0]:.2f}", *(_short(number) for number in numbers[1:])]
+        cells = [f"{numbers[0]:.2f}", *(written(number) for number in numbers[1:])]
         verdict = "pass" if c.passed else "[red]FAIL[/]"
         name = c.name.replace(", positive", " +").replace(", negative", " −")
         table.add_row(name, *cells, c.unit, f"{100 * c.margin:.0f} %", verdict)
     console.print(table)
     good = sum(check.passed for check in checks)
     console.print(f"{control}: {good} of {len(checks)} checks pass\n", highlight=False)
-
-
-def _short(number: float) -> str:
-    """Return a number in three figures, or to a whole where it is large."""
-    return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
 
 
 def _narrowest(checks: Sequence[ControlCheck]) -> list[ControlCheck]:

@@ -1,0 +1,92 @@
+"""The first pages of a force documentation's PDF: its cover, and the table of its checks."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from coupled import __version__
+from coupled.calibration.documentation import Documentation
+from coupled.calibration.qualification import FeelTest, Issue, Kind, cover_rows, feel_tests, written
+from coupled.plots.histories import plain
+from coupled.record.channels import ControlName
+
+PAGE = (8.27, 11.0)  # inches: within A4 and Letter
+_LEFT, _VALUES, _RIGHT = 0.1, 0.36, 0.92
+_LINE = 0.0165  # of the page's height
+_ROWS = 46  # of a page of the table
+_HEADS = ("test", "control", "q̄, kPa", "check", "rig", "reference", "±", "", "result", "fig.")
+_AT = (0.07, 0.18, 0.285, 0.31, 0.60, 0.69, 0.76, 0.77, 0.815, 0.92)
+_RIGHTS = (False, False, True, False, True, True, True, False, False, True)
+Numbers = Mapping[tuple[ControlName, Kind], int]
+
+
+def draw_cover(documents: Sequence[Documentation], issue: Issue) -> Figure:
+    """Draw the cover: what the document is of, which issue, and who signs it."""
+    figure = Figure(figsize=PAGE)
+    figure.text(_LEFT, 0.86, "Force documentation", fontsize=22, weight="bold")
+    figure.text(_LEFT, 0.82, plain(documents[0].rig.name), fontsize=16)
+    checks = [check for found in documents for check in found.checks]
+    good = sum(check.passed for check in checks)
+    y = 0.75
+    said = f"{good} of {len(checks)} checks are within their tolerance"
+    for name, value in (*cover_rows(documents, issue, __version__), ("result", said)):
+        figure.text(_LEFT, y, name, fontsize=10, color="0.35")
+        for line in textwrap.wrap(value, 52) or [""]:
+            figure.text(_VALUES, y, plain(line), fontsize=10)
+            y -= 1.2 * _LINE
+        y -= 0.4 * _LINE
+    for x, name in zip((0.1, 0.39, 0.68), ("Prepared", "Checked", "Accepted"), strict=True):
+        figure.add_artist(_rule(x, x + 0.24, 0.16))
+        figure.text(x, 0.14, name, fontsize=9, color="0.35")
+    return figure
+
+
+def _rule(start: float, end: float, y: float) -> Line2D:
+    return Line2D([start, end], [y, y], color="black", linewidth=0.8)
+
+
+def draw_check_table(
+    documents: Sequence[Documentation], issue: Issue, numbers: Numbers
+) -> list[Figure]:
+    """Draw the table of all checks; `numbers` are those of the figures that show them."""
+    rows = [
+        row
+        for found in documents
+        for test in feel_tests(found, issue.reference)
+        for row in _rows(test, numbers[found.control, test.kind])
+    ]
+    pages = [rows[i : i + _ROWS] for i in range(0, len(rows), _ROWS)]
+    return [_page(part, f"Checks, {i} of {len(pages)}") for i, part in enumerate(pages, 1)]
+
+
+def _rows(test: FeelTest, number: int) -> list[tuple[str, ...]]:
+    return [
+        (
+            test.number,
+            test.control,
+            f"{check.pressure_Pa / 1000:.2f}",
+            check.name,
+            *(written(x) for x in (check.measured, check.reference, check.tolerance)),
+            check.unit,
+            "pass" if check.passed else "FAIL",
+            str(number),
+        )
+        for check in test.checks
+    ]
+
+
+def _page(rows: Sequence[Sequence[str]], head: str) -> Figure:
+    figure = Figure(figsize=PAGE)
+    figure.text(_AT[0], 0.95, head, fontsize=14, weight="bold")
+    for row, y in zip((_HEADS, *rows), (0.915 - k * _LINE * 1.1 for k in range(99)), strict=False):
+        bold = "bold" if row is _HEADS else "normal"
+        for text, x, right in zip(row, _AT, _RIGHTS, strict=True):
+            side = "right" if right else "left"
+            color = "#b42318" if text == "FAIL" else "black"
+            figure.text(x, y, text, fontsize=7.5, ha=side, weight=bold, color=color)
+    figure.add_artist(_rule(_AT[0], _RIGHT, 0.909))
+    return figure

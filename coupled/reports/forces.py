@@ -1,0 +1,113 @@
+"""The force document: cover, table of checks, and each test with its conditions and its figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from coupled import __version__
+from coupled.calibration.checks import ControlCheck
+from coupled.calibration.documentation import Documentation
+from coupled.calibration.qualification import FeelTest, Issue, cover_rows, feel_tests, written
+from coupled.calibration.result import CalibrationResult
+from coupled.plots.checks import draw_releases, draw_static_checks
+from coupled.plots.documentation import draw_deflections, draw_forces
+from coupled.plots.readings import draw_readings
+from coupled.plots.saving import svg_text
+from coupled.record.channels import ControlName
+from coupled.reports.page import (
+    Block,
+    Cover,
+    Drawing,
+    Made,
+    Mark,
+    Report,
+    Section,
+    Table,
+    Verdict,
+    passed,
+)
+
+_SIGNED = ("Prepared", "Checked", "Accepted")
+_RESULTS = ("", "rig", "reference", "± allowed", "unit", "margin", "result")
+_NAMED = 8  # checks that fail, on the first page
+Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
+
+
+def force_report(
+    documents: Sequence[Documentation], fits: Fits, issue: Issue, made: Made
+) -> Report:
+    """Return the force document of a rig's controls."""
+    tests = [(found, test) for found in documents for test in feel_tests(found, issue.reference)]
+    sections = [Section("Checks", (_checks([test for _, test in tests]),), own_page=True)]
+    sections += [_test(found, test) for found, test in tests]
+    sections += [_beside(found, fits.get(found.control)) for found in documents]
+    rig = documents[0].rig
+    cover = Cover(cover_rows(documents, issue, __version__), _SIGNED)
+    settings = (("rig", rig.name), ("frame rate", f"{rig.frame_rate:g} Hz"))
+    verdict = _verdict([test for _, test in tests])
+    return Report("Force documentation", rig.name, verdict, tuple(sections), settings, made, cover)
+
+
+def _verdict(tests: Sequence[FeelTest]) -> Verdict:
+    checks = [(test, check) for test in tests for check in test.checks]
+    failed = [(test, check) for test, check in checks if not check.passed]
+    said = f"{len(checks) - len(failed)} of {len(checks)} checks are within their tolerance."
+    remarks = [
+        f"{test.number}, {test.title}, q̄ = {check.pressure_Pa / 1000:.2f} kPa: {check.name} is"
+        f" {written(check.measured)} {check.unit}, the reference {written(check.reference)} ±"
+        f" {written(check.tolerance)}."
+        for test, check in failed[:_NAMED]
+    ]
+    if len(failed) > _NAMED:
+        remarks.append(f"{len(failed) - _NAMED} more fail; the table of checks has all.")
+    return Verdict(said, "bad" if failed else "good", tuple(remarks))
+
+
+def _checks(tests: Sequence[FeelTest]) -> Table:
+    """Return the table of all checks, each with its test and the number of its figure."""
+    heads = ("test", "control", "check", "q̄, kPa", *_RESULTS[1:], "figure")
+    rows: list[tuple[str | Mark, ...]] = []
+    for number, test in enumerate(tests, 1):
+        for check in test.checks:
+            name, *result = _result(check)
+            pressure = f"{check.pressure_Pa / 1000:.2f}"
+            rows.append((test.number, test.control, name, pressure, *result, str(number)))
+    return Table(heads, tuple(rows), words=3)
+
+
+def _result(check: ControlCheck) -> tuple[str | Mark, ...]:
+    numbers = (written(n) for n in (check.measured, check.reference, check.tolerance))
+    margin = f"{100 * check.margin:.0f} %"
+    return check.name, *numbers, check.unit, margin, passed(check.passed)
+
+
+def _test(found: Documentation, test: FeelTest) -> Section:
+    """Return a test's own page: conditions, tolerances, results, figure."""
+    alone = replace(found, conditions=(test.condition,))
+    draw = draw_static_checks if test.kind == "static" else draw_releases
+    caption = f"{test.number}: {test.title}, q̄ = {test.condition.pressure_Pa / 1000:.2f} kPa."
+    results = Table(_RESULTS, tuple(_result(check) for check in test.checks))
+    blocks = (
+        Table(("conditions", ""), test.conditions, words=2),
+        Table(("tolerances", ""), test.tolerances, words=2),
+        results,
+        Drawing(svg_text(draw(alone)), caption),
+    )
+    return Section(f"{test.number}: {test.title}", blocks, own_page=True)
+
+
+def _beside(found: Documentation, fit: tuple[CalibrationResult, str] | None) -> Section:
+    """Return what documents a control beside its tests."""
+    return Section(f"{found.control}, beside the tests", tuple(_drawn(found, fit)), own_page=True)
+
+
+def _drawn(found: Documentation, fit: tuple[CalibrationResult, str] | None) -> Iterator[Block]:
+    name = found.control
+    forces = "Force against true deflection, swept both ways, with and without compensation."
+    yield Drawing(svg_text(draw_forces(found)), f"{name}: {forces}")
+    computed = "Computed against true deflection, and what the host's estimate lacks."
+    yield Drawing(svg_text(draw_deflections(found)), f"{name}: {computed}")
+    if fit is not None:
+        shown = f"Readings and fit (the report's figure 4), from {fit[1]}."
+        yield Drawing(svg_text(draw_readings(*fit)), f"{name}: {shown}")
