@@ -10,6 +10,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from coupled.cli import app
+from coupled.cli.order import PANELS, name_of
 from coupled.plots.saving import save
 from coupled.record.channels import record_channels
 from coupled.record.record import read_record
@@ -38,6 +40,14 @@ def test_a_shell_meets_what_these_tests_meet(folder: Path, words: list[str], cod
     here, anew = coupled(folder, *words), coupled_anew(folder, *words)
     assert (here.returncode, here.stdout, here.stderr) == (code, anew.stdout, anew.stderr)
     assert anew.returncode == code
+
+
+def test_every_command_stands_under_a_head_of_the_help() -> None:
+    listed = {name for names in PANELS.values() for name in names}
+    registered = {name_of(info) for info in [*app.registered_commands, *app.registered_groups]}
+    assert registered <= listed
+    heads = [info.rich_help_panel for info in app.registered_commands]
+    assert list(dict.fromkeys(heads)) == [head for head in PANELS if head in heads]  # none twice
 
 
 def test_help_has_examples_and_takes_no_physics_to_show(folder: Path) -> None:

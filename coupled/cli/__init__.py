@@ -16,6 +16,7 @@ from coupled.cli import (
     stability,
 )
 from coupled.cli.app import app, main
+from coupled.cli.order import arrange
 
 __all__ = [
     "app",
@@ -34,3 +35,5 @@ __all__ = [
     "new",
     "stability",
 ]
+
+arrange(app)

@@ -38,7 +38,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help="Fly a JSBSim aircraft through a compliant control loader.",
-    epilog="[dim]First steps: coupled compare · coupled runs · coupled fly pull-up-t37[/]",
+    epilog="[dim]First steps: coupled runs · coupled compare · coupled diagnose --help[/]",
 )
 
 _GARBAGE = 100_000  # a command is short: its garbage is looked for less often
