@@ -36,6 +36,7 @@ ORDER += [
     "record/importing",
     "flight",
     "authority",
+    "export",
     "campaign",
     "calibration",
     "gap",

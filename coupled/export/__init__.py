@@ -1,0 +1,1 @@
+"""A rig's loaders as systems that JSBSim itself runs, with the aircraft around them."""

@@ -1,0 +1,123 @@
+"""What befalls the aircraft of a run, as a JSBSim script has it: air that moves, events."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from coupled.export.script import Floats, Move, Script
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import ALTERATIONS
+from coupled.flight.event import Event
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.weather import Gust, Turbulence
+from coupled.flight.wind import Wind
+from coupled.record.channels import SURFACES
+from coupled.resources import aircraft_folder
+from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Flight
+from coupled.units import FOOT_m
+
+_TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
+_MOVED = np.linspace(-1.0, 1.0, 201)  # how far a trim is moved
+_GUST, _MILSPEC = "atmosphere/cosine-gust/", "atmosphere/turbulence/milspec/"
+
+
+def add_conditions(script: Script, manoeuvre: Manoeuvre) -> None:
+    """Add a manoeuvre's wind, gust, turbulence and events."""
+    given = manoeuvre.conditions
+    if given.wind is not None:
+        _add_wind(script, given.wind)
+    if given.gust is not None:
+        _add_gust(script, given.gust)
+    if given.turbulence is not None:
+        _add_turbulence(script, given.turbulence, manoeuvre.seed)
+    for event in given.event.values():
+        _add_event(script, event, manoeuvre)
+
+
+def _add_wind(script: Script, wind: Wind) -> None:
+    """Add a wind along the heading of the start, which is north, and upwards."""
+    times = np.array(wind.time)
+    script.led["atmosphere/wind-north-fps"] = times, np.array(wind.along) / FOOT_m
+    if wind.up is not None:
+        script.led["atmosphere/wind-down-fps"] = times, -np.array(wind.up) / FOOT_m
+
+
+def _add_gust(script: Script, gust: Gust) -> None:
+    velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
+    values = {
+        "startup-duration-sec": gust.rise,
+        "steady-duration-sec": gust.hold,
+        "end-duration-sec": gust.rise if gust.fall is None else gust.fall,
+        "magnitude-ft_sec": math.hypot(*velocity),
+        "frame": 3.0,
+        **{f"{way}-velocity-ft_sec": v for way, v in zip("XYZ", velocity, strict=True)},
+    }
+    script.started |= {_GUST + name: value for name, value in values.items()}
+    script.at.append((gust.at, {_GUST + "start": 1.0}))
+
+
+def _add_turbulence(script: Script, turbulence: Turbulence, seed: int) -> None:
+    script.started |= {
+        "atmosphere/randomseed": float(seed % 2**31),
+        "atmosphere/turb-type": {"milspec": 3.0, "tustin": 4.0}[turbulence.model],
+        _MILSPEC + "windspeed_at_20ft_AGL-fps": turbulence.wind_at_6m / FOOT_m,
+        _MILSPEC + "severity": float(turbulence.severity),
+    }
+
+
+def _add_event(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
+    if event.trim is not None and event.by is not None:
+        _add_runaway(script, event, manoeuvre)
+    elif event.of_model is not None and event.to is not None:
+        move = Move(*_shares(event, manoeuvre), to=event.to)
+        script.moved.setdefault(event.of_model, []).append(move)
+    elif event.engine_out is not None:
+        number = f"[{event.engine_out}]" if event.engine_out else ""
+        values = {
+            "propulsion/active_engine": float(event.engine_out),
+            "propulsion/cutoff_cmd": 1.0,
+            "propulsion/magneto_cmd": 0.0,
+            f"propulsion/engine{number}/set-running": 0.0,
+        }
+        script.at.append((event.at, values))
+
+
+def _shares(event: Event, manoeuvre: Manoeuvre) -> tuple[Floats, Floats]:
+    """Return the times of an event, s, and how much of it has happened: all within a frame."""
+    over = max(event.over, 1e-3 / manoeuvre.rig.frame_rate)
+    begins = event.at - (over if event.over == 0.0 else 0.0)
+    return np.array([begins, begins + over]), np.array([0.0, 1.0])
+
+
+def _add_runaway(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
+    """Let a trim run: by so much, on top of where JSBSim's trim left it."""
+    control, flight = event.trim, manoeuvre.rig.flight
+    assert control is not None and event.by is not None and flight is not None
+    by = COMMAND_SIGN[SURFACES[control]] * event.by
+    move = Move(*_shares(event, manoeuvre), by=by)
+    name = f"fcs/{_TRIMS[control]}-trim-cmd-norm"
+    script.moved.setdefault(name, []).append(move)
+    if control == "column":
+        _follow_trim(script, manoeuvre, flight, name)
+
+
+def _follow_trim(script: Script, manoeuvre: Manoeuvre, flight: Flight, name: str) -> None:
+    """Let a factor that counts from the trim count from wherever it is moved to (`Alterations`)."""
+    frame_s, folders = 1.0 / manoeuvre.rig.frame_rate, [aircraft_folder()]
+    for alteration in ALTERATIONS:
+        part = alteration.part
+        if not alteration.about_trim or alteration.factor(flight) == 1.0:
+            continue
+        plain = JSBSimAirframe(flight, frame_s, ("column",), folders)
+        known = [each for each in part.properties if plain.has(each)]
+        aircraft = JSBSimAirframe(flight, frame_s, ("column",), folders, record=known)
+        start = aircraft.lever(name).read()
+        places = []
+        for trim in _MOVED.tolist():
+            aircraft.step((trim, 0.0, 0.0))
+            places.append(aircraft.extra())
+        for each, values in zip(known, np.array(places).T, strict=True):
+            script.following[part.held(each)] = (name, start + _MOVED, values)

@@ -1,0 +1,101 @@
+"""The folder of an export, and the runs that go into it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from coupled.errors import InputError
+from coupled.export.model import Files
+from coupled.export.write import Export, Flown
+from coupled.flight.altered import ALTERATIONS
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.outputs import Outputs
+from coupled.resources import shipped_runs
+from coupled.rig.rig import Rig
+from coupled.schema import load_toml
+
+MARK = "coupled-export.json"  # by which a folder is known as ours, to be written anew
+
+
+def check_folder(folder: Path) -> None:
+    """Raise InputError for a folder that holds something else than a former export."""
+    if folder.is_file():
+        raise InputError(folder, "", "is a file; name a folder")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
+        raise InputError(folder, "", "holds files that are no export; name a new folder")
+
+
+def write_export(made: Export, folder: Path) -> None:
+    """Write an export into its folder, all files or none; what a former one left goes."""
+    before = _former(folder)
+    files: Files = dict(made.files)
+    with Outputs() as outputs:
+        for place, text in files.items():
+            outputs.at(folder / place).write_bytes(text)
+        mark = {
+            "rig": made.rig.name,
+            "loader_steps": made.substeps,
+            "left_out": list(made.left),
+            "beside": [one.as_dict() for one in made.beside],
+            "files": sorted(map(str, files)),
+        }
+        outputs.at(folder / MARK).write_text(json.dumps(mark, indent=1), encoding="utf-8")
+    for name in before - set(map(str, files)):
+        if (folder / name).resolve().is_relative_to(folder.resolve()):
+            (folder / name).unlink(missing_ok=True)
+
+
+def _former(folder: Path) -> set[str]:
+    """Return the places of the files that a former export put there."""
+    try:
+        found = json.loads((folder / MARK).read_text(encoding="utf-8"))["files"]
+        return {name for name in found if isinstance(name, str)}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+
+
+def runs_of(rig_name: str) -> list[str]:
+    """Return the shipped runs of a shipped rig."""
+    return [name for name, path in shipped_runs().items() if load_toml(path)["rig"] == rig_name]
+
+
+def exportable(rig: Rig, cases: Sequence[Manoeuvre]) -> tuple[list[Flown], list[str]]:
+    """Return the cases that fly with this export, and those that need one of their own, with why.
+
+    What a script can set are the aircraft's place, speed and levers, and the corrections; another
+    loader, frame or model is another export.
+    """
+    flown, others = list[Flown](), list[str]()
+    for case in cases:
+        why = _differs(rig, case.rig)
+        if why:
+            others.append(f"{case.name}: {case.label}: {why}")
+            continue
+        switched = [c for c in case.configurations if c != "calibrated low"]
+        if len(switched) < len(case.configurations):
+            others.append(f"{case.name}: {case.label}, calibrated low: its S₁ is another")
+        flown.append(Flown(case, tuple(switched)))
+    return flown, others
+
+
+def _differs(rig: Rig, other: Rig) -> str:
+    """Return what keeps a case's rig from flying with another's export, or nothing."""
+    if set(rig.controls) != set(other.controls) or rig.structure != other.structure:
+        return "other controls"
+    differs = [
+        f"another {n}" for n, control in rig.controls.items() if other.controls[n] != control
+    ]
+    if rig.frame_rate != other.frame_rate:
+        differs.append(f"frame_rate_Hz = {other.frame_rate:g}")
+    if rig.flight is None or other.flight is None:
+        return (
+            ""
+            if rig.flight is other.flight and not differs
+            else (differs or ["another aircraft"])[0]
+        )
+    for key in ("model", "steps_per_frame", *(a.part.name for a in ALTERATIONS)):
+        if getattr(rig.flight, key) != getattr(other.flight, key):
+            differs.append(f"flight.{key} = {getattr(other.flight, key)}")
+    return differs[0] if differs else ""

@@ -1,0 +1,188 @@
+"""What of a rig an export takes along: every key of its file is known here, or refused by name.
+
+All sections are walked by their declared parameters. A key that stands at its default leaves out an
+effect, and asks nothing of the export; any other has to be listed below. So a key that comes to the
+rig later is refused until the export has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from coupled.errors import InputError
+from coupled.record.channels import unit_of
+from coupled.rig.parameters import (
+    Calibration,
+    Compensation,
+    Control,
+    Flight,
+    Gains,
+    Loader,
+    Rigging,
+    Schedule,
+    Sensing,
+)
+from coupled.rig.rig import Rig
+from coupled.rig.structure import Compliance, Structure
+from coupled.schema import Section, file_keys
+
+# Written out, not taken from the sections: what is added there is not known here.
+EXPORTED: Mapping[type[Section], frozenset[str]] = {
+    Rig: frozenset(("name", "frame_rate", "controls", "flight", "structure")),
+    Control: frozenset(
+        (
+            *("surface", "travel", "length", "loader", "schedule", "compensation", "sensing"),
+            *("gains", "rigging", "calibration"),
+        )
+    ),
+    Loader: frozenset(
+        (
+            *("mass", "damping", "basic_gradient", "breakout", "friction", "breakaway"),
+            *("stribeck_rate", "bob_weight", "offset", "cubic", "delay", "multiplier"),
+            *("multiplier_offset", "multiplier_drift", "modifying_lag", "servo_frequency"),
+            *("servo_damping_ratio", "servo_rate_limit", "bend", "bend_push", "bend_limit"),
+            *("bend_hysteresis_share", "bend_hysteresis_width", "play", "arc_geometry"),
+        )
+    ),
+    Schedule: frozenset(
+        (
+            *("dynamic_pressure", "total_gradient", "second_gradient", "break_deflection"),
+            *("pressure_scale", "pressure_lag", "slope"),
+        )
+    ),
+    Compensation: frozenset(
+        (
+            *("deflection", "gradient", "bend", "basic_gradient", "breakout", "breakout_term"),
+            *("inertia_gradient", "mass_factor", "damping_factor", "force_lead", "force_lead_lag"),
+        )
+    ),
+    Sensing: frozenset(
+        (
+            *("computed_scale", "deflection_scale", "modifying_scale", "force_scale"),
+            *("word_length", "full_scale", "s1", "s2", "s3"),
+        )
+    ),
+    Rigging: frozenset(("stretch_loss", "lag", "rate_limit", "play", "offset")),
+    Structure: frozenset(
+        (
+            *("column_by_wheel", "column_by_pedals", "wheel_by_column", "wheel_by_pedals"),
+            *("pedals_by_column", "pedals_by_wheel", "assumed"),
+        )
+    ),
+    Compliance: frozenset(
+        (
+            *("column_by_wheel", "column_by_pedals", "wheel_by_column", "wheel_by_pedals"),
+            *("pedals_by_column", "pedals_by_wheel"),
+        )
+    ),
+    Flight: frozenset(
+        (
+            *("model", "altitude", "calibrated_airspeed", "flight_path", "trim", "properties"),
+            *("direct_controls", "steps_per_frame", "elevator_effectiveness", "pitch_damping"),
+            *("pitch_stiffness", "cg_aft", "fuel"),
+        )
+    ),
+}
+
+# What says something about the rig and does nothing in flight, or nothing in JSBSim.
+WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
+    Rig: {
+        "loader_rate": "the export chooses the loader's rate itself",
+        "noise": "noise of the record; the export's channels have none",
+    },
+    Gains: dict.fromkeys(
+        ("mechanical_advantage", "s1_over_s2", "s3_over_s2", "low_gradient"),
+        "a note of the bench; nothing in flight depends on it",
+    ),
+    Calibration: dict.fromkeys(
+        (
+            *("readings", "date", "s1", "s1_error", "s2", "s2_error", "s3", "s3_error"),
+            *("bend", "bend_error", "length", "mechanical_advantage", "s1_over_s2", "s3_over_s2"),
+        ),
+        "a note of the bench; nothing in flight depends on it",
+    ),
+    Structure: {"reciprocal": "a check of the file"},
+    Flight: {"landing": "JSBSim alone goes on after it meets the ground"},
+    Sensing: {"gauge_order": "nothing without a gauge", "gauge_damping_ratio": "the same"},
+}
+
+# Known, and not exported: why, by key.
+REFUSED: Mapping[type[Section], Mapping[str, str]] = {
+    Loader: {"friction_stiffness": "friction that yields before it slips is not exported"},
+    Sensing: {
+        **dict.fromkeys(
+            ("gauge_mass", "gauge_frequency", "gauge_delay", "gauge_sampling"),
+            "a gauge between grip and loader is not exported",
+        ),
+        **dict.fromkeys(
+            ("computed_skew", "force_skew", "gradient_skew"),
+            "a skew within the host's frame is not exported",
+        ),
+    },
+    Flight: dict.fromkeys(
+        ("gust_rms", "gust_length"), "gusts drawn from a seed are not exported; use [turbulence]"
+    ),
+}
+
+# What is approximated where it is not neutral, and how far off that is.
+APPROXIMATED: Mapping[str, str] = {
+    "loader.delay": "the delayed force is taken as straight between the ends of JSBSim's runs",
+    "structure": "of a control that comes later in the order column, wheel, pedals, the force of"
+    " the run before bends at an earlier one",
+}
+
+
+def check_keys(rig: Rig, file: object) -> list[str]:
+    """Return what is left out and why; raise InputError for a key that cannot be exported."""
+    left = list[str]()
+    for section, path, d in _sections(rig):
+        left += _check_section(section, path, d, file)
+    return left
+
+
+def _sections(rig: Rig) -> Iterator[tuple[Section, str, str]]:
+    """Yield all sections of a rig with their dotted places, and the unit of deflection there."""
+    waiting: list[tuple[Section, str, str]] = [(rig, "", "m")]
+    while waiting:
+        section, path, d = waiting.pop()
+        yield section, path, d
+        for name in type(section).model_fields:
+            value = getattr(section, name)
+            at = f"{path}.{name}" if path else name
+            inner = value.items() if isinstance(value, dict) else [("", value)]
+            for key, one in inner:
+                if isinstance(one, Section):
+                    unit = unit_of(key) if name == "controls" else d
+                    waiting.append((one, f"{at}.{key}" if key else at, unit))
+
+
+def _check_section(section: Section, path: str, d: str, file: object) -> list[str]:
+    kind = type(section)
+    exported = EXPORTED.get(kind, frozenset())
+    without, refused = WITHOUT_EFFECT.get(kind, {}), REFUSED.get(kind, {})
+    left = list[str]()
+    for key, name in file_keys(kind, d).items():
+        field, value = kind.model_fields[name], getattr(section, name)
+        dotted = f"{path}.{key}" if path else key
+        if name in exported or value == field.get_default(call_default_factory=True):
+            continue
+        if name in without:
+            left.append(f"{dotted}: {without[name]}")
+        elif name in refused:
+            default = field.get_default(call_default_factory=True)
+            raise InputError(file, dotted, f"{refused[name]}; leave it at {default!r}")
+        else:
+            problem = "is not known to the export, which leaves nothing out in silence"
+            raise InputError(file, dotted, problem)
+    return left
+
+
+def approximated(rig: Rig) -> list[str]:
+    """Return what of a rig is approximated, and how."""
+    found = list[str]()
+    for name, control in rig.controls.items():
+        if control.loader.delay > 0.0:
+            found.append(f"controls.{name}.loader.delay_s: {APPROXIMATED['loader.delay']}")
+    if not rig.structure.stands_apart:
+        found.append(f"structure: {APPROXIMATED['structure']}")
+    return found

@@ -1,0 +1,104 @@
+"""What the stages of one exported control share: its data, its system, and how time is divided.
+
+A run of JSBSim takes one step of dt. The loader takes `substeps` of h = dt/substeps within it, each
+a set of components of its own: JSBSim runs components in the order in which they stand in the file,
+and has no loop. A host that is slower than JSBSim acts at every `steps`-th run, and holds between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from coupled.export.expression import Expr, Value, either, equal, exponential, prop
+from coupled.export.system import System
+from coupled.record.channels import SURFACES, ControlName, unit_of
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
+from coupled.rig.surface import COMMAND_SIGN
+
+DT = prop("simulation/dt")
+STILL_s = 1e-6  # the loader's step in a run that takes no time, as in JSBSim's trim
+
+
+@dataclass(frozen=True)
+class Made:
+    """One control in the making.
+
+    `substeps` of the loader in a run of JSBSim, `steps` of JSBSim in a frame of the host.
+    """
+
+    rig: Rig
+    name: ControlName
+    substeps: int
+    system: System = field(init=False)
+
+    def __post_init__(self) -> None:
+        system = System(f"coupled {self.name}", f"coupled/{self.name}")
+        object.__setattr__(self, "system", system)
+
+    @property
+    def control(self) -> Control:
+        """The control's section of the rig."""
+        return self.rig.controls[self.name]
+
+    @property
+    def d(self) -> str:
+        """The unit of its deflection."""
+        return unit_of(self.name)
+
+    @property
+    def steps(self) -> int:
+        """Runs of JSBSim in a frame of the host."""
+        return self.rig.flight.steps_per_frame if self.rig.flight is not None else 1
+
+    @property
+    def command(self) -> str:
+        """JSBSim's property that moves the surface."""
+        return f"fcs/{SURFACES[self.name]}-cmd-norm"
+
+    @property
+    def sign(self) -> float:
+        """JSBSim's sign of a command that a positive force gives."""
+        return COMMAND_SIGN[self.control.surface]
+
+    def own(self, name: str) -> Expr:
+        """Return a component's value, of the last run where it stands before it."""
+        return self.system.own(name)
+
+    def kept(self, name: str) -> Expr:
+        """Return a component's value of the last run, 0 in the first after a start."""
+        return self.own("live") * self.own(name)
+
+    def once_a_frame(self, name: str, value: Value, says: str = "", out: str = "") -> Expr:
+        """Add a component that the host sets at its frames, and holds between them."""
+        if self.steps > 1:
+            value = either(equal(self.own("clock"), 0.0), value, self.own(name))
+        return self.system.add(name, value, says, out=out)
+
+    def frame_gain(self, lag_s: float) -> Expr:
+        """Return the share of the way that a first-order lag goes in a frame of the host."""
+        return 1.0 - exponential(-(self.steps / lag_s) * DT)
+
+
+def add_clock(made: Made) -> None:
+    """Add what divides time: whether JSBSim steps, the loader's step, the host's frame."""
+    system = made.system
+    system.channel("time", "A run that takes no time (JSBSim's start and trim) sets all back.")
+    system.add("live", either(stepping(), own_started(made), 0.0), "1 from the second step on")
+    system.add("started", stepping(), "1 from the first step on")
+    step = either(made.own("live"), DT / float(made.substeps), STILL_s)
+    system.add("step-s", step, f"h, the loader's step: {made.substeps} in a run")
+    if made.steps > 1:
+        count = made.own("clock") + 1.0
+        turn = either(equal(count, float(made.steps)), 0.0, count)
+        system.add("clock", either(made.own("live"), turn, 0.0), "runs since the host's frame")
+
+
+def stepping() -> Expr:
+    """Return 1 where JSBSim's time goes on, 0 where it starts or trims."""
+    return Expr("gt", (DT, Expr("v", text="0.0")))
+
+
+def own_started(made: Made) -> Expr:
+    """Return whether the run before stepped."""
+    return made.own("started")

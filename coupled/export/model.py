@@ -1,0 +1,146 @@
+"""The aircraft of an export: its files as they are, the include, and all that they refer to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from coupled.errors import InputError, nearest
+from coupled.files import read_bytes
+from coupled.flight.airframe import packaged_models
+from coupled.flight.altered import ALTERATIONS
+from coupled.flight.modelfile import NothingToScaleError, loadable
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+
+Files = dict[PurePosixPath, bytes]
+_SYSTEMS = ("system", "autopilot", "flight_control")  # as JSBSim loads them, one after the other
+_BENCH = b"""<?xml version="1.0"?>
+<!-- No aircraft: a weight that carries the loader of a bench. q comes from a property. -->
+<fdm_config name="bench" version="2.0">
+  <metrics>
+    <wingarea unit="M2">1</wingarea><wingspan unit="M">1</wingspan><chord unit="M">1</chord>
+    <location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location>
+    <location name="EYEPOINT" unit="M"><x>0</x><y>0</y><z>0</z></location>
+    <location name="VRP" unit="M"><x>0</x><y>0</y><z>0</z></location>
+  </metrics>
+  <mass_balance>
+    <ixx unit="KG*M2">1</ixx><iyy unit="KG*M2">1</iyy><izz unit="KG*M2">1</izz>
+    <emptywt unit="KG">1</emptywt>
+    <location name="CG" unit="M"><x>0</x><y>0</y><z>0</z></location>
+  </mass_balance>
+  <ground_reactions/>
+  <flight_control name="bench"/>
+  <aerodynamics><axis name="DRAG"/><axis name="ROLL"/></aerodynamics>
+</fdm_config>
+"""
+
+
+def model_name(flight: Flight | None) -> str:
+    """Return the folder's and file's name of a rig's aircraft; of a bench the stand's."""
+    return "bench" if flight is None else flight.model
+
+
+def altered(flight: Flight | None) -> list[str]:
+    """Return the names of the factors on the aerodynamics that a rig has."""
+    if flight is None:
+        return []
+    return [a.part.name for a in ALTERATIONS if a.factor(flight) != 1.0]
+
+
+def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> Files:
+    """Return an aircraft's files by their places in the exported folder.
+
+    `systems` are the names of those to include, before all of the aircraft's own; `file` is named
+    in faults. Of the model's folder all XML files are taken; of the engines, thrusters and systems
+    that it shares with other models those that it names.
+    """
+    name = model_name(flight)
+    folder = PurePosixPath("aircraft", name)
+    if flight is None:
+        return {folder / "bench.xml": _including(_BENCH, systems)}
+    home = _home(flight, file)
+    parts = [a.part for a in ALTERATIONS if a.factor(flight) != 1.0]
+    try:
+        with loadable(home, name, parts) as made:
+            main = read_bytes(made / name / f"{name}.xml")
+    except NothingToScaleError as error:
+        problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
+        raise InputError(file, f"flight.{error.scaled.name}", problem) from None
+    found: Files = {folder / f"{name}.xml": _including(main, systems)}
+    for path in sorted((home / name).rglob("*.xml")):
+        place = folder / PurePosixPath(path.relative_to(home / name).as_posix())
+        if place not in found:
+            found[place] = read_bytes(path)
+    return found | _shared(found, folder)
+
+
+def _home(flight: Flight, file: object) -> Path:
+    own = aircraft_folder()
+    if (own / flight.model / f"{flight.model}.xml").is_file():
+        return own
+    known = packaged_models()
+    if flight.model not in known:
+        problem = f"there is no JSBSim model {flight.model!r}; {nearest(flight.model, known)}"
+        raise InputError(file, "flight.model", problem)
+    return known[flight.model]
+
+
+def _including(text: bytes, systems: Sequence[str]) -> bytes:
+    """Return a model's file with systems included before its own, and nothing else changed."""
+    places = list(_top_level(text))
+    at = next((place for tag, place in places if tag in _SYSTEMS), None)
+    if at is None:
+        at = text.rindex(b"</fdm_config")
+    lines = b"".join(b'<system file="%s"/>\n    ' % name.encode() for name in systems)
+    return text[:at] + lines + text[at:]
+
+
+def _top_level(text: bytes) -> Iterator[tuple[str, int]]:
+    """Yield tag and place of each element directly below the root."""
+    depth, found = 0, list[tuple[str, int]]()
+    parser = expat.ParserCreate()
+
+    def start(tag: str, _: dict[str, str]) -> None:
+        nonlocal depth
+        if depth == 1:
+            found.append((tag, parser.CurrentByteIndex))
+        depth += 1
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.Parse(text, True)
+    yield from found
+
+
+def _shared(files: Files, folder: PurePosixPath) -> Files:
+    """Return what the files name that lies in JSBSim's own folders, and what that names."""
+    root = next(iter(packaged_models().values())).parent
+    found: Files = {}
+    waiting = list(files.values())
+    while waiting:
+        for element in _parsed(waiting.pop()).iter():
+            name = element.attrib.get("file", "").removesuffix(".xml")
+            places = {"engine": "engine", "thruster": "engine", "system": "systems"}
+            if not name or element.tag not in places:
+                continue
+            file = PurePosixPath(places[element.tag], f"{name}.xml")
+            own = "Systems" if element.tag == "system" else "Engines"
+            here = {folder / f"{name}.xml", folder / own / f"{name}.xml"}
+            if here & files.keys() or file in found or not (root / file).is_file():
+                continue
+            found[file] = read_bytes(root / file)
+            waiting.append(found[file])
+    return found
+
+
+def _parsed(text: bytes) -> ElementTree.Element:
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError:
+        return ElementTree.Element("unreadable")

@@ -1,0 +1,101 @@
+"""The README of an exported folder: how to fly it, its properties, its errors, what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from coupled.export.beside import Beside
+from coupled.export.keys import approximated
+from coupled.export.model import model_name
+from coupled.export.system import System
+from coupled.record.channels import SURFACES
+from coupled.rig.rig import Rig
+
+_HAND = """\
+Two ways lead to the grip. A force: set `coupled/{control}/force-N`. Or a hand that holds a place:
+set `coupled/{control}/hand` to 1, and where it holds the grip by `hand-deflection-…`, or by a
+joystick: whatever else sets `{command}` is taken as its axis, and what the loader makes of
+it goes to the surface in its stead, on top of the trim."""
+
+
+def readme_text(
+    rig: Rig,
+    systems: Mapping[str, System],
+    substeps: int,
+    rate_Hz: float,
+    scripts: Sequence[str],
+    flights: Sequence[Beside],
+    left: Sequence[str],
+) -> str:
+    """Return the README's text; `rate_Hz` is JSBSim's, `flights` those held against our own."""
+    name = model_name(rig.flight)
+    parts = [
+        f"# {name} with the control loader of `{rig.name}`",
+        f"Made by `coupled export`: the JSBSim model {name}, its files as they are but for a line"
+        " that includes each `Systems/coupled-….xml`, and in newtons the rig's"
+        f" {', '.join(systems)}.",
+        _flying(rig, name, rate_Hz, substeps, scripts),
+        _HAND.format(control=next(iter(systems)), command=_command(systems)),
+        _properties(systems),
+    ]
+    if flights:
+        parts.append(_errors(flights))
+    about = approximated(rig)
+    if about:
+        lines = [f"- {one}" for one in about]
+        parts.append("## Approximated\n\nThe errors above have it in them.\n\n" + "\n".join(lines))
+    if left:
+        parts.append("## Left out\n\n" + "\n".join(f"- {one}" for one in left))
+    return "\n\n".join(parts) + "\n"
+
+
+def _command(systems: Mapping[str, System]) -> str:
+    return f"fcs/{SURFACES[next(iter(systems))]}-cmd-norm"
+
+
+def _flying(rig: Rig, name: str, rate_Hz: float, substeps: int, scripts: Sequence[str]) -> str:
+    script = scripts[0] if scripts else "scripts/NAME.xml"
+    lines = ["## Flying it", "", "In this folder:", "", "```sh"]
+    lines += [
+        f"python fly.py {script} > flight.csv    # pip install jsbsim; nothing else",
+        f"JSBSim --root=. --script={script}",
+    ]
+    if rig.flight is not None:
+        lines += [
+            f"fgfs --fdm=jsbsim --aero={name} --aircraft-dir=$PWD/aircraft/{name}"
+            f" --aircraft={name} --model-hz={rate_Hz:g}",
+        ]
+    lines += ["```", ""]
+    lines.append(
+        f"The loader takes {substeps} steps in a step of JSBSim, {substeps * rate_Hz:g} Hz at the"
+        f" {rate_Hz:g} Hz of the scripts; it works at any other rate, and is as exact as its steps"
+        " are short. A run of JSBSim that takes no time (its start, its trim) sets it back."
+    )
+    return "\n".join(lines)
+
+
+def _properties(systems: Mapping[str, System]) -> str:
+    lines = ["## Properties", "", "| property | what |", "| --- | --- |"]
+    for system in systems.values():
+        lines += [f"| `{path}` | {what} |" for path, what in system.documented.items()]
+    return "\n".join(lines)
+
+
+def _errors(flights: Sequence[Beside]) -> str:
+    lines = [
+        "## Beside coupled's own flights",
+        "",
+        "Each script flown by JSBSim alone, at the worst frame and control: deflection in % of"
+        " travel, force and F_mod in % of the greatest (F_mod jumps at neutral, and is read from"
+        " 1 % of travel on), the authority lost in points.",
+        "",
+        "| run | case | configuration | deflection | force | F_mod | lost |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for one in flights:
+        lost = "" if one.loss is None else f"{100.0 * one.loss:+.3f}"
+        lines.append(
+            f"| {one.run} | {one.case} | {one.configuration} | {100.0 * one.deflection:.3f} |"
+            f" {100.0 * one.force:.3f} | {100.0 * one.modifying_force:.3f} | {lost} |"
+        )
+    return "\n".join(lines)

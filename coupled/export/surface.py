@@ -1,0 +1,34 @@
+"""The run to the surface as JSBSim's components (`rig/surface`), and the command it gives."""
+
+from __future__ import annotations
+
+from coupled.export.expression import either, prop, within
+from coupled.export.host import pressure
+from coupled.export.making import Made, stepping
+
+
+def add_surface(made: Made) -> None:
+    """Add the surface's command about trim, and give it to the aircraft on top of its trim."""
+    control, system, own = made.control, made.system, made.own
+    rigging = control.rigging
+    system.channel("surface", "the command about trim, ±1 the whole travel, then on top of it")
+    asked = within((made.sign / control.travel) * own(f"estimate-{made.d}"), -1.0, 1.0)
+    if rigging.stretch_loss > 0.0:
+        asked = asked / (1.0 + rigging.stretch_loss * pressure(made))
+    if rigging.lag > 0.0:
+        before = made.kept("surface/lagged")
+        gain = made.frame_gain(rigging.lag)
+        asked = made.once_a_frame("surface/lagged", before + gain * (asked - before))
+    if rigging.rate_limit > 0.0:
+        before, step = made.kept("surface/moved"), rigging.rate_limit / made.rig.frame_rate
+        asked = made.once_a_frame("surface/moved", within(asked, before - step, before + step))
+    if rigging.play > 0.0:
+        half = 0.5 * rigging.play
+        before = made.kept("surface/position")
+        played = within(before, asked - half, asked + half)
+        asked = made.once_a_frame("surface/position", played)
+    made.once_a_frame(
+        "surface-norm", asked + rigging.offset, out="the surface's command about trim, ±1"
+    )
+    given = either(stepping(), own("trim-norm") + own("surface-norm"), prop(made.command))
+    system.add("command-norm", given, output=made.command, out="the command given to JSBSim, ±1")
