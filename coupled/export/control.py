@@ -76,7 +76,7 @@ def _add_inputs(made: Made) -> None:
     ):
         system.declare(switch, float(on), what)
     if made.rig.flight is None:
-        system.declare(BENCH_PRESSURE, 0.0, "the dynamic pressure that the host is told, Pa")
+        system.declare(BENCH_PRESSURE, 0.0, "the dynamic pressure that the host is given, Pa")
     system.channel("input", "The force given; or a hand, led by the axis that moves the command.")
     command = prop(made.command)
     system.add(

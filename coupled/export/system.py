@@ -44,8 +44,8 @@ class System:
         """
         path = f"{self.at}/{name}"
         if says or out:
-            told = [f"gives: {out}"] if out else []
-            self._body.append(f"    {_comment('. '.join([*told, *([says] if says else [])]))}")
+            shown = [f"gives: {out}"] if out else []
+            self._body.append(f"    {_comment('. '.join([*shown, *([says] if says else [])]))}")
         self._body.append(f'    <fcs_function name="{path}">')
         self._body.append("      <function>")
         self._body += as_expr(value).lines("        ")
