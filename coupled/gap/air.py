@@ -21,7 +21,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from coupled.gap.output import white
+from coupled.gap.output import heard, white
 from coupled.gap.smooth import Smoother, rate_of, smoothed
 from coupled.gap.thresholds import STIFFEST_AIR
 from coupled.record.record import Record
@@ -54,12 +54,12 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
     rng = np.random.default_rng(seed)
     climb, climb_error = _climb(record, frame_s, rng)
     rough = climb - smoothed(speed) * np.sin(pitch - alpha)
-    level = white(rough)
+    level = heard(rough)
     smoother = Smoother.of(rough, (1,))
     smooth = smoother.smooth(rough)
     error = smoother.wiener_error(level, len(rough), rng) + climb_error
     # The smoother takes some of a faint gust with the noise, which its own rms would miss.
-    true = max(float(np.var(rough)) - level**2, float(np.var(smooth)))
+    true = max(float(np.var(rough)) - level.rms**2, float(np.var(smooth)))
     return Air(smooth, math.sqrt(true), error)
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.noise import Noise, noise_of
 from coupled.gap.thresholds import (
     ECHO_FRAMES,
     GUILTY_FROM,
@@ -104,12 +105,18 @@ class Output:
 
 
 def white(signal: Floats) -> float:
-    """Return the rms of the white noise in a smooth signal, by its fourth differences (gain √70).
+    """Return the rms of the noise in a smooth signal."""
+    return heard(signal).rms
+
+
+def heard(signal: Floats) -> Noise:
+    """Return the noise in a smooth signal (`noise`).
 
     No less than its rounding, which is not white where the signal is slow.
     """
-    noise = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
-    return max(noise, rounding(signal, noise))
+    noise = noise_of(signal)
+    rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    return replace(noise, rms=max(noise.rms, rounding(signal, rough)))
 
 
 def rounding(signal: Floats, noise: float) -> float:
@@ -138,16 +145,20 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
     return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
 
 
-def spread(carried: Sequence[Floats], own: float) -> float:
-    """Return the relative standard deviation of noise's rms: `carried` of some tries, and white.
+def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:
+    """Return the relative standard deviation of noise's rms: `carried` of some tries, and its own.
+
+    The own noise is white, or correlates by `memory` from frame to frame.
 
     The mean square of N values of Gaussian noise varies by √(2·Σρ²/N) of itself (Bartlett), its
     root by half of that. The less noise a stage and its smoother let pass, the fewer values count.
     """
     power = np.mean([np.abs(np.fft.rfft(x)) ** 2 for x in carried], axis=0) / len(carried[0])
     crowded = 1.0 + 1.0 / len(carried)  # of the square of a periodogram, by how few are averaged
-    total = float(np.mean(power)) + own**2
-    square = float(np.mean(power**2)) / crowded + 2.0 * float(np.mean(power)) * own**2 + own**4
+    at = np.linspace(0.0, np.pi, len(power))
+    alone = own**2 * (1.0 - memory**2) / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
+    total = float(np.mean(power + alone))
+    square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
     return float(np.sqrt(0.5 * square / total**2 / len(carried[0])))
 
 

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from coupled.gap.noise import Noise
+
 Floats = NDArray[np.float64]
 
 
@@ -58,12 +60,12 @@ class Smoother:
         out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
         return np.asarray(out[self.reach : self.reach + len(signal)])
 
-    def wiener_error(self, level: float, frames: int, rng: np.random.Generator) -> Floats:
+    def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
-        For a signal of which this smoother is the Wiener filter; `level` is the rms of the noise.
+        For a signal of which this smoother is the Wiener filter; `level` is its noise.
         """
-        noise = rng.normal(0.0, level, frames + 2 * self.reach)
+        noise = level.sample(frames + 2 * self.reach, rng)
         out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(self.gain), len(noise))
         return np.asarray(out[self.reach : self.reach + frames])
 

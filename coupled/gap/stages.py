@@ -22,10 +22,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.gap.floors import given_noise, noise_in, with_error
+from coupled.gap.noise import Noise
 from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.sensed import Sensed
-from coupled.gap.smooth import Smoother, rate_of, smoothed
+from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
+    BROAD,
     ECHO_SHARE,
     NOISE_TRIES,
     PRELOAD_UNSURE,
@@ -134,17 +137,17 @@ class Reader:
         measured: Floats,
         predict: Predict,
         noisy: Callable[[Rig, int], Floats],
-        own: float,
+        own: Noise,
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, carried through."""
         base = predict(self.rig)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
-        floor = float(np.hypot(own, carried))
+        floor = float(np.hypot(own.rms, carried))
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        return replace(made, spread=spread(tries, own), smoothed=carried / floor)
+        return replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
@@ -152,15 +155,14 @@ class Reader:
         rate = self.rig.frame_rate
         return Output(stage, name, measured, predict, floor, rate, self.number)
 
-    def _with_error(self, signal: Floats, k: int, level: float) -> Floats:
-        """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
-        rng = np.random.default_rng([41, k])
-        raw = signal + rng.normal(0.0, level, len(signal))
-        return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
+    def _heard(self, quantity: str) -> Noise:
+        """Return the noise of a control's channel."""
+        return noise_in(self.rig, self._name(quantity), self.signal(quantity))
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
-        own, level, smooth = white(gradient), white(pressure), smoothed(pressure)
+        own, level = self._heard("gradient"), noise_in(self.rig, "dynamic_pressure_Pa", pressure)
+        smooth = smoothed(pressure)
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
             return replay_schedule(rig, self.control, q)
@@ -175,17 +177,16 @@ class Reader:
             return [self._output("schedule", self._name("gradient"), gradient, as_read, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, self._with_error(smooth, k, level))
+            return predict(rig, with_error(smooth, k, level))
 
         return [self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
         noisy_force, gradient = self.signal("force"), self.gradient()
-        force, level = smoothed(noisy_force), white(noisy_force)
+        force, level = smoothed(noisy_force), self._heard("force")
         computed, second = self.signal("computed"), self.second()
-        flown = "load_factor" in self.record
-        load = smoothed(self.record["load_factor"]) if flown else None
-        smooth, own = smoothed(computed), white(computed)
+        load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
+        smooth, own = smoothed(computed), self._heard("computed")
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
         def driven(f: Floats, seen: Floats) -> Predict:
@@ -205,10 +206,15 @@ class Reader:
             return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
-            seen = self._with_error(smooth, k + NOISE_TRIES, own)
-            return driven(self._with_error(force, k, level), seen)(rig)
+            seen = with_error(smooth, k + NOISE_TRIES, own)
+            return driven(with_error(force, k, level), seen)(rig)
 
         predict = driven(force, smooth)
+        if level.rms > BROAD * float(np.std(noisy_force)):  # no noise, if the loader follows it
+            rough = driven(noisy_force, smooth)
+            if np.std(computed - rough(self.rig)) < np.std(computed - predict(self.rig)):
+                level = given_noise(self.rig, self._name("force"), noisy_force)
+                predict, force = rough, noisy_force
         return [self._made("loader", self._name("computed"), computed, predict, noisy, own)]
 
     def _drifts(self, gradient: Floats) -> bool:
@@ -225,15 +231,15 @@ class Reader:
         """
         computed, product = self.signal("computed"), self.signal("modifying_force")
         gradient, second, smooth = self.gradient(), self.second(), smoothed(computed)
-        level = white(computed)
+        level, own = self._heard("computed"), self._heard("modifying_force")
 
         def made(rig: Rig, read: Floats) -> Floats:
             return replay_product(rig, self.control, read, gradient, second)
 
         # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
-        jump = made(self.rig, 0.0 * smooth + level) - made(self.rig, 0.0 * smooth - level)
-        near = np.abs(smooth) < PRELOAD_UNSURE * level
-        unsure = near & (np.abs(jump) > PRELOAD_UNSURE * white(product))
+        jump = made(self.rig, 0.0 * smooth + level.rms) - made(self.rig, 0.0 * smooth - level.rms)
+        near = np.abs(smooth) < PRELOAD_UNSURE * level.rms
+        unsure = near & (np.abs(jump) > PRELOAD_UNSURE * own.rms)
 
         def predict(rig: Rig, seen: Floats = smooth) -> Floats:
             digital = rig.controls[self.control].loader.multiplier == "digital"
@@ -241,15 +247,15 @@ class Reader:
             return np.where(unsure, product, made(rig, read))
 
         def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, self._with_error(smooth, k, level))
+            return predict(rig, with_error(smooth, k, level))
 
         name = self._name("modifying_force")
-        return [self._made("multiplier", name, product, predict, noisy, white(product))]
+        return [self._made("multiplier", name, product, predict, noisy, own)]
 
     def _linkage(self) -> list[Output]:
         computed, force = self.signal("computed"), self.signal("force")
         measured = self.signal("deflection")
-        levels = white(computed), white(force)
+        levels = self._heard("computed"), self._heard("force")
         smooth, smooth_force = smoothed(computed), smoothed(force)
 
         others = {name: smoothed(signal) for name, signal in self.others().items()}
@@ -265,11 +271,11 @@ class Reader:
             return predict
 
         def noisy(rig: Rig, k: int) -> Floats:
-            c = self._with_error(smooth, k, levels[0])
-            return driven(c, self._with_error(smooth_force, k + NOISE_TRIES, levels[1]))(rig)
+            c = with_error(smooth, k, levels[0])
+            return driven(c, with_error(smooth_force, k + NOISE_TRIES, levels[1]))(rig)
 
         name, predict = self._name("deflection"), driven(smooth, smooth_force)
-        return [self._made("linkage", name, measured, predict, noisy, white(measured))]
+        return [self._made("linkage", name, measured, predict, noisy, self._heard("deflection"))]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
-from coupled.gap.output import white
+from coupled.gap.output import heard
 from coupled.gap.smooth import Smoother, smoothed
 from coupled.gap.thresholds import SURFACE_SHAKE, SURFACE_MOVES_rad, SURFACE_SHAKE_s
 from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
@@ -102,7 +102,7 @@ def commands(rig: Rig, record: Record, rng: np.random.Generator) -> tuple[Floats
             found[:, i] = wrong[:, i] = _asked(rig, record, control)
             continue
         position = record[name]
-        level, smooth = white(position), smoothed(position)
+        level, smooth = heard(position), smoothed(position)
         error = Smoother.of(position).wiener_error(level, len(smooth), rng)
         found[:, i], wrong[:, i] = command_of(smooth, points), command_of(smooth + error, points)
     return found, wrong

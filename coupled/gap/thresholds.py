@@ -18,6 +18,18 @@ SHORTEST_RECORD_s = 5.0  # two stretches of 2.5 s: one to fit, one to hold out
 ECHO_FRAMES = 12  # chosen: a tenth of a second at 120 Hz, over which noise may echo
 ROUNDED = 3.0  # of the noise, from which even steps are a ramp's: q̄ profiles of benches had such
 ROUNDING_SPAN = 1e-6  # chosen: of a channel's span, the least that a file's figures keep
+NOISE_FROM = 0.4  # chosen: of the highest frequency, from which a channel holds noise alone
+NOISE_BANDS = 20  # chosen: bands of equal width in all
+QUIETER = 0.9  # chosen: share of a band's values that count: the rest may be a line's
+WHITE_FRAMES = 400  # chosen: fewer are too few for bands
+COLOURS = tuple(0.02 * k for k in range(43))  # correlations by frames that are tried: to 0.84
+COLOURED_BY = 12.0  # chosen: by which a colour must lessen χ² of the bands' levels,
+COLOUR_FITS = 2.5  # chosen: and what it may leave of that for each degree of freedom
+FOLLOWS_ON = 3.5  # chosen: standard deviations by which the next band below may be off a colour
+FILTERED = 0.05  # chosen: of the lowest bands' level, under which the highest show a filter
+JUMPS = 0.5  # chosen: of the rms of fourth differences, under which the usual one shows jumps
+LEAST_NOISE = 1e-3  # chosen: of a signal's rms, the noise of a channel whose own was filtered away
+BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the force itself
 UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
 
 # Halves of a record: fitted and held out (`output`).

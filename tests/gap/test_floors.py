@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.gap.flexible import free_share
+from coupled.gap.noise import Noise, noise_of
 from coupled.gap.output import Output, spread
 from coupled.gap.smooth import Smoother
 from coupled.gap.summary import in_figures
@@ -78,7 +79,7 @@ def test_wieners_error_is_what_the_smoother_leaves_of_a_random_walk() -> None:
         rough = walk + level * rng.normal(size=2400)
         smoother = Smoother.of(rough, (1,))
         left.append(np.mean((smoother.smooth(rough) - walk) ** 2))
-        told.append(np.mean(smoother.wiener_error(level, 2400, rng) ** 2))
+        told.append(np.mean(smoother.wiener_error(Noise(level), 2400, rng) ** 2))
     assert np.mean(told) == pytest.approx(np.mean(left), rel=0.1)
 
 
@@ -97,3 +98,34 @@ def test_a_factor_has_as_many_figures_as_tell_it_from_one(
     name: str, value: float, figures: str
 ) -> None:
     assert in_figures(name, value) == figures
+
+
+def smooth_motion(frames: int) -> Floats:
+    """Return a motion of unit size that dies away far below the noise at high frequencies."""
+    walk = np.cumsum(np.cumsum(np.convolve(RNG.normal(size=frames), np.hanning(60), "same")))
+    return np.asarray(walk / np.std(walk))
+
+
+@pytest.mark.parametrize("corner_Hz", [15.0, 30.0])
+def test_noise_that_a_lag_has_coloured_is_as_large_as_it_is(corner_Hz: float) -> None:
+    a = float(np.exp(-2.0 * np.pi * corner_Hz / RATE_Hz))
+    found = []
+    for _ in range(20):
+        noise = Noise(1.0, a).sample(FRAMES, RNG)
+        assert np.std(noise) == pytest.approx(1.0, rel=0.15)
+        found.append(noise_of(300.0 * smooth_motion(FRAMES) + noise))
+    assert np.mean([one.rms for one in found]) == pytest.approx(1.0, rel=0.1)
+    assert np.mean([one.memory for one in found]) == pytest.approx(a, abs=0.12)
+    plain = [noise_of(300.0 * smooth_motion(FRAMES) + RNG.normal(size=FRAMES)) for _ in range(20)]
+    assert np.mean([one.memory > 0.0 for one in plain]) <= 0.1
+    assert np.mean([one.rms for one in plain]) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_hum_is_no_noise_and_a_filtered_log_is_seen() -> None:
+    motion, noise = 300.0 * smooth_motion(FRAMES), RNG.normal(size=FRAMES)
+    hum = 7.0 * np.sin(2.0 * np.pi * 50.0 * np.arange(FRAMES) / RATE_Hz)
+    heard = noise_of(motion + noise + hum)
+    assert heard.rms == pytest.approx(1.0, rel=0.1)
+    assert not heard.filtered
+    kernel = np.hanning(9)
+    assert noise_of(np.convolve(motion + noise, kernel / kernel.sum(), "valid")).filtered

@@ -1,0 +1,38 @@
+"""What is taken for a channel's noise: by its spectrum, or where that does not say, the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise import Noise
+from coupled.gap.output import heard, rounding
+from coupled.gap.smooth import Smoother
+from coupled.gap.thresholds import LEAST_NOISE
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
+    """Return the noise of a channel; of one that was filtered, no less than `given_noise`."""
+    found = heard(signal)
+    if not found.filtered:
+        return found
+    return replace(found, rms=max(found.rms, given_noise(rig, channel, signal).rms))
+
+
+def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
+    """Return what the rig file says of a channel's noise; else the least that a sensor has."""
+    known = rig.noise.get(channel, 0.0)
+    least = LEAST_NOISE * float(np.sqrt(np.mean(signal**2)))
+    return Noise(known or max(least, rounding(signal, np.inf)))
+
+
+def with_error(signal: Floats, k: int, level: Noise) -> Floats:
+    """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
+    rng = np.random.default_rng([41, k])
+    raw = signal + level.sample(len(signal), rng)
+    return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)

@@ -1,0 +1,139 @@
+"""The noise of a channel, by the part of its spectrum where a signal has died away.
+
+Above four tenths of the highest frequency that a record holds, what a rig does is long below the
+noise of its sensors. There the noise is either white, or that of a first-order lag, whose power
+falls as 1/(1 + a² − 2a·cos ω); a is the correlation from frame to frame. What is below follows from
+that. Bands are judged by their quieter nine tenths, so that a line (the mains' hum) is not taken
+for noise. A log that was filtered or resampled has next to nothing there: how large its noise
+was cannot be seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from coupled.gap.thresholds import (
+    COLOUR_FITS,
+    COLOURED_BY,
+    COLOURS,
+    FILTERED,
+    FOLLOWS_ON,
+    JUMPS,
+    NOISE_BANDS,
+    NOISE_FROM,
+    QUIETER,
+    WHITE_FRAMES,
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a level, rms in the channel's unit; `memory` is its correlation by frames, 0 to 1.
+
+    `filtered`: the spectrum falls on to its end, so that this is what is left of the noise.
+    """
+
+    rms: float
+    memory: float = 0.0
+    filtered: bool = False
+
+    def sample(self, frames: int, rng: np.random.Generator) -> Floats:
+        """Return a sample of it, shape (frames,)."""
+        white = rng.normal(0.0, self.rms, frames)
+        if self.memory == 0.0 or not frames:
+            return white
+        gain = math.sqrt(1.0 - self.memory**2)
+        start = [self.memory * white[0]]  # in its steady state
+        white[1:] *= gain
+        rest = lfilter([1.0], [1.0, -self.memory], white[1:], zi=start)[0]
+        return np.concatenate((white[:1], rest))
+
+
+def noise_of(signal: Floats) -> Noise:
+    """Return the noise of a smooth signal; of a short one, its fourth differences' rms by √70."""
+    rough = np.diff(signal, 4)
+    plain = Noise(float(np.sqrt(np.mean(rough**2) / 70.0)) if len(rough) else 0.0)
+    # Where most of it lies in a few frames, a signal jumps there, and colour is not to be seen.
+    usual = float(np.median(np.abs(rough))) / 0.6745 if len(rough) else 0.0
+    if len(rough) < WHITE_FRAMES or usual < JUMPS * plain.rms * math.sqrt(70.0):
+        return plain
+    at, levels = _bands(rough)
+    high = at >= NOISE_FROM * math.pi
+    if not np.all(levels[high] > 0.0):
+        return plain
+    sure, variance = levels[high], _log_variance(rough)
+    filtered = bool(np.median(sure[-3:]) < FILTERED * np.median(sure[:3]))
+    memory = 0.0 if filtered else _memory(at, levels, int(np.argmax(high)), variance)
+    logs = np.log(sure / _shape(at[high], memory))
+    white = float(np.exp(np.mean(logs) + 0.5 * variance))
+    return Noise(math.sqrt(white / (1.0 - memory**2)), memory, filtered)
+
+
+def _bands(rough: Floats) -> tuple[Floats, Floats]:
+    """Return the middle frequencies of bands, rad a frame, and the noise's variance in each.
+
+    `rough` are fourth differences, which a white noise passes by |2 sin(ω/2)|⁸. Each band's mean
+    is that of its quieter part, made good for an exponential distribution.
+    """
+    taper = np.hanning(len(rough))
+    power = np.abs(np.fft.rfft(rough * taper)) ** 2 / float(taper @ taper)
+    omega = np.linspace(0.0, math.pi, len(power))
+    keep = (omega >= math.pi / NOISE_BANDS) & (omega < 0.99 * math.pi)
+    power, omega = power[keep] / (2.0 * np.sin(0.5 * omega[keep])) ** 8, omega[keep]
+    parts = np.array_split(np.arange(len(power)), NOISE_BANDS - 1)
+    rest = 1.0 - QUIETER
+    biased = (QUIETER + rest * math.log(rest)) / QUIETER
+    levels = []
+    for part in parts:
+        quiet = np.sort(power[part])[: max(1, round(QUIETER * len(part)))]
+        levels.append(float(np.mean(quiet)) / biased)
+    return np.array([float(np.mean(omega[part])) for part in parts]), np.array(levels)
+
+
+def _log_variance(rough: Floats) -> float:
+    """Return the variance of the logarithm of a band's mean, which lowers the mean of logarithms.
+
+    A taper lets about two of three bins count.
+    """
+    bins = len(rough) / 2.0 / NOISE_BANDS
+    return 1.5 / bins
+
+
+def _shape(at: Floats, memory: float) -> Floats:
+    """Return the power of a first-order lag's noise over that of what drives it."""
+    return 1.0 / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
+
+
+def _memory(at: Floats, levels: Floats, first: int, variance: float) -> float:
+    """Return the correlation of the noise by frames, 0 where white noise explains it as well.
+
+    The bands from `first` on are noise. Those below are taken in as long as they follow on: where
+    a signal begins, it stands out at once, being far steeper than a first-order lag.
+    """
+    memory, logs = 0.0, np.log(np.maximum(levels, 1e-300))
+    while True:
+        memory = _fitted(at[first:], logs[first:], variance)
+        if first == 0:
+            return memory
+        level = float(np.mean(logs[first:] - np.log(_shape(at[first:], memory))))
+        expected = level + math.log(float(_shape(at[first - 1 : first], memory)[0]))
+        if abs(logs[first - 1] - expected) > FOLLOWS_ON * math.sqrt(variance):
+            return memory
+        first -= 1
+
+
+def _fitted(at: Floats, logs: Floats, variance: float) -> float:
+    """Return the correlation that explains some bands, 0 where it does not by more than white."""
+    tries = np.array([logs - np.log(_shape(at, a)) for a in COLOURS])
+    misfit = np.sum((tries - tries.mean(axis=1, keepdims=True)) ** 2, axis=1) / variance
+    best = int(np.argmin(misfit))
+    better = misfit[0] - misfit[best] > COLOURED_BY
+    fits = misfit[best] < COLOUR_FITS * (len(at) - 2)
+    return COLOURS[best] if better and fits else 0.0
