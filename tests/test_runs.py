@@ -21,8 +21,8 @@ from coupled.units import PSF_Pa
 
 WORST = {"worst-case", "worst-case-t37"}
 # Of another kind; one that some configurations do not end; one whose stick rests in two cases; one
-# in which a bend loses nothing.
-OWN = {"multiplier", "recovery", "latency", "calibrated-low"}
+# in which a bend loses nothing; and services that take or give deflection themselves.
+OWN = {"multiplier", "recovery", "latency", "calibrated-low", "jam", "stick-pusher", "force-trim"}
 
 
 def flown(name: str) -> Comparison:

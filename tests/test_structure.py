@@ -115,6 +115,7 @@ def test_every_key_of_the_files_is_documented() -> None:
     sections: list[type[Section]] = [Rig, parameters.Flight, parameters.Control]
     sections += [parameters.Loader, parameters.Schedule, parameters.Compensation]
     sections += [parameters.Sensing, parameters.Gains, parameters.Calibration, parameters.Rigging]
+    sections += [parameters.Services]
     sections += [Structure, Compliance]
     sections += [RunFile, PressureProfile, Wind, Gust, Turbulence, Event, Measure, Expect]
     sections += [SweepFile, Vary, Survive]
@@ -123,7 +124,7 @@ def test_every_key_of_the_files_is_documented() -> None:
         for key in file_keys(section, "{d}"):
             if key in ("controls", "flight", "loader", "schedule", "compensation", "sensing"):
                 continue
-            if key in ("gains", "calibration", "rigging", "noise", "measure"):
+            if key in ("services", "gains", "calibration", "rigging", "noise", "measure"):
                 continue
             if key in ("structure", "assumed", "bench", "wind", "case", "expect", "kind", "vary"):
                 continue

@@ -205,6 +205,7 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     )
     point = static_point(rig, control, pressure, float(np.mean(deflection[held])), others)
     breakout = side * rig.controls[control].loader.breakout
+    known = not manoeuvre.served  # the statics are those of a loader without services
     return Outcome(
         manoeuvre.label,
         configuration,
@@ -212,9 +213,11 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
         asked,
         reached,
         1.0 - reached / asked,
-        1.0 - float(point.estimate[0] / point.deflection[0]),
+        1.0 - float(point.estimate[0] / point.deflection[0]) if known else nan,
         felt / specified if specified else nan,
-        float((point.force[0] - breakout) / (point.specified[0] - breakout)) if specified else nan,
+        float((point.force[0] - breakout) / (point.specified[0] - breakout))
+        if specified and known
+        else nan,
         float(np.max(np.abs(force))),
         float(np.max(np.abs(record[channel(control, "force_step")]))),
         *_motion_figures(manoeuvre, control, record, side),

@@ -24,8 +24,10 @@ class Conditions(Section):
 
     @property
     def given(self) -> list[str]:
-        """The tables that are there."""
-        return [key for key in Conditions.model_fields if getattr(self, key)]
+        """The tables that are there, and need an aircraft."""
+        there = [key for key in Conditions.model_fields if getattr(self, key)]
+        on_aircraft = any(event.service is None for event in self.event.values())
+        return [key for key in there if key != "event" or on_aircraft]
 
 
 def build_conditions(table: dict[str, Any], file: object) -> None:

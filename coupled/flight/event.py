@@ -1,17 +1,20 @@
-"""What happens to the aircraft in flight: an engine stops, the trim runs away, a lever moves.
+"""What happens in flight: an engine stops, the trim runs away, a lever moves, a loader's service.
 
-Each event is a table of a run file, `[event.NAME]`, of one of three kinds. The aircraft starts
-in trim and whole; what is wrong with it comes later.
+Each event is a table of a run file, `[event.NAME]`, of one of four kinds. The aircraft starts
+in trim and whole; what is wrong with it comes later. A service is the rig's, with or without an
+aircraft (`rig/serving`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from coupled.errors import InputError
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
+from coupled.rig.control import ControlArray
 from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.serving import lead, led
 from coupled.schema import Section, named, quantity
 
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
@@ -22,7 +25,7 @@ _PICK = "propulsion/active_engine"
 
 
 class Event(Section):
-    """One event: `engine_out`, or `trim` with `by_norm`, or `property` with `to`."""
+    """One event: `engine_out`, `trim` with `by_norm`, or `property` or `service` with `to`."""
 
     at: float = quantity("s", ge=0, le=7200)
     over: float = quantity("s", 0.0, ge=0, le=7200)
@@ -30,21 +33,30 @@ class Event(Section):
     trim: ControlName | None = None
     by: float | None = quantity("norm", None, ge=-2, le=2)
     of_model: str | None = named("property", None, min_length=1, max_length=200)
+    service: str | None = quantity("", None, min_length=1, max_length=200)
+    control: ControlName | None = None
     to: float | None = None
 
 
 def check_events(events: Mapping[str, Event], file: object) -> None:
-    """Refuse an event that is none of the three kinds, or two at once."""
+    """Refuse an event that is none of the four kinds, or two at once."""
     for name, event in events.items():
         place = f"event.{name}"
         kinds = {"engine_out": event.engine_out, "trim": event.trim, "property": event.of_model}
+        kinds["service"] = event.service
         given = [key for key, value in kinds.items() if value is not None]
         if len(given) != 1:
-            raise InputError(file, place, "give one of engine_out, trim and property")
-        values = {"by_norm": ("trim", event.by), "to": ("property", event.to)}
-        for key, (kind, value) in values.items():
-            if (given[0] == kind) != (value is not None):
-                raise InputError(file, f"{place}.{key}", f"is given with {kind}, and only there")
+            problem = "give one of engine_out, trim, property and service"
+            raise InputError(file, place, problem)
+        values = {
+            "by_norm": (("trim",), event.by),
+            "to": (("property", "service"), event.to),
+            "control": (("service",), event.control),
+        }
+        for key, (with_, value) in values.items():
+            if (given[0] in with_) != (value is not None):
+                problem = f"is given with {' or '.join(with_)}, and only there"
+                raise InputError(file, f"{place}.{key}", problem)
         if event.engine_out is not None and event.over > 0.0:
             raise InputError(file, f"{place}.over_s", "an engine stops at once; leave it out")
 
@@ -64,18 +76,44 @@ class Events(Wrapper):
             for make in makers
             if (move := make(aircraft, event, self._file, f"event.{name}")) is not None
         ]
-        frame, frame_s = 0, self._frame_s
+        return happening(moves, self._frame_s)
 
-        def happen() -> None:
-            nonlocal frame, moves
-            time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
-            frame += 1
-            for event, move in moves:
-                if time >= event.at:
-                    move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
-            moves = [(event, move) for event, move in moves if time < event.at + event.over]
 
-        return happen
+def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
+    """Return what lets happen, called before each frame, what happens by its start."""
+    frame = 0
+
+    def happen() -> None:
+        nonlocal frame, moves
+        time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
+        frame += 1
+        for event, move in moves:
+            if time >= event.at:
+                move(min((time - event.at) / event.over, 1.0) if event.over > 0.0 else 1.0)
+        moves = [(event, move) for event, move in moves if time < event.at + event.over]
+
+    return happen
+
+
+def service_events(
+    events: Mapping[str, Event], controls: ControlArray, names: Sequence[str], frame_s: float
+) -> Hook | None:
+    """Return what leads the loaders' services of a flying rig, called before each frame, if any."""
+    moves = [(e, _service(controls, names, e)) for e in events.values() if e.service is not None]
+    return happening(moves, frame_s) if moves else None
+
+
+def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move:
+    """Return what leads a service to its value, evenly from where it stands when it begins."""
+    control, service, to = str(event.control), str(event.service), float(event.to or 0.0)
+    begun: float | None = None
+
+    def move(share: float) -> None:
+        nonlocal begun
+        begun = led(controls, names, control, service) if begun is None else begun
+        lead(controls, names, control, service, begun + (to - begun) * share)
+
+    return move
 
 
 def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:

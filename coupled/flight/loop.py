@@ -28,6 +28,7 @@ from coupled.flight.gusts import Gusts
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action, ForceTable
 from coupled.flight.pilot.base import Start
+from coupled.flight.served import Served
 from coupled.record.channels import (
     ALTITUDE,
     LOAD,
@@ -113,13 +114,13 @@ def fly(
     noise = data.copy() if lateness(rig) else None
     hands = controls["state"]["hand"]
     looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
+    served = Served(manoeuvre, controls)
     extra: list[tuple[float, ...]] = []
 
     read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
-    elsewhere = companion is not None and companion.elsewhere
-    arrays = addresses(controls, script, data, elsewhere)
+    arrays = addresses(controls, script, data, companion is not None and companion.elsewhere)
     place = int(arrays.ctypes.data)
-    rig_frame = bound(step_frame_at, place, 0, read(), 1.0)
+    rig_frame = served.around(bound(step_frame_at, place, 0, read(), 1.0))
     flown, asked = rig.flight is not None, bool(manoeuvre.record_properties)
     ended: EndedEarly | None = None
     done = 0
@@ -151,23 +152,23 @@ def fly(
                     progress(done, frames)
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
-    return _flown(manoeuvre, channels, (data[:done], noise), extra, ended)
+    return _flown(manoeuvre, channels, (data[:done], noise), (served, extra), ended)
 
 
 def _flown(
     manoeuvre: Manoeuvre,
     channels: tuple[str, ...],
     flown: tuple[Floats, Floats | None],
-    extra: Sequence[tuple[float, ...]],
+    beside: tuple[Served, Sequence[tuple[float, ...]]],
     ended: EndedEarly | None,
 ) -> Record:
     """Return the record of the frames flown, with their noise, up to the first without a number."""
-    frame_rate, properties = manoeuvre.rig.frame_rate, manoeuvre.record_properties
-    data, noise = flown
-    data, ended = _finite(data, frame_rate, ended)
-    data[:, 0] = np.arange(len(data)) / frame_rate
+    (data, noise), (served, extra), properties = flown, beside, manoeuvre.record_properties
+    data, ended = _finite(data, manoeuvre.rig.frame_rate, ended)
+    data[:, 0] = np.arange(len(data)) / manoeuvre.rig.frame_rate
     if noise is not None:
         stamp(manoeuvre.rig, channels, data, noise[: len(data)])
+    channels, data = (*channels, *served.channels), served.beside(data)
     if properties:
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))

@@ -21,6 +21,7 @@ from coupled.record.channels import ControlName, record_channels, unit_of
 from coupled.rig.equations import bend_loss, felt_gradient
 from coupled.rig.parameters import PLAIN_NAME, Control
 from coupled.rig.rig import Rig
+from coupled.rig.serving import check_led, has_services, service_channels
 from coupled.rig.structure import Structure
 from coupled.schema import Given, Section, build, quantity
 
@@ -145,6 +146,7 @@ class Manoeuvre:
         self._check_kind()
         self._check_pilots()
         self._check_measure()
+        self._check_services()
 
     @property
     def file(self) -> object:
@@ -177,7 +179,14 @@ class Manoeuvre:
     def channels(self) -> tuple[str, ...]:
         """Channels of the record."""
         own = record_channels(list(self.rig.controls), self.rig.flight is not None)
-        return (*own, *self.record_properties)
+        services = [name for control in self.served for name in service_channels(control)]
+        return (*own, *services, *self.record_properties)
+
+    @property
+    def served(self) -> tuple[ControlName, ...]:
+        """The controls of which the rig gives services, or an event leads one."""
+        led = {event.control for event in self.conditions.event.values()}
+        return tuple(n for n, c in self.rig.controls.items() if n in led or has_services(c))
 
     def configured(self, configuration: Configuration) -> Manoeuvre:
         """Return this manoeuvre with the rig in one of the configurations."""
@@ -219,6 +228,12 @@ class Manoeuvre:
         if drawn is not None and drawn not in self.channels:
             problem = f"no {drawn!r}; {nearest(drawn, self.channels)}"
             raise InputError(self.file, "measure.drawn", problem)
+
+    def _check_services(self) -> None:
+        for name, event in self.conditions.event.items():
+            if event.service is not None:
+                control, to = str(event.control), float(event.to or 0.0)
+                check_led(self.rig, control, event.service, to, self.file, f"event.{name}")
 
 
 def configure(rig: Rig, configuration: Configuration) -> Rig:

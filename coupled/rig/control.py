@@ -25,6 +25,7 @@ from coupled.rig import (
     reach,
     schedule,
     sensing,
+    services,
     surface,
 )
 from coupled.rig.compiled import layout
@@ -56,6 +57,7 @@ class ControlParameters(Protocol):
     loader: Annotated[loader.LoaderParameters, loader.LOADER]
     inertia: Annotated[inertia.InertiaParameters, inertia.INERTIA]
     friction: Annotated[friction.FrictionParameters, friction.FRICTION]
+    services: Annotated[services.ServicesParameters, services.SERVICES]
     linkage: Annotated[linkage.LinkageParameters, linkage.LINKAGE]
     sensing: Annotated[sensing.SensingParameters, sensing.SENSING]
     compensation: Annotated[compensation.CompensationParameters, compensation.COMPENSATION]
@@ -73,6 +75,7 @@ class ControlState(Protocol):
     gauge: gauge.GaugeState
     loader: loader.LoaderState
     inertia: inertia.InertiaState
+    services: services.ServicesState
     linkage: linkage.LinkageState
     sensing: sensing.SensingState
     crossing: crossing.CrossingState

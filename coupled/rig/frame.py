@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.record.channels import ALPHA
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
@@ -27,6 +28,7 @@ from coupled.rig.modification import (
 from coupled.rig.reach import free
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
+from coupled.rig.services import asked_of_surface, begin_services, note_services
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -78,9 +80,9 @@ def host_frame(
     here, the surface command, the stop met since the last frame, and the hand's own force. It
     comes holding the noise of each: the first F is what the strain gauge reads.
     """
-    computed = s.loader.computed
+    computed, neutral = s.loader.computed, s.loader.neutral
     m = s.modification
-    ended = m.held if p.modification.digital else modifying_force(m, computed)
+    ended = m.held if p.modification.digital else modifying_force(m, computed - neutral)
 
     sampled = s.sensing.computed if p.sensing.skewed else computed
     force_read = read_force(p.sensing, sampled_force(p, s), out[0])
@@ -88,11 +90,15 @@ def host_frame(
     if p.modification.late > 0:
         keep_last(m)
     first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
+    if s.services.on:
+        first *= 1.0 - s.services.feel_lost
+        second *= 1.0 - s.services.feel_lost
     set_gradients(p.modification, m, first, second)
     set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
-    product = set_product(p, m, computed, computed_read)
+    product = set_product(p, m, computed - neutral, computed_read - neutral)
     estimated = estimate(p.compensation, computed_read, force_read) + s.crossing.estimated
-    command = command_surface(p.surface, s.surface, estimated, pressure)
+    asked = asked_of_surface(p.services, s.services, estimated) if s.services.on else estimated
+    command = command_surface(p.surface, s.surface, asked, pressure)
 
     out[0] = force_read
     out[1] = computed_read
@@ -105,7 +111,28 @@ def host_frame(
     out[7] = command
     out[8] = s.loader.stop
     out[9] = force
+    if s.services.on:
+        note_services(s.services, s.loader)
     return command
+
+
+@stage
+def angle_of_attack(motion: tuple[float, ...]) -> float:
+    """Return α of a motion, rad; 0 on a bench, whose motion has none."""
+    alpha = 0.0
+    for i in range(len(motion)):  # an index beyond a bench's would not compile
+        if i == ALPHA:
+            alpha = motion[i]
+    return alpha
+
+
+@stage
+def serve_frame(controls: ControlArray, motion: tuple[float, ...], load_factor: float) -> None:
+    """Set what the hosts' services hold over the frame."""
+    for i in range(len(controls)):
+        p, s = controls[i].parameters.services, controls[i].state.services
+        if s.on:
+            begin_services(p, s, motion[0], load_factor, angle_of_attack(motion))
 
 
 @stage
@@ -208,6 +235,7 @@ def step_frame(
     """
     if k == 0:
         start_controls(controls, script)
+    serve_frame(controls, motion, load_factor)
     commands = host_frames(controls, record[k], motion)
     if controls[0].parameters.crossing.joined != 0:
         run_joined(controls, script, k, load_factor)
@@ -249,5 +277,6 @@ def step_frame_at(
     script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
     record = carray(pointer(at[4]), (at[5], at[6]), np.float64)
     if at[7] != 0:
+        serve_frame(controls, motion, load_factor)
         return host_frames(controls, record[k], motion)
     return step_frame(controls, script, record, k, motion, load_factor)

@@ -4,6 +4,7 @@
         = F(t − delay) + F_offset − b·(n_z − 1),      |δc| ≤ travel, inelastic stops
 
 The springs, G_B·δc + k₃·δc³ and others, are in `springs`, the laws of friction in `friction`.
+A trim moves the neutral about which springs, breakout and F_mod act (`services`).
 
 Friction, breakout and the stops are set-valued: each holds the control still with
 whatever force that takes, up to its limit. They are integrated as what they are, not
@@ -66,6 +67,8 @@ class LoaderState(SpringState, DelayState, Protocol):
     load: float  # the force that it carries, N; of use to friction that grows with it
     bent: float  # by how much a friction's contact has yielded, d
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
+    neutral: float  # x₀, about which the springs act, d (`services`)
+    loose: int  # the springs follow the control, and no breakout holds it
     stop: int  # the stop met during this frame: −1, 0 or +1
 
 
@@ -78,7 +81,7 @@ LOADER = Declaration(
         "travel": lambda g: g.control.travel,
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
-    fixed=("external", "mass", "damping"),
+    fixed=("external", "mass", "damping", "neutral"),
 )
 
 
@@ -122,7 +125,7 @@ def _release(
 @stage
 def _holds(friction: FrictionParameters, s: LoaderState, breakout: float) -> Ends:
     """Return the least and the greatest net force that a control at rest withstands, N."""
-    preload = breakout if s.computed == 0.0 else 0.0
+    preload = breakout if s.computed == s.neutral else 0.0
     if friction.rigid == 0:
         return -preload, preload
     down = friction.breakaway + more_friction(friction, s.load, -1.0) + preload
@@ -144,7 +147,7 @@ def _midpoint(
     `push` is the force that does not depend on the motion, N.
     """
     v = s.rate
-    middle = s.computed + 0.5 * span * v
+    middle = s.computed + 0.5 * span * v - s.neutral
     inertia = 2.0 * s.mass / span + s.damping + 0.5 * span * stiffness(p, m, middle)
     push -= elastic(p, m, s, middle) + s.damping * v
     if p.relaxing > 0.0:
@@ -169,7 +172,8 @@ def _rest(
 
     `pulls` are the pilot's force at the beginning and the end of the `left` seconds, N.
     """
-    balance = s.external - breakout * sign(s.computed) - elastic(p, m, s, s.computed)
+    at = s.computed - s.neutral
+    balance = s.external - breakout * sign(at) - elastic(p, m, s, at)
     balance -= friction.stiffness * s.bent
     start, end = pulls[0] + balance, pulls[1] + balance
     if p.relaxing > 0.0:
@@ -193,7 +197,7 @@ def _pass_neutral(
     left: float,
 ) -> None:
     """Let the preload stop a control too slow to leave neutral within the `left` seconds."""
-    s.computed = 0.0
+    s.computed = s.neutral
     hold = breakout
     if friction.rigid:
         hold += friction.running + more_friction(friction, s.load, s.rate)
@@ -226,7 +230,8 @@ def _move(
     before = s.delayed
     after = delayed(p, s, force)
     s.delayed = after
-    breakout = p.breakout + (0.0 if p.held else m.breakout)
+    breakout = 0.0 if s.loose else p.breakout + (0.0 if p.held else m.breakout)
+    neutral = s.neutral
     if friction.varies:
         s.load = abs(0.5 * (before + after) + s.external)
     done = 0.0
@@ -243,11 +248,13 @@ def _move(
         if left <= 1e-12 * h:
             return
         pull = before + (after - before) * (done + 0.5 * left) / h + s.external
-        net = pull - breakout * sign(x)
-        if x == 0.0:
+        net = pull - breakout * sign(x - neutral)
+        if x == neutral:
             net -= breakout * direction
         halfway = _midpoint(p, friction, m, s, net, direction, left)
-        span, event = first_event(x, v, friction.rigid != 0, breakout, halfway, left, ends)
+        about = (ends[0] - neutral, ends[1] - neutral)
+        dry = friction.rigid != 0
+        span, event = first_event(x - neutral, v, dry, breakout, halfway, left, about)
         acceleration = 2.0 * (halfway - v) / left
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
@@ -280,7 +287,7 @@ def move_loader(
 ) -> None:
     """Advance δc, between its `ends`, over h seconds to where the pilot's force is `force` N."""
     if p.held:
-        feel(p, m, s, s.computed)
+        feel(p, m, s, s.computed - s.neutral)
     _move(p, friction, m, s, force, ends, h)
     if p.lag_gain > 0.0:
-        feel(p, m, s, s.computed)
+        feel(p, m, s, s.computed - s.neutral)

@@ -19,6 +19,7 @@ from coupled.rig.loader import move_loader, set_external
 from coupled.rig.modification import exchange_last
 from coupled.rig.reach import bounds, seated, set_reach, stop_linkage, within_reach
 from coupled.rig.sensing import sample
+from coupled.rig.services import serve, set_base
 
 Floats = NDArray[np.float64]
 
@@ -59,6 +60,8 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
     """Set what holds over a frame; return whether the hand does no more than its script."""
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
+    if s.services.on:
+        set_base(s.services, s.loader)
     stopped = p.reach.reach > 0.0
     if stopped:
         set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
@@ -97,6 +100,8 @@ def run_node(
     if p.gauge.present != 0 or p.inertia.rows > 0:
         ahead = force_given(p, s, ahead)
     ends = bounds(p.reach, s.reach, p.loader, p.linkage, before)
+    if s.services.on:
+        ends = serve(p.services, s.services, p.loader, s.loader, s.modification, ahead, ends, h)
     move_loader(p.loader, p.friction, s.modification, s.loader, ahead, ends, h)
     position, grip = s.linkage.position, s.linkage.grip
     move_linkage(p.linkage, s.linkage, before, s.loader.computed, h)

@@ -49,4 +49,5 @@ def pack(
         for stage, declared in STAGES.items():
             for parameter in declared.parameters.names or ():
                 p[stage][parameter] = declared.value(parameter, given)
+    packed["state"]["services"]["on"] = packed["parameters"]["services"]["present"]
     return packed

@@ -136,6 +136,36 @@ class Rigging(Section):
     offset: float = quantity("norm", 0.0, ge=-1, le=1)
 
 
+class Services(Section):
+    """What the loader gives beside gradient and breakout; 0 leaves a service out (`services`)."""
+
+    autopilot_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
+    autopilot_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
+    override: float = quantity("N", 0.0, ge=0)
+    override_time: float = quantity("s", 0.0, ge=0)
+    other_mass: float = quantity("kg", 0.0, ge=0)
+    other_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
+    other_gradient: float = quantity("N_per_{d}", 0.0, ge=0)
+    other_share: float = quantity("", 0.0, ge=0, le=1)
+    link_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
+    link_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
+    disconnect: float = quantity("N", 0.0, ge=0)
+    jam_breaks: float = quantity("N", 0.0, ge=0)
+    shaker: float = quantity("N", 0.0, ge=0)
+    shaker_frequency: float = quantity("Hz", 12.0, gt=0, le=100)
+    shaker_alpha: float = quantity("rad", 0.0, ge=0)
+    pusher: float = quantity("N", 0.0, ge=0)
+    pusher_rise: float = quantity("s", 0.2, ge=0)
+    pusher_alpha: float = quantity("rad", 0.0, ge=0)
+    hinge_alpha: float = quantity("N_per_Pa_rad", 0.0)
+    hinge_surface: float = quantity("N_per_Pa", 0.0)
+    soft_stop: float = quantity("{d}", 0.0, ge=0)
+    soft_stop_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
+    soft_stop_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
+    envelope_above: float = quantity("g", 0.0)
+    envelope: float = quantity("N_per_g", 0.0, ge=0)
+
+
 class Gains(Section):
     """What is fixed before any readings are taken; 0 for a ratio that is not known (figure 3).
 
@@ -181,6 +211,7 @@ class Control(Section):
     schedule: Schedule
     compensation: Compensation
     sensing: Sensing = Sensing()
+    services: Services = Services()
     gains: Gains = Gains()
     rigging: Rigging = Rigging()
     calibration: Calibration = Calibration()

@@ -89,14 +89,15 @@ def _place(
     level = p.breakout + m.breakout + rubs - side * s.external
     force = level
     for _ in range(_ITERATIONS):
-        force = level + side * spring(p, side * x) + limited(p, smooth_force(m, x))
+        at = x - side * s.neutral
+        force = level + side * spring(p, side * at) + limited(p, smooth_force(m, at))
         force /= 1.0 - friction.by_load
         over = x + bend(linkage_p, force) - r
         if over > 0.0:
             high = x
         else:
             low = x
-        stiffness = (spring_slope(p, side * x) + slope(m, x)) / (1.0 - friction.by_load)
+        stiffness = (spring_slope(p, side * at) + slope(m, at)) / (1.0 - friction.by_load)
         rise = 1.0 + bend_slope(linkage_p, force) * stiffness
         after = x - over / rise if rise > 0.0 else 0.5 * (low + high)
         if not low <= after <= high:

@@ -200,7 +200,7 @@ def test_fuel_is_mass(tmp_path: Path) -> None:
         ("[turbulence]\nseverity = 9\nwind_at_6m_m_per_s = 3.0", "turbulence.severity", "7"),
         ('[turbulence]\nmodel = "x"\nwind_at_6m_m_per_s = 3.0', "turbulence.model", "'milspec'"),
         ("event = 3", "event", "[event.NAME]"),
-        ("[event.a]\nat_s = 1.0", "event.a", "one of engine_out, trim and property"),
+        ("[event.a]\nat_s = 1.0", "event.a", "one of engine_out, trim, property and service"),
         ('[event.a]\nat_s = 1.0\ntrim = "column"', "event.a.by_norm", "is given with trim"),
         ("[event.a]\nat_s = 1.0\nengine_out = 0\nto = 1.0", "event.a.to", "with property"),
         ("[event.a]\nat_s = 1.0\nover_s = 1.0\nengine_out = 0", "event.a.over_s", "at once"),

@@ -1,0 +1,291 @@
+"""Services: what a control loader gives beside gradient and breakout, and what may fail of it.
+
+    trim         springs and F_mod act about x₀, led by force trim; a trim release lets x₀ be δc
+    autopilot    F_a = k·(x_a − δc) − c·δc', within ±override: the backdrive of a hand's override
+    other side   m₂·y'' + c₂·y' + G₂·(y − x₀) = F₂ + F_l,    F_l = k_l·(δc − y) + c_l·(δc' − y'),
+                 until it is disconnected; it moves a share of the surface by y
+    jam          δc stays where it was, and what it moves of the surface stays too
+    shaker       A·sin(2π·f·t)
+    pusher       −P, coming and going over its rise
+    hinge        −q̄·(h_α·(α − α₀) + h_δ·surface)
+    soft stop    −k·(|δc| − s) beyond s, and a damping on the way out
+    envelope     −e·(n_z − n) above n
+    failed feel  G_T·(1 − lost), eqs. (6) to (12) with what is left
+
+Forces act on the loader beside the pilot's, positive with a pull. Those of the host (pusher,
+hinge, envelope) are held over a frame, the others follow the motion at each node. Shaker and
+pusher act when asked to, or from an angle of attack on. What a flight leads of all this is in the
+state, and 0 at its start; `serving` leads it, for a run's events as for a page. A rig that has
+none of it skips the stage.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import layout, stage
+from coupled.rig.declaration import Declaration, Ends
+from coupled.rig.loader import LoaderParameters, LoaderState
+from coupled.rig.modification import ModificationState
+from coupled.rig.parameters import Services
+from coupled.rig.springs import elastic
+
+# What is recorded of each control that has services, in this order; d is its unit.
+SERVICE_CHANNELS = (
+    "trim_{d}",
+    "service_force_N",
+    "autopilot",
+    "disconnected",
+    "jammed",
+    "shaker",
+    "pusher",
+    "feel_lost",
+    "other_{d}",
+    "link_force_N",
+    "asked_{d}",
+)
+
+
+class ServicesParameters(Protocol):
+    """The services' numbers; d is m, or rad for a wheel. 0 leaves one out."""
+
+    present: int  # the rig file gives some
+    frame: float  # s
+    travel: float  # d
+    autopilot_stiffness: float  # N/d
+    autopilot_damping: float  # N·s/d
+    override: float  # the most that the backdrive gives, N
+    override_time: float  # held against it for so long, s, it lets go; 0 for never
+    other_mass: float  # of the other side's control, kg (N per d/s²)
+    other_damping: float  # N·s/d
+    other_gradient: float  # N/d
+    other_share: float  # of the surface that it moves
+    link_stiffness: float  # N/d
+    link_damping: float  # N·s/d
+    disconnect: float  # the link opens above this force, N; 0 for never
+    jam_breaks: float  # a jam gives way above this force, N; 0 for never
+    shaker: float  # A, N
+    shaker_frequency: float  # Hz
+    shaker_alpha: float  # rad; 0 for none
+    pusher: float  # P, N
+    pusher_rise: float  # s
+    pusher_alpha: float  # rad; 0 for none
+    hinge_alpha: float  # N/(Pa·rad)
+    hinge_surface: float  # N/Pa at the whole surface
+    soft_stop: float  # d
+    soft_stop_stiffness: float  # N/d
+    soft_stop_damping: float  # N·s/d
+    envelope_above: float  # n, g
+    envelope: float  # N/g
+
+
+class ServicesState(Protocol):
+    """What is led, as 0 or 1 where nothing else is said; and what follows of it."""
+
+    on: int  # a rig file or an event asks for the stage
+    trim_release: float
+    autopilot: float
+    autopilot_at: float  # x_a, d
+    disconnected: float
+    jammed: float
+    other_jammed: float
+    shaker: float
+    pusher: float
+    feel_lost: float  # share of G_T
+    other_force: float  # F₂, N
+    started: int
+    alpha: float  # α₀, rad
+    base: float  # the loader's own external force, N
+    slow: float  # what is held over the frame, N
+    force: float  # all that the services add at the last node, N
+    shaking: int
+    time: float  # that it has been shaking, s
+    pushing: float  # share of the pusher's force
+    over: float  # s for which the hand has held more than the override
+    stuck: int  # the jam has taken hold
+    stuck_at: float  # δc there, d
+    held: float  # δ̂ there, d
+    other: float  # y, d
+    other_rate: float  # d/s
+    link: float  # F_l, N
+    asked: float  # of the surface, d
+    row: NDArray[np.float64]  # what is recorded
+
+
+SERVICES = Declaration(
+    layout(ServicesParameters),
+    section="control.services",
+    derived={
+        "present": lambda g: g.control.services != Services(),
+        "frame": lambda g: g.frame_s,
+        "travel": lambda g: g.control.travel,
+    },
+    state=layout(ServicesState, row=(len(SERVICE_CHANNELS),)),
+    fixed=(
+        *(
+            "trim_release",
+            "autopilot",
+            "disconnected",
+            "jammed",
+            "other_jammed",
+            "shaker",
+            "pusher",
+        ),
+        *("feel_lost", "alpha", "time", "pushing", "over", "row"),
+    ),
+)
+
+
+@stage
+def begin_services(
+    p: ServicesParameters,
+    s: ServicesState,
+    pressure: float,
+    load_factor: float,
+    alpha: float,
+) -> None:
+    """Set what the host holds over a frame: q̄ in Pa, n_z in g and α in rad as they are at t_k."""
+    if s.started == 0:
+        s.alpha, s.started = alpha, 1
+    pushed = s.pusher > 0.5 or (p.pusher_alpha > 0.0 and alpha >= p.pusher_alpha)
+    step = p.frame / p.pusher_rise if p.pusher_rise > p.frame else 1.0
+    s.pushing = min(s.pushing + step, 1.0) if pushed else max(s.pushing - step, 0.0)
+    s.shaking = s.shaker > 0.5 or (p.shaker_alpha > 0.0 and alpha >= p.shaker_alpha)
+    if s.shaking == 0:
+        s.time = 0.0
+    surface = s.asked / p.travel
+    s.slow = -p.pusher * s.pushing
+    s.slow -= pressure * (p.hinge_alpha * (alpha - s.alpha) + p.hinge_surface * surface)
+    if p.envelope > 0.0:
+        s.slow -= p.envelope * max(load_factor - p.envelope_above, 0.0)
+
+
+@stage
+def set_base(s: ServicesState, loader: LoaderState) -> None:
+    """Take up the loader's own external force of a frame, and add what the host holds to it."""
+    s.base = loader.external
+    loader.external = s.base + s.slow
+
+
+@stage
+def _backdrive(
+    p: ServicesParameters, s: ServicesState, x: float, v: float, hand: float, h: float
+) -> float:
+    """Return the autopilot's force, N; it lets go of a hand that holds more for long enough."""
+    if s.autopilot <= 0.5 or p.override == 0.0:
+        s.over = 0.0
+        return 0.0
+    s.over = s.over + h if abs(hand) > p.override else 0.0
+    if 0.0 < p.override_time <= s.over:
+        s.autopilot = 0.0
+    wanted = p.autopilot_stiffness * (s.autopilot_at - x) - p.autopilot_damping * v
+    return min(max(wanted, -p.override), p.override)
+
+
+@stage
+def _soft_stop(p: ServicesParameters, x: float, v: float) -> float:
+    """Return the soft stop's force, N."""
+    beyond = abs(x) - p.soft_stop
+    if p.soft_stop == 0.0 or beyond <= 0.0:
+        return 0.0
+    side = 1.0 if x > 0.0 else -1.0
+    return -side * (p.soft_stop_stiffness * beyond + p.soft_stop_damping * max(side * v, 0.0))
+
+
+@stage
+def _move_other(p: ServicesParameters, s: ServicesState, loader: LoaderState, h: float) -> None:
+    """Advance the other side over a substep, and set the link's force."""
+    s.link = p.link_stiffness * (loader.computed - s.other)
+    s.link += p.link_damping * (loader.rate - s.other_rate)
+    if 0.0 < p.disconnect < abs(s.link):
+        s.disconnected = 1.0
+    if s.disconnected > 0.5:
+        s.link = 0.0
+    if s.other_jammed > 0.5:
+        s.other_rate = 0.0
+        return
+    force = s.other_force + s.link - p.other_damping * s.other_rate
+    force -= p.other_gradient * (s.other - loader.neutral)
+    s.other_rate += h * force / p.other_mass
+    s.other += h * s.other_rate
+    if abs(s.other) > p.travel:
+        s.other = min(max(s.other, -p.travel), p.travel)
+        s.other_rate = 0.0
+
+
+@stage
+def _jam(
+    p: ServicesParameters,
+    s: ServicesState,
+    loader_p: LoaderParameters,
+    loader: LoaderState,
+    m: ModificationState,
+    hand: float,
+) -> bool:
+    """Tell whether a jam holds the control in this substep."""
+    if s.jammed <= 0.5:
+        s.stuck = 0
+        return False
+    if s.stuck == 0:
+        s.stuck, s.stuck_at, s.held = 1, loader.computed, s.asked
+    if p.jam_breaks > 0.0:
+        at = loader.computed - loader.neutral
+        if abs(hand + loader.external - elastic(loader_p, m, loader, at)) > p.jam_breaks:
+            s.jammed, s.stuck = 0.0, 0
+            return False
+    return True
+
+
+@stage
+def serve(
+    p: ServicesParameters,
+    s: ServicesState,
+    loader_p: LoaderParameters,
+    loader: LoaderState,
+    m: ModificationState,
+    hand: float,
+    ends: Ends,
+    h: float,
+) -> Ends:
+    """Set the services' force for a substep of h seconds; return how far δc may go, d.
+
+    `hand` is the pilot's force at the substep's end, N, `ends` how far it might go without.
+    """
+    x, v = loader.computed, loader.rate
+    loader.loose = s.trim_release > 0.5
+    if loader.loose:
+        loader.neutral = x
+    s.force = s.slow + _backdrive(p, s, x, v, hand, h) + _soft_stop(p, x, v)
+    if s.shaking:
+        s.force += p.shaker * math.sin(2.0 * math.pi * p.shaker_frequency * s.time)
+        s.time += h
+    if p.other_mass > 0.0:
+        _move_other(p, s, loader, h)
+        s.force -= s.link
+    loader.external = s.base + s.force
+    if _jam(p, s, loader_p, loader, m, hand):
+        return s.stuck_at, s.stuck_at
+    return ends
+
+
+@stage
+def asked_of_surface(p: ServicesParameters, s: ServicesState, estimated: float) -> float:
+    """Return what is asked of the surface, d, where the host's estimate is δ̂."""
+    own = s.held if s.stuck else estimated
+    s.asked = own
+    if p.other_share > 0.0:
+        s.asked = (1.0 - p.other_share) * own + p.other_share * s.other
+    return s.asked
+
+
+@stage
+def note_services(s: ServicesState, loader: LoaderState) -> None:
+    """Write what is recorded at t_k, as `SERVICE_CHANNELS` has it."""
+    row = s.row
+    row[0], row[1], row[2], row[3] = loader.neutral, s.force, s.autopilot, s.disconnected
+    row[4], row[5], row[6], row[7] = s.jammed, float(s.shaking), s.pushing, s.feel_lost
+    row[8], row[9], row[10] = s.other, s.link, s.asked

@@ -1,0 +1,110 @@
+"""What a flight leads of the loaders' services: one way for a run's events and for a page.
+
+`lead` sets a service of a rig that is flying, as `pack` made it, between two frames; `noted` is
+what its kernels last wrote of the services, as the channels of `service_channels`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError, nearest
+from coupled.record.channels import unit_of
+from coupled.rig.control import ControlArray
+from coupled.rig.parameters import Control, Services
+from coupled.rig.rig import Rig
+from coupled.rig.services import SERVICE_CHANNELS
+
+Floats = NDArray[np.float64]
+
+# What may be led of a control: where it stands in the state, and its greatest value, if any is set.
+LED: dict[str, tuple[str, str, float | None]] = {
+    "trim_{d}": ("loader", "neutral", None),
+    "trim_release": ("services", "trim_release", 1.0),
+    "autopilot": ("services", "autopilot", 1.0),
+    "autopilot_{d}": ("services", "autopilot_at", None),
+    "disconnected": ("services", "disconnected", 1.0),
+    "jammed": ("services", "jammed", 1.0),
+    "other_jammed": ("services", "other_jammed", 1.0),
+    "other_force_N": ("services", "other_force", None),
+    "shaker": ("services", "shaker", 1.0),
+    "pusher": ("services", "pusher", 1.0),
+    "feel_lost": ("services", "feel_lost", 1.0),
+}
+# Without this key of the rig file a service does nothing.
+_NEEDS = {
+    "autopilot": ("override", "override_N"),
+    "autopilot_{d}": ("override", "override_N"),
+    "disconnected": ("other_mass", "other_mass_kg"),
+    "other_jammed": ("other_mass", "other_mass_kg"),
+    "other_force_N": ("other_mass", "other_mass_kg"),
+    "shaker": ("shaker", "shaker_N"),
+    "pusher": ("pusher", "pusher_N"),
+}
+
+
+def services_of(control: str) -> dict[str, str]:
+    """Return {service of a control, with its unit: its key in `LED`}."""
+    return {key.format(d=unit_of(control)): key for key in LED}
+
+
+def service_channels(control: str) -> tuple[str, ...]:
+    """Return the channels that record a control's services."""
+    return tuple(f"{control}_{name.format(d=unit_of(control))}" for name in SERVICE_CHANNELS)
+
+
+def has_services(control: Control) -> bool:
+    """Tell whether the rig file gives a control any."""
+    return control.services != Services()
+
+
+def check_led(rig: Rig, control: str, service: str, to: float, file: object, place: str) -> None:
+    """Raise InputError for what cannot be led on a rig; `place` is the table of a file."""
+    if control not in rig.controls:
+        problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
+        raise InputError(file, f"{place}.control", problem)
+    known = services_of(control)
+    if service not in known:
+        problem = f"no {service!r}; {nearest(service, known)}"
+        raise InputError(file, f"{place}.service", problem)
+    data = rig.controls[control]
+    needed, key = _NEEDS.get(known[service], ("", ""))
+    if needed and getattr(data.services, needed) == 0.0:
+        problem = f"does nothing without controls.{control}.services.{key} of the rig"
+        raise InputError(file, f"{place}.service", problem)
+    most = LED[known[service]][2]
+    if most is not None and not 0.0 <= to <= most:
+        raise InputError(file, f"{place}.to", f"is {to:g}; a share or a switch, from 0 to 1")
+    if known[service].endswith("_{d}") and abs(to) > data.travel:
+        problem = f"is {to:g}, beyond the control's travel of ±{data.travel:g}"
+        raise InputError(file, f"{place}.to", problem)
+
+
+def lead(
+    controls: ControlArray, names: Sequence[str], control: str, service: str, value: float
+) -> None:
+    """Set a service of a flying rig between two frames; `names` are its controls, in order.
+
+    An autopilot that is engaged holds the control where it is, until it is led elsewhere.
+    """
+    state = controls["state"][list(names).index(control)]
+    stage, field, _ = LED[services_of(control)[service]]
+    if field == "autopilot" and value > 0.5 >= state["services"]["autopilot"]:
+        state["services"]["autopilot_at"] = state["loader"]["computed"]
+    state[stage][field] = value
+    state["services"]["on"] = 1
+
+
+def led(controls: ControlArray, names: Sequence[str], control: str, service: str) -> float:
+    """Return how a service of a flying rig stands."""
+    stage, field, _ = LED[services_of(control)[service]]
+    return float(controls["state"][list(names).index(control)][stage][field])
+
+
+def noted(controls: ControlArray, names: Sequence[str], which: Sequence[str]) -> Floats:
+    """Return what was last recorded of some controls' services, one after the other."""
+    rows = controls["state"]["services"]["row"]
+    return np.concatenate([rows[list(names).index(name)] for name in which])
