@@ -1,7 +1,8 @@
-"""What is built from a clone: the package, its aircraft and runs, and no more."""
+"""What is built from a clone: the package, its aircraft and runs, and no more; it flies, too."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tarfile
@@ -32,7 +33,9 @@ def test_a_wheel_holds_the_package_its_aircraft_and_runs(tmp_path: Path) -> None
         archive.extractall(tmp_path / "installed")
     wanted = tracked("coupled")
     wanted |= {f"coupled/shipped/{name}" for name in tracked("aircraft", "runs")}
-    assert names == {name for name in wanted if "/withheld/" not in name}
+    # What only makes the aircraft, and diagnoses kept as evidence, stay in the clone.
+    kept = {n for n in wanted if not (n.startswith("coupled/shipped/") and n.endswith(".py"))}
+    assert names == {name for name in kept if "/withheld/" not in name}
     assert "coupled/py.typed" in names
     shipped = "from coupled.resources import *; print(len(shipped_runs()), len(shipped_rigs()))"
     done = subprocess.run(
@@ -57,3 +60,31 @@ def test_a_source_distribution_holds_what_a_clone_has(tmp_path: Path) -> None:
     missing = tracked(*folders) - names
     assert missing == set()
     assert not {name for name in names if "__pycache__" in name or name.endswith(".pyc")}
+
+
+@pytest.mark.parametrize("kind", ["wheel", "source distribution"])
+def test_what_is_built_installs_and_flies(kind: str, tmp_path: Path) -> None:
+    source = str(ROOT)
+    if kind != "wheel":
+        build = "import sys, hatchling.build; hatchling.build.build_sdist(sys.argv[1])"
+        words = [sys.executable, "-c", build, str(tmp_path)]
+        subprocess.run(words, cwd=ROOT, check=True, timeout=300)
+        [archive] = tmp_path.glob("*.tar.gz")
+        source = str(archive)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-compile"]
+    target = tmp_path / "installed"
+    subprocess.run([*pip, "--target", str(target), source], check=True, timeout=300)
+    words = ["-m", "coupled", "compare", "appendix-c", "--report", "report.html"]
+    done = subprocess.run(
+        [sys.executable, *words],
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(target), "NO_COLOR": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "by closed form" in done.stdout
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert (tmp_path / "out" / "appendix-c.png").is_file()
