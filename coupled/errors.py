@@ -62,9 +62,22 @@ class InputError(ValueError):
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a hint that names the known word most like `word`, or lists the first of them."""
     names = [shown(name) for name in islice(known, _SEARCHED + 1)]
+    begun = [name for name in names if word and name.startswith(f"{word}_")]
+    if begun:  # its unit was left out
+        return f"did you mean {_quoted(min(begun, key=len))}?"
     plain = {name.casefold(): name for name in names}
     match = difflib.get_close_matches(word[:LONGEST].casefold(), plain, n=1, cutoff=0.6)
     if match:
-        return f"did you mean {plain[match[0]]}?"
+        return f"did you mean {_quoted(plain[match[0]])}?"
     more = ", …" if len(names) > LISTED else ""
-    return "known: " + ", ".join(sorted(names)[:LISTED]) + more
+    return "known: " + listed(sorted(names)[:LISTED]) + more
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names in a row, those with a comma in them in quotes."""
+    return ", ".join(_quoted(shown(name)) for name in names)
+
+
+def _quoted(name: str) -> str:
+    """Return a name as a list of names shows it, so that its commas are its own."""
+    return f'"{name}"' if "," in name else name

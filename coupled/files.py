@@ -8,6 +8,8 @@ the next one that writes into the same folder.
 
 from __future__ import annotations
 
+import contextlib
+import difflib
 import hashlib
 import json
 import os
@@ -120,22 +122,31 @@ def _too_large(path: Path, most_bytes: int) -> InputError:
 _READ = "is a file that this command reads; give another to write"
 
 
-def check_target(path: Path, inputs: Iterable[Path] = (), why: str = _READ) -> None:
+def check_target(
+    path: Path, inputs: Iterable[Path] = (), why: str = _READ, made: Path | None = None
+) -> None:
     """Refuse a file that could not be written, before the work that it is to hold.
 
     Nothing is made or changed. `inputs` are files that must not be overwritten, under
-    whatever name or link they are given; `why` is what is said of one of them.
+    whatever name or link they are given; `why` is what is said of one of them. The file's
+    folder must be there, unless it is `made`, one that the command makes, or `out`.
     """
-    check_targets([path], inputs, why)
+    check_targets([path], inputs, why, made)
 
 
-def check_targets(paths: Iterable[Path], inputs: Iterable[Path] = (), why: str = _READ) -> None:
+def check_targets(
+    paths: Iterable[Path],
+    inputs: Iterable[Path] = (),
+    why: str = _READ,
+    made: Path | None = None,
+) -> None:
     """Refuse files of which one could not be written, is an input, or is meant twice."""
     read = {identity for path in inputs for identity in _identities(path)}
     written: set[object] = set()
     for path in paths:
         try:
             _check_place(path)
+            _refuse_mistyped(path, made)
         except InputError:
             raise
         except (OSError, ValueError):
@@ -158,6 +169,24 @@ def _check_place(path: Path) -> None:
         parent = parent.parent
     if not parent.is_dir() or not os.access(parent, os.W_OK) or len(os.fsencode(path.name)) > 200:
         raise InputError(path, "", "cannot be written there")
+
+
+OWN_FOLDER = "out"  # where files go that are given no other place; made where it is not there
+
+
+def _refuse_mistyped(path: Path, made: Path | None) -> None:
+    """Refuse a file in a folder that is not there: a mistyped one would be made in silence."""
+    own, folder = Path(OWN_FOLDER).absolute(), path.absolute().parent
+    if made is not None and made.absolute() in (folder, *folder.parents):
+        folder = made.absolute().parent
+    if folder.exists() or folder == own or own in folder.parents:
+        return
+    found: list[str] = []
+    with contextlib.suppress(OSError):
+        found = [entry.name for entry in os.scandir(folder.parent) if entry.is_dir()]
+    hint = difflib.get_close_matches(folder.name, found, n=1)
+    meant = f"did you mean {hint[0]}?" if hint else "make it first"
+    raise InputError(path, "", f"there is no folder {folder.name}; {meant}")
 
 
 def _identities(path: Path) -> set[object]:

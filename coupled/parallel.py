@@ -20,16 +20,16 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
-    as_completed,
 )
 from concurrent.futures import wait as wait_for
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from coupled.errors import InputError
 
 _PATIENCE_s = 10.0
+_ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
 T = TypeVar("T")
 
 
@@ -49,15 +49,25 @@ def as_done(
     """Yield what `work` gives of each call's arguments, as soon as it is done, in any order.
 
     No more than `ahead` calls wait for a worker, so that their arguments are made as they are
-    wanted. What a call raises is raised here.
+    wanted. What a call raises is raised here. An interruption is met within a fraction of a
+    second, however long a call takes.
     """
     waiting: set[Future[T]] = set()
+
+    def done(patience_s: float) -> Iterator[T]:
+        for future in wait_for(waiting, patience_s, FIRST_COMPLETED).done:
+            waiting.remove(future)
+            yield future.result()
+
     for arguments in calls:
-        waiting.add(pool.submit(work, *arguments))
-        patience_s = None if len(waiting) >= ahead else 0.0
-        done, waiting = wait_for(waiting, patience_s, FIRST_COMPLETED)
-        yield from (future.result() for future in done)
-    yield from (future.result() for future in as_completed(waiting))
+        with nullcontext() if isinstance(pool, Here) else _uninterrupted():
+            future = pool.submit(work, *arguments)
+        waiting.add(future)
+        yield from done(0.0)
+        while len(waiting) >= ahead:
+            yield from done(_ATTENTIVE_s)
+    while waiting:
+        yield from done(_ATTENTIVE_s)
 
 
 def cores(workers: int) -> int:
@@ -94,11 +104,26 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
         raise InputError("--workers", "", problem) from None
     except BaseException:
         ours.close()  # interrupted, or nothing to be done with the rest: no worker is waited for
+        for worker in own.active_children():  # nor one that is still loading
+            worker.kill()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
         ours.close()
         alive.close()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hold an interruption back; a worker that is begun meanwhile never gets one."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker(alive: Connection) -> None:

@@ -65,6 +65,7 @@ def test_help_has_examples_and_takes_no_physics_to_show(folder: Path) -> None:
 
 
 def test_compare_writes_figure_and_json(folder: Path) -> None:
+    (folder / "a").mkdir()
     done = coupled(folder, "compare", "short.toml", "--figure", "a/b.pdf", "--json", "t.json")
     assert done.returncode == 0, done.stderr
     assert files(folder) == {"short.toml", "a/b.pdf", "t.json"}
@@ -85,10 +86,71 @@ def test_fly_writes_a_record_that_other_tools_read(folder: Path) -> None:
     assert tuple(frame.columns) == record_channels(["column"], flown=True)
     assert frame.height == 240
     manifest = json.loads((folder / "r.manifest.json").read_text())
-    assert manifest["rig"]["controls"]["column"]["loader"]["bend"] == 0.0
+    assert manifest["rig"]["controls"]["column"]["loader"]["bend_m_per_N"] == 0.0
     drawn = coupled(folder, "plot", "r.parquet")
     assert drawn.returncode == 0, drawn.stderr
     assert (folder / "r.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_force_is_said_to_move_the_hand_further(folder: Path) -> None:
+    """The surface gets of 40 N what it gets on the rigid rig, and the hand goes further by K·F."""
+    run = SHORT.replace('"rigid", "compensated"', '"rigid", "uncompensated"')
+    (folder / "push.toml").write_text(run)
+    done = coupled(folder, "compare", "push.toml", "--no-figure", "--json", "t.json")
+    assert done.returncode == 0, done.stderr
+    rigid, bent = json.loads((folder / "t.json").read_text())
+    further = 1000.0 * 0.1778 * (bent["hand_travel_norm"] - rigid["hand_travel_norm"])
+    assert further == pytest.approx(1000.0 * 9.136e-5 * 40.0, rel=0.02)  # K·F
+    [row] = [line for line in done.stdout.splitlines() if "hand's travel, mm" in line]
+    shown = [float(cell) for cell in row.split()[-2:]]
+    assert shown[1] - shown[0] == pytest.approx(further, abs=0.11)
+    said = " ".join(done.stdout.split())
+    assert f"the hand moves {shown[1]:.0f} mm for it instead of {shown[0]:.0f} mm" in said
+    assert "the surface goes about as far, while" in said
+    clamped = run.replace('kind = "step"\n', 'kind = "clamp"\n').replace(
+        "force_N = 40.0", "deflection_m = 0.02"
+    )
+    (folder / "clamp.toml").write_text(clamped)
+    done = coupled(folder, "compare", "clamp.toml", "--no-figure")
+    assert "hand's travel, mm" in done.stdout
+    assert "holds a force" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("compare", "short.toml", "--figure", "figuers/a.png"),
+        ("fly", "short.toml", "-o", "figuers/a.csv"),
+        ("fly", "short.toml", "--json", "figuers/a.json"),
+        ("bench", "-o", "figuers/a.csv"),
+        ("document", "-o", "figuers/doc"),
+        ("sweep", "recovery", "--folder", "figuers/sweep"),
+    ],
+)
+def test_a_mistyped_folder_is_not_made(folder: Path, words: tuple[str, ...]) -> None:
+    (folder / "figures").mkdir()
+    done = coupled(folder, *words)
+    assert done.returncode == 2
+    assert "there is no folder figuers; did you mean figures?" in done.stderr
+    assert not (folder / "figuers").exists()
+    assert files(folder) == {"short.toml"}
+
+
+def test_the_folder_out_and_a_command_s_own_are_made(folder: Path) -> None:
+    assert coupled(folder, "fly", "short.toml", "-o", "out/new/a.csv").returncode == 0
+    assert coupled(folder, "new", "run", "runs/a.toml").returncode == 2
+    assert files(folder) == {"short.toml", "out/new/a.csv", "out/new/a.manifest.json"}
+
+
+def test_hints_tell_names_with_commas_apart_and_know_a_name_without_its_unit(folder: Path) -> None:
+    done = coupled(folder, "fly", "pull-up-t37", "--case", "none of them")
+    assert 'known: "110 kt, 2.0 kPa", "200 kt, 6.5 kPa", "300 kt, 14.5 kPa"' in done.stderr
+    done = coupled(folder, "fly", "pull-up-t37", "--case", "110 kt, 2 kPa")
+    assert 'did you mean "110 kt, 2.0 kPa"?' in done.stderr
+    expected = '\n[[expect]]\nchannel = "pitch_rate"\nmost = 1.0\n'
+    (folder / "rate.toml").write_text(SHORT + expected)
+    done = coupled(folder, "check", "rate.toml")
+    assert "did you mean pitch_rate_rad_per_s?" in done.stderr
 
 
 def test_a_figure_is_the_same_bytes_again(tmp_path: Path, folder: Path) -> None:

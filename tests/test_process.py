@@ -180,6 +180,7 @@ def test_sigterm_keeps_the_records_of_blind_make(folder: Path) -> None:
 @pytest.mark.slow
 def test_sigterm_keeps_the_diagnoses_of_a_folder(folder: Path) -> None:
     for name in ("r1", "r2", "r3", "r4"):
+        (folder / "many").mkdir(exist_ok=True)
         made = coupled(folder, "fly", "short.toml", "-o", f"many/{name}.csv")
         assert made.returncode == 0
     listed = "".join(f'r{i} = "report-column"\n' for i in range(1, 5))

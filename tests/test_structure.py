@@ -49,7 +49,9 @@ ORDER += [
     "api",
     "live",
     "cli/tables",
+    "cli/process",
     "cli/terminal",
+    "cli/progress",
     "cli",
 ]
 LOWER = {room: set(ORDER[: i + 1]) for i, room in enumerate(ORDER)}

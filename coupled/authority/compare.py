@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, listed, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.channels import ATTITUDE, RATE, ControlName, channel
@@ -45,6 +45,7 @@ class Outcome:
     control: str
     asked_norm: float  # surface command that the held deflection asks for, of ±1
     reached_norm: float  # surface command reached
+    hand_travel_norm: float  # the hand's deflection, a pull positive, of the control's travel
     loss: float  # share of the asked command that is lost
     loss_closed_form: float  # the same by the rig's statics
     felt_ratio: float  # force felt over force specified, breakout taken off
@@ -114,7 +115,7 @@ class Comparison(Sequence[Flight]):
         """
         cases = list(dict.fromkeys(flight.outcome.case for flight in self.flights))
         if case is None and len(cases) > 1:
-            raise InputError("comparison", "case", f"is needed; one of: {', '.join(cases)}")
+            raise InputError("comparison", "case", f"is needed; one of: {listed(cases)}")
         if case is not None and case not in cases:
             raise InputError("comparison", "case", f"no {case!r}; {nearest(case, cases)}")
         ours = {f.configuration: f for f in self.flights if case in (None, f.outcome.case)}
@@ -186,7 +187,7 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
     why = "" if record.ended_early is None else str(record.ended_early)
     nan = float("nan")
     if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
-        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 8, None, None, None, why)
+        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
     deflection = record[channel(control, "deflection")]
     force = record[channel(control, "hand_force")]
     held = _where_held(record.time_s, deflection)
@@ -212,6 +213,7 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
         control,
         asked,
         reached,
+        float(np.mean(deflection[held])) / rig.controls[control].travel,
         1.0 - reached / asked,
         1.0 - float(point.estimate[0] / point.deflection[0]) if known else nan,
         felt / specified if specified else nan,

@@ -7,12 +7,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from coupled.record.channels import unit_of
 from coupled.units import DEGREE_rad
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight, Outcome
+    from coupled.flight.manoeuvre import Manoeuvre
 
 NONE = "–"  # in place of a figure that a flight does not have
+_NOTICED = 0.005  # of the hand's travel: what it moves further is said
+_ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+_FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
 
 
@@ -24,18 +29,22 @@ class Figure:
     label: str
     form: Callable[[float], str]
 
-    def written(self, outcome: Outcome) -> str:
-        """Return the figure of an outcome; a dash where there is none, no sign before a zero."""
+    def written(self, outcome: Outcome, factor: float = 1.0) -> str:
+        """Return the figure of an outcome; a dash where there is none, no sign before a zero.
+
+        `factor` takes it to the unit that it is written in.
+        """
         value = getattr(outcome, self.field)
         if value is None or not math.isfinite(value):
             return NONE
-        text = self.form(value)
+        text = self.form(factor * value)
         return text.lstrip("-") if float(text) == 0.0 else text
 
 
 FIGURES: tuple[Figure, ...] = (
     Figure("asked_norm", "surface asked, % of travel", lambda x: f"{100 * abs(x):.2f}"),
     Figure("reached_norm", "surface reached, %", lambda x: f"{100 * abs(x):.2f}"),
+    Figure("hand_travel_norm", "hand's travel, {unit}", lambda x: f"{abs(x):.1f}"),
     Figure("loss", "authority lost, %", lambda x: f"{100 * x:.2f}"),
     Figure("loss_closed_form", "  by closed form, %", lambda x: f"{100 * x:.2f}"),
     Figure("felt_ratio", "felt of specified gradient", lambda x: f"{x:.3f}"),
@@ -53,7 +62,43 @@ def rows(flights: Sequence[Flight]) -> Iterator[tuple[str, list[str]]]:
     manoeuvre = flights[0].manoeuvre
     rate, angle = _WORDS[manoeuvre.control]
     change = manoeuvre.measure.attitude_change / DEGREE_rad
+    size, unit = _travel(manoeuvre)
     for figure in FIGURES:
-        written = [figure.written(flight.outcome) for flight in flights]
+        factor = size if figure.field == "hand_travel_norm" else 1.0
+        written = [figure.written(flight.outcome, factor) for flight in flights]
         if any(text != NONE for text in written):
-            yield figure.label.format(rate=rate, angle=angle, change=change), written
+            yield figure.label.format(rate=rate, angle=angle, change=change, unit=unit), written
+
+
+def _travel(manoeuvre: Manoeuvre) -> tuple[float, str]:
+    """Return the travel of the control that is looked at, and the unit it is written in."""
+    travel = manoeuvre.rig.controls[manoeuvre.control].travel
+    if unit_of(manoeuvre.control) == "rad":
+        return travel / DEGREE_rad, "°"
+    return 1000.0 * travel, "mm"
+
+
+def further(case: Sequence[Flight]) -> str:
+    """Return why authority is lost where a force moves the surface as on the rigid rig.
+
+    Nothing where the hand does not hold a force, or moves no further for it.
+    """
+    manoeuvre = case[0].manoeuvre
+    pilot = manoeuvre.pilots.get(manoeuvre.control)
+    flown = {flight.configuration: flight.outcome for flight in case}
+    rigid, bent = flown.get("rigid"), flown.get("uncompensated")
+    if pilot is None or pilot.kind not in _FORCES or rigid is None or bent is None:
+        return ""
+    further = abs(bent.hand_travel_norm) - abs(rigid.hand_travel_norm)
+    if not further > _NOTICED:
+        return ""
+    size, unit = _travel(manoeuvre)
+    where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
+    places = [f"{size * abs(each.hand_travel_norm):.0f} {unit}" for each in (bent, rigid)]
+    alike = abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)
+    surface = "the surface goes about as far, while" if alike else "and"
+    return (
+        f"The pilot holds a force: uncompensated, the hand moves {places[0]} for it instead of"
+        f" {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of what"
+        " the hand asks for is lost."
+    )

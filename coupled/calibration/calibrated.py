@@ -5,19 +5,34 @@ was found, and each scale's factor of real over assumed is kept true of the same
 v₁ is read where the host gets it: an S₁ that is off in the electronics is put right for reading
 and analog product alike. One that is off in the host's reading alone (`deflection_scale`) stays
 what it is: the S₁ found has it, the reading is right, and the analog product wrong by its inverse.
+
+A scale that the rig file does not state is known by the readings alone, so the hardware has the
+one that was found, unless the readings are of the rig's own bench. Where the file does state it, or
+a K, readings of another loader contradict the file: flown, such a rig would not do what the
+calibration promises, and it is refused.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from coupled.calibration.assumed import GAINS, real_scales
+from coupled.calibration.accuracy import (
+    DEFLECTION_WITHIN,
+    FELT_WITHIN,
+    deflection_off,
+    felt_off,
+    made_of_asked,
+)
+from coupled.calibration.assumed import GAINS, assumed_scales, real_scales
 from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
+from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
+from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
 _ROUNDING = 1e-15  # of a figure: a smaller error is that of a computer alone
+_BEYOND = 3.0  # half widths of a 95 % interval: more is no chance, but other hardware
 
 
 def with_calibration(
@@ -30,20 +45,24 @@ def with_calibration(
     """Return the rig whose host uses a calibration of one of its controls.
 
     `date` is noted as given. With `hardware` the rig's own structure and scales are taken to
-    be as found, too: for readings of a real loader, whose rig file is a model. Raises
-    InputError where the figures make a rig that cannot be.
+    be as found, too: for readings of a real loader, whose rig file is a model. A scale that the
+    file has not is as found in any case. Raises InputError where the figures make a rig
+    that cannot be.
     """
     data, d = rig.controls[control], unit_of(control)
-    real, place = real_scales(data), f"controls.{control}"
+    place, sensing = f"controls.{control}", data.sensing
     s1, s2, s3, bend = found.line.s1, found.s2_chosen, found.s3, found.line.bend
-    reading = data.sensing.deflection_scale
+    real, reading = real_scales(data), sensing.deflection_scale
+    figures = {"s1": s1, "s2": s2, "s3": s3}
+    kept = {name: not hardware and _is_filed(data, name, each) for name, each in figures.items()}
     used = max(bend.value, 0.0)  # no structure bends against its force
+    computed = (real.s1 / s1.value if kept["s1"] else 1.0) / reading
     changes: dict[str, Any] = {
         f"sensing.s1_V_per_{d}": s1.value,
         "sensing.s3_V_per_N": s3.value,
-        "sensing.computed_scale": 1.0 if hardware else real.s1 / (reading * s1.value),
+        "sensing.computed_scale": 1.0 if hardware else computed,
         "sensing.deflection_scale": 1.0 if hardware else reading,
-        "sensing.force_scale": 1.0 if hardware else real.s3 / s3.value,
+        "sensing.force_scale": real.s3 / s3.value if kept["s3"] else 1.0,
         f"compensation.bend_{d}_per_N": used,
         "calibration.readings": found.count,
         "calibration.date": date,
@@ -60,7 +79,7 @@ def with_calibration(
         changes[f"calibration.{key}"] = getattr(data.gains, name)
     if s2 is not None:
         changes["sensing.s2_V_per_N"] = s2.value
-        changes["sensing.modifying_scale"] = 1.0 if hardware else real.s2 / s2.value
+        changes["sensing.modifying_scale"] = real.s2 / s2.value if kept["s2"] else 1.0
         changes["calibration.s2_V_per_N"] = s2.value
         changes["calibration.s2_error_V_per_N"] = _error(s2)
     if hardware:
@@ -72,6 +91,76 @@ def with_calibration(
         if hardware:
             whole[f"structure.{key}"] = estimate.value
     return rig.changed(whole)
+
+
+def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
+    """Tell whether the rig file has a scale: it states it, or the readings are of its own bench.
+
+    A bench of a rig that states none takes the converters' full scale for it.
+    """
+    if found is None or getattr(control.sensing, name) > 0.0:
+        return True
+    real: float = getattr(real_scales(control), name)
+    return abs(found.value - real) <= max(_BEYOND * found.half_width, 1e-6 * abs(real))
+
+
+def unstated_scales(control: Control, found: CalibrationResult) -> list[str]:
+    """Return the keys of the scales found that the rig file has not."""
+    scales = (("s1", found.line.s1), ("s2", found.s2_chosen), ("s3", found.s3))
+    units = {"s1": f"V_per_{unit_of(found.control)}"}
+    missing = [name for name, each in scales if not _is_filed(control, name, each)]
+    return [f"{name}_{units.get(name, 'V_per_N')}" for name in missing]
+
+
+def refuse_other_hardware(
+    filed: Control, new: Control, found: CalibrationResult, file: object
+) -> None:
+    """Raise InputError where a calibrated control, flown, would not do what is promised.
+
+    `filed` is the control of the rig file, `new` with the calibration. The readings are then
+    of other hardware than the file has.
+    """
+    promise = found.accuracy
+    if promise is None:
+        return
+    g, bend = promise.gradient, new.compensation.bend
+    host, true, true_bend = assumed_scales(new), real_scales(new), new.loader.bend
+    off = deflection_off(host, bend, true, true_bend, g)
+    gradients = (g, new.loader.basic_gradient)
+    felt = felt_off(made_of_asked(host, true), bend, true_bend, gradients)
+    if promise.felt is None or abs(felt) <= max(_BEYOND * promise.felt.half_width, FELT_WITHIN):
+        felt = 0.0
+    if abs(off) <= max(_BEYOND * promise.deflection.half_width, DEFLECTION_WITHIN):
+        off = 0.0
+    if off == 0.0 == felt:
+        return
+    worst = f"{100 * off:+.2g} % of the deflection" if off else f"{100 * felt:+.2g} % of the feel"
+    raise InputError(
+        file,
+        f"controls.{found.control}",
+        f"the readings are of other hardware than the file has: {_contradictions(filed, found)}."
+        f" Flown, the calibrated rig would be off by {worst}. For readings of a real loader add"
+        " --hardware, which takes what was found for the rig's own hardware, too; else give --rig"
+        " the file that the readings were taken from",
+    )
+
+
+def _contradictions(filed: Control, found: CalibrationResult) -> str:
+    """Return the figures in which readings and file differ most, as words."""
+    d, real, sensing = unit_of(found.control), real_scales(filed), filed.sensing
+    figures = [("K", found.line.bend, filed.loader.bend, f"{d}/N")]
+    if sensing.s1:
+        figures.append(("S1", found.line.s1, real.s1, f"V/{d}"))
+    if sensing.s2 and found.s2_chosen is not None:
+        figures.append(("S2", found.s2_chosen, real.s2, "V/N"))
+    if sensing.s3:
+        figures.append(("S3", found.s3, real.s3, "V/N"))
+    far = [
+        f"{name} is {estimate.value:.4g} {unit} by the readings and {value:.4g} by the file"
+        for name, estimate, value, unit in figures
+        if abs(estimate.value - value) > _BEYOND * estimate.half_width
+    ]
+    return "; ".join(far) or "their figures together"
 
 
 def _error(figure: Estimate) -> float:

@@ -195,10 +195,12 @@ def surface_checks(
 class Swing:
     """A release in the rule's terms, times in s from 90 % of the displacement.
 
-    `crossings` of zero, `peaks` of the overshoots over the displacement (signs left out,
-    those above 5 %), and the time from 90 % to 10 %, NaN where it never gets there.
+    `begin_s` is when it falls through that after the release; `crossings` of zero, `peaks` of
+    the overshoots over the displacement (signs left out, those above 5 %), and the time from
+    90 % to 10 %, NaN where it never gets there.
     """
 
+    begin_s: float
     crossings: Floats
     peaks: Floats
     fall_s: float
@@ -216,7 +218,7 @@ def swing_of(let_go: Release) -> Swing:
     )
     stretches = np.split(np.abs(share), change + 1)[1:]
     peaks = np.array([stretch.max() for stretch in stretches if stretch.size])
-    return Swing(crossings - begin, peaks[peaks > COUNTED], end - begin)
+    return Swing(begin, crossings - begin, peaks[peaks > COUNTED], end - begin)
 
 
 def _resting(let_go: Release) -> float:

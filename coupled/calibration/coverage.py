@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,12 +19,13 @@ from coupled.calibration.assumed import Scales, real_scales
 from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.result import CalibrationResult
-from coupled.parallel import executor
+from coupled.parallel import as_done, executor
 from coupled.rig.parameters import Control
 
 Progress = Callable[[str, int, int], None]
 NEAR = 0.05
 _BLOCK = 25
+_AHEAD = 64  # blocks that wait for a worker
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,13 @@ def measure_coverage(
         range(first, min(first + _BLOCK, seed + benches))
         for first in range(seed, seed + benches, _BLOCK)
     ]
-    trials: list[Trial] = []
+    found: dict[range, list[Trial]] = {}
     with executor(workers) as pool:
-        for block in pool.map(partial(_block, bench), blocks):
-            trials += block
+        for block, of_block in as_done(pool, _block, [(bench, each) for each in blocks], _AHEAD):
+            found[block] = of_block
             if progress is not None:
-                progress("benches", len(trials), benches)
+                progress("benches", sum(map(len, found.values())), benches)
+    trials = [trial for block in blocks for trial in found[block]]
     bend = [trial.bend_off for trial in trials]
     plain = [trial.ordinary_off for trial in trials]
     deflection = np.array([trial.deflection_off for trial in trials]) <= DEFLECTION_WITHIN
@@ -119,8 +120,8 @@ def _share(held: Iterable[bool | None]) -> float:
     return float(np.mean(had)) if had else float("nan")
 
 
-def _block(bench: CalibrationBench, seeds: range) -> list[Trial]:
-    return [_trial(bench, seed) for seed in seeds]
+def _block(bench: CalibrationBench, seeds: range) -> tuple[range, list[Trial]]:
+    return seeds, [_trial(bench, seed) for seed in seeds]
 
 
 def _trial(bench: CalibrationBench, seed: int) -> Trial:

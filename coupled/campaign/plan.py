@@ -24,7 +24,8 @@ from coupled.campaign.points import grid_size, points
 from coupled.campaign.sweepfile import MOST_FLIGHTS, Survive, SweepFile, Vary
 from coupled.errors import InputError, nearest
 from coupled.files import sha256
-from coupled.flight.loop import input_files, make_airframe
+from coupled.flight.loop import make_airframe
+from coupled.flight.manifest import input_files
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import manoeuvres_from_table
 from coupled.resources import find, shipped_runs

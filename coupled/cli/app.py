@@ -61,6 +61,10 @@ def main() -> None:
             code = _run()
         except KeyboardInterrupt:  # a second one, while the first was dealt with
             code = INTERRUPTED
+        except Exception:
+            if not stop.asked:  # a library that is interrupted as it loads raises what it likes
+                raise
+            code = INTERRUPTED
     silence_streams()
     sys.exit(stop.exit_code or code)
 

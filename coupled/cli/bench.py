@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.progress import progress
 from coupled.cli.rigs import (
     DEFAULT_RIG,
     ControlOption,
@@ -21,7 +22,7 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_stale,
 )
-from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs

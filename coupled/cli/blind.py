@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app, check_cluster
-from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.cli.progress import progress
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs

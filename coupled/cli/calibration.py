@@ -16,12 +16,11 @@ from coupled.cli.rigs import (
     CrossedOption,
     ErrorOption,
     OnceOption,
-    RigOption,
     StrongestOption,
     instruments,
     rig_and_control,
 )
-from coupled.cli.terminal import check_json, keep_json, out, print_json, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say, say_note
 from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
@@ -34,12 +33,18 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled calibrate out/report-column-readings.csv"
-    " · coupled calibrate my.csv --rig my.toml --write new.toml --date 1974-02-04"
+    " · coupled calibrate my.csv --rig my.toml --hardware --write new.toml --date 1974-02-04"
     " · coupled calibrate --plan --precision 5[/]"
 )
 def calibrate(
     readings: Annotated[Path | None, typer.Argument(help="Readings, CSV.")] = None,
-    rig: RigOption = DEFAULT_RIG,
+    rig: Annotated[
+        str,
+        typer.Option(
+            help="A rig file, or the name of a shipped one: its travel, arc, gains and gradients"
+            f" count.  [default: {DEFAULT_RIG}]"
+        ),
+    ] = "",
     control: ControlOption = "column",
     write: Annotated[
         Path | None,
@@ -47,7 +52,10 @@ def calibrate(
     ] = None,
     hardware: Annotated[
         bool,
-        typer.Option("--hardware", help="Take what is found for the rig's own hardware, too."),
+        typer.Option(
+            "--hardware",
+            help="For readings of a real loader: what is found is the rig's own hardware, too.",
+        ),
     ] = False,
     date: Annotated[str, typer.Option(help="Noted in the rig file as given.")] = "",
     plan: Annotated[bool, typer.Option("--plan", help="Choose readings to take.")] = False,
@@ -65,7 +73,7 @@ def calibrate(
     report: ReportOption = None,
 ) -> None:
     """Find S1, S2, S3 and K from readings, with their errors; or plan the readings."""
-    file, data, name = rig_and_control(rig, control)
+    file, data, name = rig_and_control(rig or DEFAULT_RIG, control)
     tools = instruments(name, error)
     if plan:
         if readings is not None or figure is not None:
@@ -74,6 +82,7 @@ def calibrate(
             raise InputError("--plan", "--report", "is for a calibration, not for a plan")
         wanted = (precision / 100.0, strongest, 1 if once else 2, crossed)
         _plan((file, data, name), tools, wanted, (write, json_file))
+        _say_default(rig)
         return
     if readings is None:
         raise InputError("calibrate", "", "give a file of readings, or --plan for which to take")
@@ -91,6 +100,13 @@ def calibrate(
     check_json(json_file, [*own, *check_report(report, own)])
     targets = (write, figure, report, json_file)
     _calibrate(readings, (file, data, name), tools, targets, (date, hardware))
+    _say_default(rig)
+
+
+def _say_default(rig: str) -> None:
+    """Say whose values were taken where no rig was named."""
+    if not rig:
+        say_note(f"no --rig given: travel, arc, gains and gradients are {DEFAULT_RIG}'s")
 
 
 def _calibrate(
@@ -101,7 +117,11 @@ def _calibrate(
     noted: tuple[str, bool],
 ) -> None:
     from coupled.calibration.calibrate import calibrate_control as fit
-    from coupled.calibration.calibrated import with_calibration
+    from coupled.calibration.calibrated import (
+        refuse_other_hardware,
+        unstated_scales,
+        with_calibration,
+    )
     from coupled.calibration.readingsfile import read_readings
     from coupled.cli.tables.calibration import print_calibration
     from coupled.rig.rigfile import rig_from_table
@@ -114,6 +134,7 @@ def _calibrate(
     text = ""
     if write is not None:
         new = with_calibration(data, name, found, date, hardware)
+        refuse_other_hardware(data.controls[name], new.controls[name], found, file)
         text = rig_text(new, f"{shown(file.name)}, its {name} calibrated from {shown(path.name)}")
         rig_from_table(loads_toml(text, write), write)  # a rig that cannot be flown is refused
     with Outputs() as outputs:
@@ -136,6 +157,9 @@ def _calibrate(
     if json_file != "-":
         print_calibration(out, found)
         if write is not None:
+            unstated = unstated_scales(data.controls[name], found)
+            if unstated and not hardware:
+                say(f"{', '.join(unstated)}: not in {file.name}, so the hardware's are those found")
             say(f"calibrated rig: {write}")
         if figure is not None:
             say(f"figure: {figure}")

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app, check_cluster
+from coupled.cli.process import asked_to_stop
+from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
@@ -34,7 +36,7 @@ def check(
     from coupled.campaign.check import read_expecting
     from coupled.campaign.junit import junit_xml
     from coupled.cli.tables.campaign import print_verdicts
-    from coupled.flight.loop import input_files
+    from coupled.flight.manifest import input_files
 
     found = [read_expecting(name) for name in run]
     names = [scenarios[0].name for scenarios in found]
@@ -48,6 +50,8 @@ def check(
     check_json(json_file, [*own, *check_report(report, own)])
     with progress() as advance:
         checked = check_runs(found, advance)
+    if asked_to_stop():  # what was flown of the last run says nothing of it
+        raise KeyboardInterrupt
     table = [verdict.as_dict() for verdict in checked.verdicts]
     with Outputs() as outputs:
         if junit is not None:
@@ -116,8 +120,8 @@ def sweep(
         target / INDICES,
     ]
     check_format(path)
-    check_target(path, own)
-    check_json(json_file, [*own, path, *check_report(report, [*own, path])])
+    check_target(path, own, made=target)
+    check_json(json_file, [*own, path, *check_report(report, [*own, path], target)])
     try:
         with progress() as advance:
             found = fly_all(plan, target, workers, cluster, advance, _say_found)

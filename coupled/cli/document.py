@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
-from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, sha256, write_text
 from coupled.outputs import Outputs
@@ -21,6 +22,7 @@ from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
     from coupled.calibration.aircraftdata import AircraftData
+    from coupled.calibration.documentation import Documentation
     from coupled.calibration.qualification import Issue
     from coupled.calibration.result import CalibrationResult
     from coupled.rig.rig import Rig
@@ -63,10 +65,12 @@ def document(
     json_file: JsonOption = "",
     report: ReportOption = None,
 ) -> None:
-    """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks."""
+    """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks.
+
+    A check that fails gives exit code 1, and the table says why.
+    """
     from coupled.calibration.documentation import controls_of, surface_travels
     from coupled.calibration.documentation import document as gather
-    from coupled.cli.tables.calibration import print_checks
     from coupled.rig.rigfile import read_rig
 
     file = find(rig, shipped_rigs(), "rig")
@@ -79,9 +83,9 @@ def document(
     inputs = [file, *(path for path in (readings, reference, aircraft) if path is not None)]
     if folder.is_file():
         raise InputError(folder, "--output", "is a file; give a folder")
-    check_target(pdf, inputs)
+    check_target(pdf, inputs, made=folder)
     own = [*inputs, pdf, *([write] if write else [])]
-    check_json(json_file, [*own, *check_report(report, own)])
+    check_json(json_file, [*own, *check_report(report, own, folder)])
     say_stale(data)
     text = ""
     if write is not None:
@@ -110,15 +114,25 @@ def document(
                 report, outputs, inputs, lambda made: force_report(documents, fits, issue, made)
             )
     if json_file != "-":
-        for found in documents:
-            print_checks(out, found.control, found.checks, every)
-        if not travels:
-            out.print("no aircraft: the surface's position is not judged\n")
+        _print(documents, every, bool(travels))
         say(f"{len(written)} figures and {pdf.name} in {folder}")
         if write is not None:
             say(f"rig: {write}")
         say_report(report)
     print_json(table, json_file)
+    if not all(check.passed for found in documents for check in found.checks):
+        raise typer.Exit(1)
+
+
+def _print(documents: Sequence[Documentation], every: bool, judged: bool) -> None:
+    """Print each control's checks, and why some fail; `judged` is whether surfaces are."""
+    from coupled.calibration.reasons import reasons
+    from coupled.cli.tables.calibration import print_checks
+
+    for found in documents:
+        print_checks(out, found.control, found.checks, every, reasons(found))
+    if not judged:
+        out.print("no aircraft: the surface's position is not judged\n")
 
 
 def _issue(

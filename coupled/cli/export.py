@@ -10,7 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, err, give_json, out, progress, say
+from coupled.cli.progress import progress
+from coupled.cli.terminal import check_json, err, give_json, out, say
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
 

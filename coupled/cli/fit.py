@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.cli.progress import progress
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
 from coupled.outputs import Outputs

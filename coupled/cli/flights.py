@@ -10,18 +10,10 @@ import typer
 from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, app
+from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_stale
-from coupled.cli.terminal import (
-    check_json,
-    err,
-    give_json,
-    keep_json,
-    out,
-    print_json,
-    progress,
-    say,
-)
+from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
@@ -48,7 +40,7 @@ def compare(
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
     from coupled.cli.tables.flights import print_comparison
-    from coupled.flight.loop import input_files
+    from coupled.flight.manifest import input_files
     from coupled.flight.runfile import read_run
 
     cases = read_run(run)
@@ -64,6 +56,8 @@ def compare(
     say_stale(cases[0].rig)
     with progress() as advance:
         flights = compare_flights(cases, advance)
+    stopped = flights[-1].ended_early.startswith("interrupted")
+    no_figure = no_figure or stopped  # who has interrupted waits for no drawing
     table = flights.as_dict()
     with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
@@ -102,7 +96,7 @@ def fly(
     """Fly one run and write its record, and a manifest beside it."""
     from coupled.authority.compare import AS_THE_RIG, fly_and_judge
     from coupled.errors import nearest
-    from coupled.flight.loop import input_files
+    from coupled.flight.manifest import input_files
     from coupled.flight.manoeuvre import EVERY_CONFIGURATION
     from coupled.flight.runfile import read_run
     from coupled.record.record import check_suffix, manifest_path, write_record

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app, check_cluster
+from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.terminal import check_json, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
 from coupled.outputs import Outputs
@@ -96,7 +97,7 @@ def diagnose(
     drawn = _plot_targets(plots)
     targets = [*drawn, *([improve] if improve else [])]
     for target in targets:
-        check_target(target, inputs)
+        check_target(target, inputs, made=plots)
     if improve in drawn:
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
     targets += check_report(report, [*inputs, *targets])
@@ -235,7 +236,7 @@ def _diagnose_folder(
     todo = jobs(folders[0], output, control)
     read = [file for job in todo for file in (job.record, manifest_path(job.record), job.rig)]
     targets = [*(job.out for job in todo), output / "summary.csv"]
-    check_targets(targets, [folders[0] / LIST, *read])
+    check_targets(targets, [folders[0] / LIST, *read], made=output)
     with progress() as advance:
         found = run_all(todo, advance, *place)
     write_text(output / "summary.csv", summary(found))

@@ -122,7 +122,7 @@ def _positive(option: str, value: float) -> float:
 
 
 def _inputs(flown: Manoeuvre) -> list[Path]:
-    from coupled.flight.loop import input_files
+    from coupled.flight.manifest import input_files
 
     return input_files(flown)
 

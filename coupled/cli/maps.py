@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import app
+from coupled.cli.progress import progress
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
-from coupled.cli.terminal import progress, say
+from coupled.cli.terminal import say
 from coupled.errors import InputError
 from coupled.files import check_targets
 from coupled.outputs import Outputs

@@ -19,11 +19,12 @@ _STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG, errno.EDQUO
 class Stop:
     """Let SIGTERM and a hang-up end a command as Ctrl-C does: finished work is kept.
 
-    `exit_code` is that of the signal that came, or 0.
+    `exit_code` is that of the signal that came, or 0; `asked` tells whether any came, Ctrl-C
+    too, since a library may swallow the exception.
     """
 
     def __init__(self) -> None:
-        self.exit_code = 0
+        self.exit_code, self.asked = 0, False
         wanted = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
         # One that is ignored, as by nohup, stays so.
         self._signals = [n for n in wanted if n and signal.getsignal(n) == signal.SIG_DFL]
@@ -31,15 +32,27 @@ class Stop:
     def __enter__(self) -> Stop:
         for number in self._signals:
             signal.signal(number, self._come)
+        self._before = signal.getsignal(signal.SIGINT)
+        if self._before == signal.default_int_handler:
+            signal.signal(signal.SIGINT, self._come)
         return self
 
     def __exit__(self, *error: object) -> None:
         for number in self._signals:
             signal.signal(number, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, self._before)
 
     def _come(self, number: int, frame: FrameType | None) -> None:
-        self.exit_code = 128 + number
+        self.asked = True
+        if number != signal.SIGINT:  # the command itself says how it ends after that
+            self.exit_code = 128 + number
         raise KeyboardInterrupt
+
+
+def asked_to_stop() -> bool:
+    """Tell whether an interruption has come while a `Stop` was on."""
+    stop = getattr(signal.getsignal(signal.SIGINT), "__self__", None)
+    return isinstance(stop, Stop) and stop.asked
 
 
 def prepare_streams() -> None:

@@ -28,13 +28,16 @@ ReportOption = Annotated[
 ]
 
 
-def check_report(path: Path | None, others: Iterable[Path]) -> list[Path]:
-    """Refuse a report that could not be written, or is another file; return it where asked for."""
+def check_report(path: Path | None, others: Iterable[Path], made: Path | None = None) -> list[Path]:
+    """Refuse a report that could not be written, or is another file; return it where asked for.
+
+    `made` is a folder that the command makes.
+    """
     if path is None:
         return []
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(path, "--report", "is one HTML file: its name ends in .html")
-    check_target(path, others, "is another file of this command; give another name")
+    check_target(path, others, "is another file of this command; give another name", made)
     return [path]
 
 

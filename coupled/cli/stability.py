@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.progress import progress
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
-from coupled.cli.terminal import check_json, err, keep_json, out, print_json, progress, say
+from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target
 from coupled.outputs import Outputs

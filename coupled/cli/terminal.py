@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.text import Text
 
@@ -62,32 +60,14 @@ def say(text: str) -> None:
     out.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
+def say_note(text: str) -> None:
+    """Print a line that a user should know beside a command's output, on the error side."""
+    err.print(f"[yellow]note:[/] {escape(text)}", soft_wrap=True, highlight=False)
+
+
 def say_error(text: str) -> None:
     """Print the one line of a fault."""
     err.print(f"[red]error:[/] {escape(text)}", soft_wrap=True, highlight=False)
-
-
-@contextmanager
-def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress on the terminal while work goes on; nothing where there is none."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        task = bar.add_task(_starting() if err.is_terminal else "", total=None)
-
-        def advance(label: str, done: int, total: int) -> None:
-            bar.update(task, description=escape(label), completed=done, total=total)
-
-        yield advance
-
-
-def _starting() -> str:
-    """Return what is said while a command loads; compiling takes longer than all the rest."""
-    from coupled.rig.compiled import compiled_before
-    from coupled.rig.frame import step_frame_at
-
-    if compiled_before(step_frame_at):
-        return "starting"
-    return "starting (the first start compiles the physics)"
 
 
 def check_json(target: str, others: list[Path]) -> None:

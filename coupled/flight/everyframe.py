@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -62,6 +63,7 @@ def motion_reader(
     aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
 
     def all_controls() -> tuple[float, ...]:
+        turned = heading()  # from 0 to 2π, north being either
         return (
             *column(),
             aileron(),
@@ -70,7 +72,7 @@ def motion_reader(
             yaw_rate(),
             beta(),
             roll(),
-            heading(),
+            turned if turned <= math.pi else turned - 2.0 * math.pi,
         )
 
     return all_controls

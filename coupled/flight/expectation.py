@@ -21,6 +21,7 @@ from coupled.schema import Section, named, quantity
 Figure = Literal[
     "asked_norm",
     "reached_norm",
+    "hand_travel_norm",
     "loss",
     "loss_closed_form",
     "felt_ratio",
@@ -54,8 +55,8 @@ RATES = (SMALL_RATE, RATE)  # they hold a flight against the rigid one
 REFERENCE = "rigid"
 
 SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole: a bound of 1 bounds nothing
-RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "felt_ratio")
-RELATIVE += ("felt_ratio_closed_form",)
+RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "hand_travel_norm")
+RELATIVE += ("felt_ratio", "felt_ratio_closed_form")
 _PER_CENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
 
 

@@ -7,35 +7,30 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.files import sha256
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.bench import Airframe, Bench
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.gusts import Gusts
+from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.pilot import Action, ForceTable
+from coupled.flight.pilot import Action
 from coupled.flight.pilot.base import Start
 from coupled.flight.served import Served
 from coupled.record.channels import (
     ALTITUDE,
     LOAD,
     PRESSURE,
-    TIME,
     ControlName,
-    channel,
     record_channels,
 )
 from coupled.record.record import EndedEarly, Record
@@ -172,7 +167,7 @@ def _flown(
     if properties:
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
-    return Record(channels, data, _manifest(manoeuvre, channels, data, ended))
+    return Record(channels, data, manifest(manoeuvre, channels, data, ended))
 
 
 def _finite(
@@ -260,41 +255,3 @@ def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, see
     hiss[:, drawn] = np.random.default_rng(seed).standard_normal((frames, int(drawn.sum())))
     hiss *= sigma
     return hiss
-
-
-def input_files(manoeuvre: Manoeuvre) -> list[Path]:
-    """Return the files that a flight reads, if any: run, rig, and a pilot's tables."""
-    source = manoeuvre.source
-    own = [source.run_file, source.rig_file] if source is not None else []
-    pilots = manoeuvre.pilots.values()
-    return own + [Path(p.file) for p in pilots if isinstance(p, ForceTable) and p.file]
-
-
-def _manifest(
-    manoeuvre: Manoeuvre, channels: tuple[str, ...], data: Floats, ended: EndedEarly | None
-) -> dict[str, Any]:
-    stops = {}
-    for control in manoeuvre.rig.controls:
-        met = np.flatnonzero(data[:, channels.index(channel(control, "stop"))])
-        if met.size:
-            stops[control] = float(data[met[0], channels.index(TIME)])
-    files = [path for path in input_files(manoeuvre) if path.is_file()]
-    return {
-        "run": manoeuvre.name,
-        "case": manoeuvre.label,
-        "rig": manoeuvre.rig.model_dump(),
-        "seed": manoeuvre.seed,
-        "channels": list(channels),
-        "rows": len(data),
-        "ended_early": None if ended is None else asdict(ended),
-        "stop_first_met_s": stops,
-        "inputs_sha256": {path.name: sha256(path) for path in files},
-        "versions": dict(versions()),
-    }
-
-
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Return the versions of what flies."""
-    found = {"coupled": version("coupled"), "python": platform.python_version()}
-    return found | {name: version(name) for name in ("jsbsim", "numpy", "numba", "scipy")}

@@ -66,7 +66,7 @@ def jobs(folder: Path, out: Path, control: ControlName = "column") -> list[Job]:
         if not re.match(PLAIN_NAME, rig):
             raise InputError(folder / LIST, name, f"names the rig {rig!r}: give a name, no folder")
         file = f"{name}.json"
-        check_target(out / file)
+        check_target(out / file, made=out)
         found.append(Job(name, _record(folder, name), _rig(folder, name, rig), out / file, control))
     if not found:
         raise InputError(folder / LIST, "", "names no record")

@@ -101,7 +101,10 @@ def draw_releases(found: Documentation) -> Figure:
                 (now, {"color": BLUE, "label": "rig"}),
             ):
                 share = 100.0 * let_go.deflection / let_go.start
-                axes.plot(let_go.time_s, share, linewidth=1.3, **style)
+                from_90 = (
+                    let_go.time_s - swing_of(let_go).begin_s
+                )  # as the rule counts, and the table
+                axes.plot(from_90, share, linewidth=1.3, **style)
             _draw_tolerance(axes, wanted, swing)
             axes.grid(alpha=0.25)
             kinds = [c for c in found.checks if c.pressure_Pa == condition.pressure_Pa]
@@ -109,9 +112,9 @@ def draw_releases(found: Documentation) -> Figure:
             worst = min(kinds, key=lambda check: check.margin)
             word = "pass" if worst.passed else f"FAIL: {worst.name.removesuffix(', ' + side)}"
             axes.set_title(f"{pressure(condition.pressure_Pa)}, {side}: {word}", fontsize=9)
-            axes.set_xlim(0.0, _span(wanted, swing))
+            axes.set_xlim(-swing.begin_s, _span(wanted, swing))
         for axes in grid[:, i] if len(found.conditions) == 1 else grid[-1:, i]:
-            axes.set_xlabel("time from the release, s")
+            axes.set_xlabel("time from 90 % of the displacement, s")
     for axes in grid[:, 0]:
         axes.set_ylabel("δ, % of displacement")
     what = "release, 14 CFR Part 60, 2.b"
@@ -128,22 +131,25 @@ def _span(wanted: Release, swing: Swing) -> float:
 
 def _draw_tolerance(axes: Any, wanted: Release, swing: Swing) -> None:
     """Draw where the rule lets the specified curve's 10 %, crossings and overshoots lie."""
-    share = wanted.deflection / wanted.start
-    begin = wanted.time_s[int(np.argmax(share <= 0.9))]
+    share, time = wanted.deflection / wanted.start, wanted.time_s - swing.begin_s
     style = {"color": ORANGE, "linewidth": 5.0, "alpha": 0.55, "solid_capstyle": "butt"}
     if not swing.peaks.size:
-        low, high = (begin + swing.fall_s * (1.0 + s * TIME_SHARE) for s in (-1.0, 1.0))
+        low, high = (swing.fall_s * (1.0 + s * TIME_SHARE) for s in (-1.0, 1.0))
         axes.plot([low, high], [10.0, 10.0], label="tolerance", **style)
         return
     crossings = swing.crossings[: len(swing.peaks) + 1 : 2]  # whole periods apart
     wide = 0.0
     for n, (crossing, before) in enumerate(zip(crossings, [0.0, *crossings], strict=False)):
         wide += TIME_SHARE * (n + 1) * (crossing - before)
-        at = begin + crossing
-        axes.plot([at - wide, at + wide], [0.0, 0.0], label=None if n else "tolerance", **style)
-    starts = np.append(swing.crossings, np.inf) + begin
+        axes.plot(
+            [crossing - wide, crossing + wide],
+            [0.0, 0.0],
+            label=None if n else "tolerance",
+            **style,
+        )
+    starts = np.append(swing.crossings, np.inf)
     for n in range(len(swing.peaks)):
-        inside = (wanted.time_s >= starts[n]) & (wanted.time_s < starts[n + 1])
+        inside = (time >= starts[n]) & (time < starts[n + 1])
         at = int(np.argmax(np.where(inside, np.abs(share), -1.0)))
         top, wide = 100.0 * share[at], 10.0 * swing.peaks[0]
-        axes.plot([wanted.time_s[at]] * 2, [top - wide, top + wide], **style)
+        axes.plot([time[at]] * 2, [top - wide, top + wide], **style)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from coupled.authority.compare import Flight
-from coupled.authority.figures import rows
+from coupled.authority.figures import further, rows
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.plots.flights import draw_comparison
 from coupled.plots.saving import svg_text
@@ -55,7 +55,15 @@ def _verdict(flights: Sequence[Flight]) -> Verdict:
         lost.append(f"{configuration} {_span([100.0 * o.loss for o in ours], 1)} %")
         felt.append(f"{configuration} {_span([o.felt_ratio for o in ours], 3)}")
     run = flights[0].manoeuvre
-    remarks = [f"Felt of the specified gradient: {', '.join(felt)}.", " ".join(run.card.split())]
+    by_case = {
+        f.outcome.case: [g for g in flights if g.outcome.case == f.outcome.case] for f in flights
+    }
+    why = next(filter(None, map(further, by_case.values())), "")
+    remarks = [
+        f"Felt of the specified gradient: {', '.join(felt)}.",
+        why,
+        " ".join(run.card.split()),
+    ]
     ended = [
         f"{f.outcome.case}, {f.configuration}: ended early, {f.ended_early}."
         for f in flights

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from coupled.files import read_text, sha256
-from coupled.flight.loop import versions
+from coupled.flight.manifest import versions
 from coupled.reports.page import InputFile, Made
 
 _READ_BY_PEOPLE = ".toml"

@@ -29,6 +29,26 @@ def rig_text(rig: Rig, remark: str = "") -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
+def rig_table(rig: Rig) -> dict[str, Any]:
+    """Return a rig as the tables of a rig file, every key with its unit, defaults too.
+
+    What the rig has not, as a flight on a bench, is left out: the tables read back as the rig.
+    """
+    table = _whole(rig, "m")
+    controls = {name: _whole(each, unit_of(name)) for name, each in rig.controls.items()}
+    return table | {"controls": controls}
+
+
+def _whole(section: Section, d: str) -> dict[str, Any]:
+    """Return a section's values by their keys in a file."""
+    found = {}
+    for key, field in file_keys(type(section), d).items():
+        value = getattr(section, field)
+        if value is not None:
+            found[key] = _whole(value, d) if isinstance(value, Section) else value
+    return found
+
+
 def _table(path: str, section: Section, d: str) -> Iterator[str]:
     """Yield a section's table, then those within it."""
     values = list(_values(section, d))

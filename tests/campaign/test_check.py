@@ -342,6 +342,7 @@ def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
         'measure = "force_N"\nconfiguration = "rigid"\nmost = 30.0',
         'channel = "column_force_N"\nconfiguration = "rigid"\nreaches = 50.0\nby_s = 1.0',
     )
+    (tmp_path / "a").mkdir()
     done = coupled(tmp_path, "check", "push.toml", "--junit", "a/j.xml", "--json", "t.json")
     assert done.returncode == 1
     assert done.stderr == ""

@@ -15,7 +15,10 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
 from coupled.record.channels import record_channels
 from coupled.record.record import FORMAT, manifest_path, read_record, write_record
+from coupled.resources import shipped_rigs
 from coupled.rig.compiled import bound
+from coupled.rig.rigfile import read_rig, rig_from_table
+from tests.support.runs import shortened
 
 RUN = """
 name = "test"
@@ -45,6 +48,14 @@ def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
     assert manifest_path(paths[0]).read_bytes() == manifest_path(paths[1]).read_bytes()
 
 
+def test_a_heading_starts_at_north_and_turns_to_either_side_of_it() -> None:
+    """JSBSim counts it from 0 to 2π, so north and a degree to its left were a turn apart."""
+    right = fly(shortened("roll-authority", 2, 360))["heading_rad"]
+    assert abs(right[0]) < 1e-9
+    assert np.max(np.abs(np.diff(right))) < 0.01
+    assert right[-1] > 0.01
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_a_record_is_read_back_as_it_was_written(tmp_path: Path, suffix: str) -> None:
     record = fly(manoeuvre(tmp_path, 'kind = "step"\nforce_N = 30.0'))
@@ -64,6 +75,10 @@ def test_the_manifest_says_what_went_in(tmp_path: Path) -> None:
     assert manifest["ended_early"] is None
     assert set(manifest["inputs_sha256"]) == {"test.toml", "report-column.toml"}
     assert {"coupled", "jsbsim", "numpy", "numba", "python"} <= set(manifest["versions"])
+    assert rig_from_table(manifest["rig"], "manifest") == read_rig(shipped_rigs()["report-column"])
+    assert manifest["positive"]["column"] == "a pull"
+    assert "a pull gives a negative command" in manifest["positive"]["column_surface_norm"]
+    assert record["column_surface_norm"].min() < -0.05  # as the manifest says of a pull
     assert record.channels == record_channels(["column"], flown=True)
     assert record.time_s[1] == pytest.approx(1 / 120)
 

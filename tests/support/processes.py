@@ -14,7 +14,11 @@ PATIENCE_s = 300.0  # a command that takes so long hangs, however busy the machi
 
 
 def begun(
-    folder: Path, *words: str, until: Callable[[], bool], script: str = ""
+    folder: Path,
+    *words: str,
+    until: Callable[[], bool],
+    script: str = "",
+    may_end: bool = False,
 ) -> subprocess.Popen[bytes]:
     """Return a command, or a script, in its own group of processes, once it has come so far."""
     process = subprocess.Popen(
@@ -26,7 +30,7 @@ def begun(
     )
     patience = time.monotonic() + PATIENCE_s
     while not until():
-        assert process.poll() is None
+        assert may_end or process.poll() is None
         assert time.monotonic() < patience
         time.sleep(0.01)
     return process

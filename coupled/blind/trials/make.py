@@ -207,7 +207,7 @@ def _begin(places: Places, asked: Numbers, any_seed: bool) -> Numbers:
         raise InputError(places.folder, "", "is not empty; give a new folder")
     if places.key.exists():
         raise InputError(places.key, "--key", "is there already; a key is never overwritten")
-    check_targets([places.key, places.folder / SEAL])
+    check_targets([places.key, places.folder / SEAL], made=places.folder)
     write_text(note, json.dumps(asdict(asked)))
     return asked
 

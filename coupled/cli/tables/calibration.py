@@ -116,10 +116,20 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     console.print(table)
 
 
+_ROUNDED = 1e-9  # of N, s, ° or %: less is a computer's rounding
+
+
 def print_checks(
-    console: Console, control: str, checks: Sequence[ControlCheck], every: bool
+    console: Console,
+    control: str,
+    checks: Sequence[ControlCheck],
+    every: bool,
+    why: Sequence[str] = (),
 ) -> None:
-    """Print a control's checks: those that fail and each kind's narrowest, or every one."""
+    """Print a control's checks: those that fail and each kind's narrowest, or every one.
+
+    `why` says why some fail.
+    """
     shown = list(checks) if every else _narrowest(checks)
     table = Table(box=None, pad_edge=False)
     table.add_column(control, no_wrap=True)
@@ -133,7 +143,10 @@ def print_checks(
         table.add_row(name, *cells, c.unit, f"{100 * c.margin:.0f} %", verdict)
     console.print(table)
     good = sum(check.passed for check in checks)
-    console.print(f"{control}: {good} of {len(checks)} checks pass\n", highlight=False)
+    console.print(f"{control}: {good} of {len(checks)} checks pass", highlight=False)
+    for sentence in why:
+        console.print(f"  {sentence}", highlight=False)
+    console.print()
 
 
 def _narrowest(checks: Sequence[ControlCheck]) -> list[ControlCheck]:

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
 
-from coupled.authority.figures import rows
+from coupled.authority.figures import further, rows
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
@@ -29,6 +29,9 @@ def print_comparison(console: Console, flights: Sequence[Flight]) -> None:
         for case in cases:
             title = case[0].outcome.case if len(cases) > 1 else ""
             _print_table(console, title, [(f.configuration, f) for f in case])
+    for sentence in filter(None, map(further, cases)):
+        console.print(f"{escape(sentence)}\n", highlight=False)
+        break
     for flight in flights:
         o = flight.outcome
         if o.ended_early:

@@ -23,6 +23,7 @@ from tests.support.logs import (
 
 def test_the_command_writes_a_record_and_says_what_it_thinks(tmp_path: Path) -> None:
     imported(tmp_path)
+    (tmp_path / "a").mkdir()
     done = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "a/r.csv")
     assert done.returncode == 0, done.stderr
     assert max(len(line) for line in done.stdout.splitlines()) <= 80

@@ -1,0 +1,84 @@
+"""Progress of long work: a bar on a terminal, a line every ten seconds elsewhere."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.markup import escape
+
+from coupled.cli.process import asked_to_stop
+from coupled.cli.terminal import err
+
+Advance = Callable[[str, int, int], None]
+EVERY_s = 10.0  # between the lines where there is no terminal
+MARK = "…"  # before each of them, so that a reader of a log can leave them out
+
+
+@contextmanager
+def progress(first: str = "") -> Iterator[Advance]:
+    """Show the progress of what is done within, on the error side.
+
+    What is given is called with what goes on, how much of it is done, and how much there is.
+    `first` is said until then; by default that the command is starting.
+    """
+    with _bar(first or _starting()) if err.is_terminal else _lines(first) as show:
+
+        def advance(label: str, done: int, total: int) -> None:
+            if asked_to_stop():  # a library may swallow it, and the work go on
+                raise KeyboardInterrupt
+            show(label, done, total)
+
+        yield advance
+
+
+@contextmanager
+def _bar(first: str) -> Iterator[Advance]:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=err, transient=True) as bar:
+        task = bar.add_task(escape(first), total=None)
+
+        def advance(label: str, done: int, total: int) -> None:
+            bar.update(task, description=escape(label), completed=done, total=total)
+
+        yield advance
+
+
+@contextmanager
+def _lines(first: str) -> Iterator[Advance]:
+    """Print a line every so often from a thread, whether the work reports anything or not."""
+    began, over = time.monotonic(), threading.Event()
+    latest: list[tuple[str, int, int]] = [(first, 0, 0)]
+
+    def tell() -> None:
+        while not over.wait(EVERY_s):
+            label, done, total = latest[0]
+            label = label or _starting()
+            share = f", {100 * done / total:.0f} %" if total else ""
+            text = f"{MARK} {label}{share}, after {time.monotonic() - began:.0f} s"
+            err.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def advance(label: str, done: int, total: int) -> None:
+        latest[0] = (label, done, total)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield advance
+    finally:
+        over.set()
+        teller.join()
+
+
+def _starting() -> str:
+    """Return what is said while a command loads; compiling takes longer than all the rest."""
+    from coupled.rig.compiled import compiled_before
+    from coupled.rig.frame import step_frame_at
+
+    if compiled_before(step_frame_at):
+        return "starting"
+    return "starting (the first start compiles the physics)"

@@ -1,0 +1,59 @@
+"""Why control checks fail: each reason stands where its cause does, and goes with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from coupled.calibration.documentation import document
+from coupled.calibration.letgo import scheduled
+from coupled.calibration.reasons import reasons
+from coupled.rig.rig import Rig
+from tests.support.readings import report_rig
+
+COLUMN = "controls.column"
+
+
+def said(rig: Rig) -> str:
+    return " ".join(reasons(document(rig, "column", None)))
+
+
+def test_a_release_fails_by_the_bend_and_no_reason_is_left_where_it_is_put_right() -> None:
+    rig = report_rig()
+    assert "springs back by the structure's bend" in said(rig)
+    assert "coupled document RIG --write" in said(rig)
+    assert said(scheduled(rig, "column")) == ""
+    assert (
+        said(
+            rig.changed(
+                {f"{COLUMN}.loader.bend_m_per_N": 0.0, f"{COLUMN}.compensation.bend_m_per_N": 0.0}
+            )
+        )
+        == ""
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"compensation.gradient": False}, "The gradient's correction is off"),
+        ({"compensation.deflection": False}, "The deflection's correction is off"),
+        (
+            {"compensation.bend_m_per_N": 4e-5},
+            "takes K for 4e-05 m/N, and the structure has 9.136e-05",
+        ),
+        ({"sensing.modifying_scale": 0.7}, "Scales are off (modifying_scale = 0.7)"),
+        ({"loader.breakout_N": 200.0}, "within the breakout of 200 N the loader rests"),
+    ],
+)
+def test_each_cause_is_named(changes: dict[str, Any], words: str) -> None:
+    rig = report_rig()
+    assert words not in said(rig)
+    assert words in said(rig.changed({f"{COLUMN}.{key}": value for key, value in changes.items()}))
+
+
+def test_a_fault_that_the_file_does_not_say_is_left_to_a_diagnosis() -> None:
+    rigid = {f"{COLUMN}.loader.bend_m_per_N": 0.0, f"{COLUMN}.compensation.bend_m_per_N": 0.0}
+    rig = report_rig().changed({**rigid, f"{COLUMN}.loader.cubic_N_per_m3": 1e5})
+    assert "coupled diagnose" in said(rig)
