@@ -145,7 +145,7 @@ def _fit(
         x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
         slopes = _Slopes(residual, low, high)
         found = least_squares(
-            residual, x0, slopes, bounds=(low, high), xtol=1e-5, ftol=1e-6, max_nfev=FIT_ITERATIONS
+            residual, x0, slopes, bounds=(low, high), xtol=1e-4, ftol=1e-5, max_nfev=FIT_ITERATIONS
         )
         if best is None or found.cost < best.cost:
             best = found

@@ -15,7 +15,14 @@ from coupled.gap.case import Case
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, touched
-from coupled.gap.thresholds import SCREEN_FACTORS, SCREEN_SHOWN, SCREEN_SIZES, SCREENED
+from coupled.gap.thresholds import (
+    SCREEN_FACTORS,
+    SCREEN_NEAR,
+    SCREEN_SHOWN,
+    SCREEN_SIZES,
+    SCREENED,
+    SCREENED_LEAST,
+)
 from coupled.rig.rig import Rig
 
 
@@ -49,7 +56,9 @@ def screen(
         if starts:
             scores.append((best, effect, starts))
     scores.sort(key=lambda item: -item[0])
-    kept = scores[:SCREENED] + [item for item in scores[SCREENED:] if not item[1].free]
+    near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
+    most = min(SCREENED, max(SCREENED_LEAST, len(near)))
+    kept = scores[:most] + [item for item in scores[most:] if not item[1].free]
     return [(effect, starts) for _, effect, starts in kept]
 
 

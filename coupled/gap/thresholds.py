@@ -74,7 +74,9 @@ ALIKE = 0.05  # least eigenvalue of signatures' cosines: two at cosine 0.95 are 
 SHARES_IN = 0.3  # chosen: of the largest part, from which a number belongs to such a group
 
 # Screening (`screen`).
-SCREENED = 6  # chosen: candidates fitted in a round
+SCREENED = 6  # chosen: candidates fitted in a round,
+SCREENED_LEAST = 3  # chosen: and no fewer, however little they take beside the best
+SCREEN_NEAR = 0.15  # chosen: share of what the best takes, from which others are fitted, too
 SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
 SCREEN_FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
 SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which a size does something
