@@ -26,6 +26,7 @@ from coupled.gap.floors import given_noise, noise_in, with_error
 from coupled.gap.noise import Noise
 from coupled.gap.output import Output, Predict, echoed, spread, white
 from coupled.gap.sensed import Sensed
+from coupled.gap.served import asked, left, neutral, services
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
     BROAD,
@@ -106,7 +107,7 @@ class Reader:
         if self._gradient_from() == [self._name("gradient")]:
             return self.signal("gradient")
         pressure = self.record["dynamic_pressure_Pa"]
-        return replay_schedule(self.rig, self.control, smoothed(pressure))
+        return replay_schedule(self.rig, self.control, smoothed(pressure)) * left(self)
 
     def second(self) -> Floats | None:
         """Return G_T beyond the break, which no record holds: what the schedule makes of q̄."""
@@ -115,7 +116,7 @@ class Reader:
         if not two or pressure not in self.record:
             return None
         smooth = smoothed(self.record[pressure])
-        return replay_schedule(self.rig, self.control, smooth, beyond=True)
+        return replay_schedule(self.rig, self.control, smooth, beyond=True) * left(self)
 
     def outputs(self) -> list[Output]:
         """Return every output that the record lets judge, in the order of the chain."""
@@ -165,7 +166,7 @@ class Reader:
         smooth = smoothed(pressure)
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
-            return replay_schedule(rig, self.control, q)
+            return replay_schedule(rig, self.control, q) * left(self)
 
         share, rest = echoed(gradient, predict(self.rig, pressure))
         if share > ECHO_SHARE:
@@ -200,7 +201,7 @@ class Reader:
                 scale = sensed.scale(len(seen))
                 restart = (every, seen / scale, rate / scale)
                 pull = sensed.force_on_nodes(nodes, f)
-                driven_by = (pull, gradient, misread, load, second, restart)
+                driven_by = (pull, gradient, misread, load, second, restart, services(self))
                 return scale * drive_loader(rig, self.control, *driven_by)[0]
 
             return predict
@@ -232,13 +233,14 @@ class Reader:
         computed, product = self.signal("computed"), self.signal("modifying_force")
         gradient, second, smooth = self.gradient(), self.second(), smoothed(computed)
         level, own = self._heard("computed"), self._heard("modifying_force")
+        about = 0.0 * smooth + neutral(self)
 
         def made(rig: Rig, read: Floats) -> Floats:
-            return replay_product(rig, self.control, read, gradient, second)
+            return replay_product(rig, self.control, read - about, gradient, second)
 
         # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
-        jump = made(self.rig, 0.0 * smooth + level.rms) - made(self.rig, 0.0 * smooth - level.rms)
-        near = np.abs(smooth) < PRELOAD_UNSURE * level.rms
+        jump = made(self.rig, about + level.rms) - made(self.rig, about - level.rms)
+        near = np.abs(smooth - about) < PRELOAD_UNSURE * level.rms
         unsure = near & (np.abs(jump) > PRELOAD_UNSURE * own.rms)
 
         def predict(rig: Rig, seen: Floats = smooth) -> Floats:
@@ -253,11 +255,9 @@ class Reader:
         return [self._made("multiplier", name, product, predict, noisy, own)]
 
     def _linkage(self) -> list[Output]:
-        computed, force = self.signal("computed"), self.signal("force")
-        measured = self.signal("deflection")
+        computed, force, measured = map(self.signal, ("computed", "force", "deflection"))
         levels = self._heard("computed"), self._heard("force")
         smooth, smooth_force = smoothed(computed), smoothed(force)
-
         others = {name: smoothed(signal) for name, signal in self.others().items()}
 
         def driven(c: Floats, f: Floats) -> Predict:
@@ -282,7 +282,7 @@ class Reader:
         if points is None:
             return []
         commands_at, positions = points
-        estimate, measured = self.signal("estimate"), self.record[self.surface]
+        estimate, measured = asked(self), self.record[self.surface]
         pressure = self.record["dynamic_pressure_Pa"]
         command = replay_surface(self.rig, self.control, estimate, pressure)
 

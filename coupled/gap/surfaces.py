@@ -25,6 +25,7 @@ from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.rig.replay import replay_surface
 from coupled.rig.rig import Rig
+from coupled.rig.serving import service_rows
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
@@ -113,5 +114,7 @@ def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     if name not in record or pressure not in record:
         return np.zeros(len(record))
-    asked = replay_surface(rig, control, record[name], record[pressure])
+    served = service_rows(record, control)
+    wanted = record[name] if served is None else served.asked
+    asked = replay_surface(rig, control, wanted, record[pressure])
     return np.concatenate(([0.0], asked[:-1]))

@@ -25,6 +25,7 @@ from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import scale_at
+from coupled.rig.serving import ServiceRows
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -72,10 +73,12 @@ def drive_loader(
     load_factor: Floats | None = None,
     second: Floats | None = None,
     restart: Restart | None = None,
+    services: ServiceRows | None = None,
 ) -> tuple[Floats, Floats]:
     """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
 
-    `nodes_N` has `rig.substeps` values a frame and one more.
+    `nodes_N` has `rig.substeps` values a frame and one more. `services` are what the record holds
+    of the loader's services; their force is straight between frames.
     """
     p, s = _one(rig, control)
     level = np.ones_like(misread) if load_factor is None else load_factor
@@ -83,7 +86,9 @@ def drive_loader(
     h = 1.0 / (rig.frame_rate * rig.substeps)
     every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
-    given = np.stack((*both, misread, level, position, rate))
+    none = np.zeros_like(misread)
+    served = (none, none, none) if services is None else services[:3]
+    given = np.stack((*both, misread, level, position, rate, *served))
     _loader(p, s, nodes_N, given, every, rig.substeps, h, out)
     return out[0], out[1]
 
@@ -190,9 +195,13 @@ def _loader(
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader; `given`, shape (6, frames): G_T twice, misread δc, load factor, restarts."""
+    """Run the loader on what is `given`, shape (9, frames).
+
+    G_T twice, misread δc, load factor, restarts' δc and its rate; x₀, force and jams of services.
+    """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
+    neutral, added, jammed = given[6], given[7], given[8]
     start_loader(p.loader, s.loader, force[0])
     ends = (-p.loader.travel, p.loader.travel)
     frames = len(misread)
@@ -203,15 +212,21 @@ def _loader(
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
         read = scale_at(p.sensing, k) * s.loader.computed + misread[k]
-        out[1, k] = set_product(p, m, s.loader.computed, read)
+        s.loader.neutral = neutral[k]
+        out[1, k] = set_product(p, m, s.loader.computed - neutral[k], read - neutral[k])
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
+            base, here = s.loader.external, ends
+            if jammed[k] > 0.5:
+                here = (s.loader.computed, s.loader.computed)
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
+                share = (node - k * substeps - 0.5) / substeps
+                s.loader.external = base + (1.0 - share) * added[k] + share * added[k + 1]
                 led = force[node]
                 if p.inertia.rows > 0:
                     led = lead_force(p.inertia, s.inertia, led)
-                move_loader(p.loader, p.friction, m, s.loader, led, ends, h)
+                move_loader(p.loader, p.friction, m, s.loader, led, here, h)
 
 
 @entry

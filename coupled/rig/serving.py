@@ -7,12 +7,14 @@ what its kernels last wrote of the services, as the channels of `service_channel
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
 from coupled.record.channels import unit_of
+from coupled.record.record import Record
 from coupled.rig.control import ControlArray
 from coupled.rig.parameters import Control, Services
 from coupled.rig.rig import Rig
@@ -54,6 +56,25 @@ def services_of(control: str) -> dict[str, str]:
 def service_channels(control: str) -> tuple[str, ...]:
     """Return the channels that record a control's services."""
     return tuple(f"{control}_{name.format(d=unit_of(control))}" for name in SERVICE_CHANNELS)
+
+
+class ServiceRows(NamedTuple):
+    """What a record holds of a control's services, one value a frame."""
+
+    neutral: Floats  # x₀, d
+    force: Floats  # that they add, N
+    jammed: Floats  # 0 or 1
+    feel_lost: Floats  # share of G_T
+    asked: Floats  # of the surface, d
+
+
+def service_rows(record: Record, control: str) -> ServiceRows | None:
+    """Return a record's channels of a control's services; None where it lacks any of them."""
+    quantities = ("trim_{d}", "service_force_N", "jammed", "feel_lost", "asked_{d}")
+    names = [f"{control}_{each.format(d=unit_of(control))}" for each in quantities]
+    if any(name not in record for name in names):
+        return None
+    return ServiceRows(*(record[name] for name in names))
 
 
 def has_services(control: Control) -> bool:
