@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.rig.gauge import move_gauge
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
 from coupled.rig.standalone import History, nodes_of, run_control
@@ -196,3 +197,19 @@ def test_what_no_gauge_can_be_is_refused(changes: dict[str, object], says: str) 
     slow = {**{f"{SENSING}.gauge_delay_s": 0.1}, "loader_rate_Hz": 20_000.0}
     with pytest.raises(InputError, match="too long for this loader_rate_Hz"):
         bench().changed(slow)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_servo_at_its_rate_limit_does_not_accelerate_the_mass_on_either_side(side: float) -> None:
+    """On the limit x'' is 0 while the servo asks for more, and its equation's where it brakes."""
+    packed = pack(
+        bench({"servo_rate_limit_m_per_s": 0.2, "controls.column.sensing.gauge_mass_kg": 1.0})
+    )
+    p, s = packed["parameters"][0], packed["state"][0]
+    s["linkage"]["rate"] = side * 0.2
+    move_gauge(p["gauge"], s["gauge"], p["linkage"], s["linkage"], side * 0.1)
+    assert s["gauge"]["acceleration"] == 0.0
+    move_gauge(p["gauge"], s["gauge"], p["linkage"], s["linkage"], side * -0.1)
+    w = 2.0 * math.pi * 18.0
+    wanted = side * (-0.1 * w * w - 2.0 * 0.7 * w * 0.2)
+    assert s["gauge"]["acceleration"] == pytest.approx(wanted, rel=1e-12)

@@ -22,7 +22,7 @@ from coupled.rig.rigfile import rig_from_table
 from coupled.rig.rigwrite import rig_text
 from coupled.rig.standalone import nodes_of, run_control
 from coupled.rig.statics import static_line, static_point
-from coupled.rig.structure import felt_forces, lost_deflections, whole
+from coupled.rig.structure import Structure, felt_forces, lost_deflections, whole
 from coupled.schema import loads_toml
 from tests.support.joined import BETWEEN, FULL, RADIUS, STRUCTURE, joined
 from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
@@ -435,3 +435,21 @@ def test_the_rigid_configuration_has_no_structure() -> None:
     assert column[2] == pytest.approx(column[1], rel=1e-12)
     assert joined().only("column").structure.stands_apart
     assert coupled.load_rig("t37").structure.stands_apart
+
+
+def test_a_force_within_the_plays_width_of_the_carried_one_moves_only_the_elastic_share() -> None:
+    """Before the node's force is carried: share s lags by half the width, to either side."""
+    share, width, force = 0.4, 20.0, 30.0
+    packed = pack(bench({"bend_hysteresis_share": share, "bend_hysteresis_width_N": width}))
+    p, s = packed["parameters"][0]["linkage"], packed["state"][0]["linkage"]
+    for side in (1.0, -1.0):
+        s["carried"] = 0.0
+        found = linkage.deflection(p, s, side * force)
+        lagged = force - share * 0.5 * width
+        assert found == pytest.approx(side * K_REPORT * lagged, rel=1e-12)
+        near = linkage.deflection(p, s, side * 0.4 * width)  # nothing of the play is taken up
+        assert near == pytest.approx(side * K_REPORT * (1.0 - share) * 0.4 * width, rel=1e-12)
+
+
+def test_a_structure_need_not_be_reciprocal_unless_it_is_asked_for() -> None:
+    assert not Structure().reciprocal
