@@ -110,8 +110,13 @@ def draw_deflections(found: Documentation) -> Figure:
     for axes in (left, right):
         axes.set_xlabel(f"true deflection δ, {unit}")
         axes.grid(alpha=0.25)
-        axes.legend(fontsize=7, loc="best")
-    right.margins(y=0.35)
+    handles, labels = (
+        [*some, *others]
+        for some, others in zip(
+            *(a.get_legend_handles_labels() for a in (left, right)), strict=True
+        )
+    )
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
     figure.suptitle(title(found, "true against computed deflection"), fontsize=12)
     return figure
 

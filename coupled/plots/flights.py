@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.campaign.labels import parameter_label
-from coupled.plots.histories import plain
+from coupled.plots.histories import legend_above, plain
 from coupled.record.channels import RATE, channel, unit_of
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
@@ -28,17 +28,18 @@ _STYLE = {
     "compensated": ("#009e73", "solid", 1.6),
     "calibrated low": ("#e69f00", "dashdot", 1.6),
 }
+_FELT = 0.01  # of the force: a step below that is felt by no hand
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
 def draw_comparison(flights: Sequence[Flight]) -> Figure:
     """Draw a comparison: a column a case; surface, motion, force, and what is lost.
 
-    Where each case is flown in one configuration only, draw a panel a case, of the steps of
-    the modifying force.
+    Where each case is flown in one configuration only, and the hand feels the modifying force
+    step, draw a panel a case, of these steps.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    if len(cases) > 1 and all(len(case) == 1 for case in cases):
+    if len(cases) > 1 and all(len(case) == 1 for case in cases) and _steps_are_felt(flights):
         return _draw_step_panels(cases)
     flown = flights[0].manoeuvre.rig.flight is not None
     rows = [_draw_surface, *([_draw_motion] if flown else []), _draw_force, _draw_loss]
@@ -62,6 +63,11 @@ def draw_comparison(flights: Sequence[Flight]) -> Figure:
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9)
     return figure
+
+
+def _steps_are_felt(flights: Sequence[Flight]) -> bool:
+    """Tell whether the modifying force steps anywhere by more than a hundredth of the force."""
+    return any(f.outcome.force_step_N > _FELT * f.outcome.force_N for f in flights)
 
 
 def _draw_step_panels(cases: Sequence[Sequence[Flight]]) -> Figure:
@@ -192,7 +198,7 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
     axes.margins(y=0.18)
     axes.set_ylim(bottom=min(0.0, *lost, *soft))
     axes.set_ylabel("%")
-    axes.legend(fontsize=7, loc="upper right")
+    legend_above(axes, 2)
 
 
 def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -128,7 +128,7 @@ def _drawn(
         axes.set_ylabel(label, fontsize=9)
         axes.grid(alpha=0.25)
         if len(lines) > 1 or lines[0][1] not in label:
-            axes.legend(fontsize=7, loc="best", ncols=len(lines))
+            legend_above(axes, len(lines))
     for axes in list(grid.T.flat)[len(panels) :]:
         axes.set_visible(False)
     for column in range(columns):
@@ -144,3 +144,15 @@ def _drawn(
 def plain(text: str) -> str:
     """Return a user's text as text, where a dollar sign would begin a formula."""
     return text.replace("$", r"\$")
+
+
+def legend_above(axes: Any, columns: int, fontsize: float = 7.0) -> None:
+    """Put a legend above a panel without a title, where it covers no curve."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
+        ncols=columns,
+        fontsize=fontsize,
+        frameon=False,
+        borderaxespad=0.0,
+    )

@@ -12,7 +12,8 @@ from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.choose import Found
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import stage_gaps
-from coupled.gap.summary import in_figures, plain
+from coupled.gap.summary import figure as written
+from coupled.gap.summary import plain
 from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View
@@ -111,7 +112,7 @@ def _headline(k: int, step: Found | None) -> str:
 def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
     side = 1 if gain >= 0.0 else -1
     axes.annotate(
-        f"{gain:.3g}" if abs(gain) < 1000 else f"{gain:.0f}",
+        _short(gain),
         (gain, place),
         textcoords="offset points",
         xytext=(3 * side, 0),
@@ -121,6 +122,13 @@ def _write_gain(axes: Any, place: int, gain: float, weight: str) -> None:
         fontweight=weight,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
     )
+
+
+def _short(gain: float) -> str:
+    """Return a gain without an exponent: a tenth of it is nothing."""
+    if abs(gain) < 1000.0:
+        return "0" if abs(gain) < 0.05 else f"{gain:.3g}"
+    return f"{gain:.0f}"
 
 
 def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> None:
@@ -136,7 +144,10 @@ def _finish_gains(figure: Any, column: Any, rounds: list[dict[str, float]]) -> N
     ticks = [tick for tick in span if left <= tick <= right]
     last.set_xticks(ticks, [f"{tick:,.0f}".replace(",", " ") for tick in ticks], fontsize=8)
     last.minorticks_off()
-    figure.supxlabel("gain on stretches not fitted to, log-likelihood", fontsize=9)
+    figure.supxlabel(
+        f"gain on stretches not fitted to, log-likelihood (logarithmic beyond ±{_LINEAR:g})",
+        fontsize=9,
+    )
     marks = [
         _bar(last, {"color": look.RIGHT}, "found"),
         _bar(last, {"facecolor": "white", "edgecolor": look.RIVAL, "hatch": "////"}, "rival"),
@@ -217,7 +228,7 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
     axes.minorticks_off()
     axes.set_xlim(-0.6, len(names) - 0.4)
     axes.set_xticks(places, ["\n".join(textwrap.wrap(name, 16)) for name in names], fontsize=8)
-    axes.set_ylabel("residual over its noise floor, 1", fontsize=9)
+    axes.set_ylabel("residual over its noise floor, 1 (logarithmic)", fontsize=9)
     axes.set_title(
         "gap from rung to rung\n(black: floor of noise; dotted: explained below it)",
         fontsize=9,
@@ -225,7 +236,13 @@ def _draw_rungs(axes: Any, view: View, gaps: Gaps) -> None:
     )
     axes.grid(alpha=0.25, axis="y")
     if stages:
-        axes.legend(fontsize=8, loc="upper right", frameon=False)
+        axes.legend(
+            fontsize=8,
+            loc="upper left",
+            bbox_to_anchor=(0.0, -0.16),
+            ncols=min(len(stages), 4),
+            frameon=False,
+        )
 
 
 def _numbers(view: View) -> list[tuple[str, str, str]]:
@@ -235,9 +252,10 @@ def _numbers(view: View) -> list[tuple[str, str, str]]:
         lines.append((f"{plain(effect.name)}, p = {effect.probability:.2f}", "", ""))
         for p in effect.parameters:
             interval = "not determined"
-            if p.low is not None and p.high is not None:
-                interval = f"{in_figures(p.name, p.low)} to {in_figures(p.name, p.high)}"
-            lines.append((f"    {p.name}", in_figures(p.name, p.value), interval))
+            if p.found_low is not None and p.found_high is not None:
+                interval = f"{written(p.found_low)} to {written(p.found_high)}"
+            value = f"{written(p.found)} {p.unit}".rstrip()
+            lines.append((f"    {p.key.rpartition('.')[2]}", value, interval))
     return lines
 
 

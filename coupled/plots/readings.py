@@ -59,8 +59,8 @@ def draw_readings(found: CalibrationResult, source: str) -> Figure:
     below.set_xlabel(f"deflection δ, {unit}")
     for axes in (top, below):
         axes.grid(alpha=0.25)
-    many = len(set(readings.label)) > 8
-    top.legend(fontsize=6 if many else 8, ncols=2 if many else 1, loc="upper left")
+    handles, labels_shown = top.get_legend_handles_labels()
+    figure.legend(handles, labels_shown, loc="outside lower center", ncols=3, fontsize=8)
     d_unit = unit_of(found.control)
     s1, bend = line.s1, line.bend
     text = f"S₁ = {plus_minus(s1)} V/{d_unit}\nK = {plus_minus(bend)} {d_unit}/N"

@@ -14,7 +14,7 @@ from coupled.gap.effect import Effect, Signature
 from coupled.gap.fit import touched
 from coupled.gap.library import WHOLE_s
 from coupled.gap.output import Floats, Output
-from coupled.gap.summary import in_figures, plain
+from coupled.gap.summary import change, plain
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_label, style_of, unit_shown
 from coupled.plots.signals import SIGNALS, Scene
@@ -80,7 +80,7 @@ def _draw_effect(figure: Any, view: View, effect: Effect) -> None:
 def _title(view: View, effect: Effect) -> str:
     """Return the effect with its parameters."""
     found = next(e for e in view.diagnosis.effects if e.name == effect.name)
-    numbers = [f"{p.name} = {in_figures(p.name, p.value)}" for p in found.parameters]
+    numbers = [change(p) for p in found.parameters]
     return ", ".join([f"{effect.stage}: {plain(effect.name)}", *numbers])
 
 

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from coupled.authority.stability.limits import gradient_range
+from coupled.authority.stability.limits import filed, gradient_range
 from coupled.authority.stability.planes import KINDS, Kind, Plane
 from coupled.plots.pages import panels
 from coupled.record.channels import ControlName
@@ -19,7 +20,8 @@ from coupled.units import MILLISECOND_s
 
 _FASTEST = 100.0  # 1/s, the ends of the colours
 _LINEAR = 3.0  # 1/s, within which they are even
-_ARM_N_per_d = 500.0  # the stiffness of a pilot's arm unless a run says otherwise
+_ACROSS = 3
+_OWN = "#00a000"
 _LABELS: dict[Kind, str] = {
     "assumed": "host's K̂ over real K",
     "frame": "frame time T, ms",
@@ -39,27 +41,33 @@ _TITLES: dict[Kind, str] = {
 
 
 def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> Figure:
-    """Draw the planes of each control, a row each."""
-    figure, grid = panels(len(planes), len(KINDS), 3.1)
+    """Draw the planes of each control, in rows of three."""
+    rows = -(-len(KINDS) // _ACROSS)
+    figure, grid = panels(rows * len(planes), _ACROSS, 2.9)
     norm = SymLogNorm(_LINEAR, vmin=-_FASTEST, vmax=_FASTEST)
-    for row, (name, of_control) in zip(grid, planes.items(), strict=True):
-        for axes, plane in zip(row, of_control, strict=True):
+    for i, (name, of_control) in enumerate(planes.items()):
+        ours = grid[i * rows : (i + 1) * rows]
+        for axes, plane in zip(ours.flat, of_control, strict=True):
             mesh = _panel(axes, plane, norm)
             _mark_own(axes, rig, plane)
             axes.set_title(f"{name}, {_TITLES[plane.kind]}", fontsize=10)
+        for axes in ours[-1]:
             axes.set_xlabel("structure's bend under the gradient, K·G_T", fontsize=9)
-        scale = figure.colorbar(mesh, ax=list(row), extend="both")
-        scale.set_label("growth, 1/s (red grows)")
+        scale = figure.colorbar(mesh, ax=list(ours.flat), extend="both", aspect=30)
+        scale.set_label(f"growth, 1/s: red grows (logarithmic beyond ±{_LINEAR:g})")
         ticks = [-100, -30, -10, -3, 0, 3, 10, 30, 100]
         scale.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    shown: dict[str, Artist] = {}
+    for axes in grid.flat:
+        handles, labels = axes.get_legend_handles_labels()
+        shown |= dict(zip(labels, handles, strict=True))
+    figure.legend(shown.values(), list(shown), loc="outside lower center", ncols=2, fontsize=9)
     figure.suptitle(f"{rig.name}: where its loops are stable, without friction", fontsize=12)
     return figure
 
 
 def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
-    factor = 1.0 / MILLISECOND_s if plane.kind == "frame" else 1.0
+    factor = _factor(plane)
     y, fine_y = factor * plane.values, factor * plane.fine_values
     mesh = axes.pcolormesh(
         plane.shares,
@@ -84,25 +92,34 @@ def _panel(axes: Axes, plane: Plane, norm: SymLogNorm) -> Any:
     )
     if plane.kind != "assumed":
         axes.set_yscale("log")
-    axes.set_ylabel(_LABELS[plane.kind])
+    scale = "" if plane.kind == "assumed" else "\n(logarithmic)"
+    axes.set_ylabel(_LABELS[plane.kind] + scale)
     return mesh
 
 
 def _mark_own(axes: Axes, rig: Rig, plane: Plane) -> None:
-    """Draw what the rig itself spans."""
-    control = rig.controls[plane.control]
-    bend = control.loader.bend
-    own = {
-        "assumed": control.compensation.bend / bend,
-        "frame": 1.0 / rig.frame_rate / MILLISECOND_s,
-        "hand": _ARM_N_per_d * bend,
-        "servo": control.loader.servo_frequency,
-        "gauge": control.sensing.gauge_frequency,
-        "mass": control.sensing.gauge_mass / control.loader.mass,
-    }[plane.kind]
-    if own == 0.0:
+    """Draw what the rig itself spans; at the edge, with an arrow, where that is off the map."""
+    own = filed(rig, plane.control, plane.kind)
+    low, high = (_factor(plane) * end for end in (plane.values[0], plane.values[-1]))
+    axes.set_ylim(low, high)
+    if own is None:
         return
-    ends = np.array(gradient_range(control)) * bend
+    control = rig.controls[plane.control]
+    ends = np.clip(np.array(gradient_range(control)) * control.loader.bend, *axes.get_xlim())
+    own *= _factor(plane)
+    there = [float(np.clip(own, low, high))] * 2
     label = "the rig's gradients, as filed (hand: a pilot's arm)"
-    axes.plot(ends, [own, own], color="#00a000", linewidth=3.5, label=label)
-    axes.plot(ends, [own, own], "|", color="#00a000", markersize=9, markeredgewidth=2.0)
+    axes.plot(ends, there, color=_OWN, linewidth=3.5, label=label, clip_on=False)
+    axes.plot(ends, there, "|", color=_OWN, markersize=9, markeredgewidth=2.0, clip_on=False)
+    if not low <= own <= high:
+        arrow, side = ("^", 8) if own > high else ("v", -12)
+        axes.plot(ends.mean(), there[0], arrow, color=_OWN, markersize=9, clip_on=False)
+        place = (float(ends[-1]), there[0])
+        axes.annotate(
+            f"{own:.3g}", place, (6, -side), textcoords="offset points", color=_OWN, fontsize=8
+        )
+
+
+def _factor(plane: Plane) -> float:
+    """Return the factor to the unit in which a plane's quantity is drawn."""
+    return 1.0 / MILLISECOND_s if plane.kind == "frame" else 1.0

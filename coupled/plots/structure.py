@@ -126,5 +126,5 @@ def _draw_spectrum(axes: Any, found: _Spectrum, unit: str) -> None:
     at = found.frequency[found.peak]
     axes.plot(at, found.amplitude[found.peak], "o", color=look.WRONG, markersize=4)
     axes.set_xscale("log")
-    axes.set_xlabel("frequency, Hz", fontsize=9)
+    axes.set_xlabel("frequency, Hz (logarithmic)", fontsize=9)
     axes.set_ylabel(f"amplitude, {unit}", fontsize=9)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coupled.blind.trials.result import Score, Share
+from coupled.plots.histories import legend_above
 
 _BLUE, _ORANGE = "#0072b2", "#d55e00"
 
@@ -25,10 +26,10 @@ def draw_score(score: Score) -> Figure:
     wrong = [row.wrong / row.named.of for row in score.power]
     power.plot(ratios, wrong, "x--", color=_ORANGE, label="wrong")
     power.set(xscale="log", ylim=(-0.03, 1.03), ylabel="share of single effects")
-    power.set_xlabel("stage's residual, with the effect over without")
+    power.set_xlabel("stage's residual, with the effect over without (logarithmic)")
     power.set_xticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
     power.minorticks_off()
-    power.legend(frameon=False)
+    legend_above(power, 2, 9.0)
     bins = score.probabilities.bins
     _points(reliability, [row.stated for row in bins], [row.true for row in bins], _BLUE, "")
     reliability.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=(0, (1, 1)))

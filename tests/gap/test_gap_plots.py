@@ -35,7 +35,8 @@ from tests.support.commands import coupled
 from tests.support.gaps import made, nominal_rig
 
 Case = tuple[Rig, Record, tuple[Output, ...]]
-UNIT = re.compile(r", (%|%/s|1|°|°/s|g|N|N/m|m/s|m/s²|mm|mm/s|cm|cm/s|µm|kPa|kPa/s|s|Hz)$")
+UNITS = r"%|%/s|1|°|°/s|g|N|N/m|m/s|m/s²|mm|mm/s|cm|cm/s|µm|kPa|kPa/s|s|Hz"
+UNIT = re.compile(rf", ({UNITS})( \(logarithmic\))?$")
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
+ARM_N_per_d = 500.0  # the stiffness of a pilot's arm unless a run says otherwise
 _POINTS = 41
 _SIMULATED_s = 8.0
 _CLAMP_rad_per_s = 6.0
@@ -38,7 +39,8 @@ class Limit:
     """Where one quantity, at the stiffest gradient, first makes a control unstable.
 
     `stable` says on which side it is stable: `below` or `above` the limit; or `everywhere`
-    or `nowhere` within the values tried, from `least` to `greatest`, and there is none.
+    or `nowhere` within the values tried, from `least` to `greatest`, and there is none. `filed` is
+    the rig's own value, None where its file has none.
     """
 
     kind: Kind
@@ -47,6 +49,16 @@ class Limit:
     theory: float | None
     least: float
     greatest: float
+    filed: float | None = None
+
+    @property
+    def outside(self) -> bool:
+        """Whether the rig's own value lies where the control is unstable."""
+        if self.filed is None or self.stable == "everywhere":
+            return False
+        if self.simulated is None:
+            return True
+        return (self.filed < self.simulated) == (self.stable == "above")
 
 
 @dataclass(frozen=True)
@@ -77,9 +89,29 @@ def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
     """Return a control's limits; its structure must bend."""
     control = rig.controls[name]
     stiffest = gradient_range(control)[1]
-    limits = tuple(_limit(rig, name, kind, stiffest) for kind in KINDS)
+    limits = tuple(
+        replace(_limit(rig, name, kind, stiffest), filed=filed(rig, name, kind)) for kind in KINDS
+    )
     share, growths = stiffest * control.loader.bend, _growths(rig, name, stiffest)
     return StabilityLimits(name, stiffest, share, limits, growths)
+
+
+def filed(rig: Rig, name: ControlName, kind: Kind) -> float | None:
+    """Return what a rig itself has of a plane's quantity, None where its file has none.
+
+    Of a hand's stiffness there is only what a pilot's arm usually has.
+    """
+    control = rig.controls[name]
+    bend, loader, sensing = control.loader.bend, control.loader, control.sensing
+    own = {
+        "assumed": control.compensation.bend / bend,
+        "frame": 1.0 / rig.frame_rate,
+        "hand": ARM_N_per_d * bend,
+        "servo": loader.servo_frequency,
+        "gauge": sensing.gauge_frequency,
+        "mass": sensing.gauge_mass / loader.mass,
+    }[kind]
+    return own or None
 
 
 def gradient_range(control: Control) -> tuple[float, float]:

@@ -29,9 +29,9 @@ _WORDS: dict[Kind, tuple[str, float]] = {
     "assumed": ("K̂/K, free hand", 1.0),
     "frame": ("frame of a digital product, ms", 1.0 / MILLISECOND_s),
     "hand": ("hand's stiffness, K·k", 1.0),
-    "servo": ("servo with the grip held fast, Hz", 1.0),
-    "gauge": ("gauge's amplifier in a hand with K·k = 1, Hz", 1.0),
-    "mass": ("mass between gauge and grip over m, free hand", 1.0),
+    "servo": ("servo, grip held fast, Hz", 1.0),
+    "gauge": ("gauge in a hand with K·k = 1, Hz", 1.0),
+    "mass": ("mass beyond the gauge over m, free hand", 1.0),
 }
 
 
@@ -40,7 +40,7 @@ def print_limits(
 ) -> None:
     """Print the limits of each control at its stiffest gradient, simulated and by theory."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for head in ("", "stable", "simulated", "theory"):
+    for head in ("", "stable", "simulated", "theory", "filed"):
         table.add_column(head, justify="left" if head in ("", "stable") else "right")
     for control in limits:
         unit = unit_of(control.control)
@@ -62,11 +62,14 @@ def print_limits(
 
 def _row(limit: Limit) -> tuple[str, ...]:
     word, factor = _WORDS[limit.kind]
+    own = "–" if limit.filed is None else f"{factor * limit.filed:.3g}"
+    if limit.outside:
+        own = f"[red]{own} unstable[/]"
     if limit.simulated is None:
         ends = f"{factor * limit.least:.3g} to {factor * limit.greatest:.3g}"
-        return f" {word}", limit.stable, f"({ends})", ""
+        return f" {word}", limit.stable, f"({ends})", "", own
     theory = "–" if limit.theory is None else f"{factor * limit.theory:.4g}"
-    return f" {word}", limit.stable, f"{factor * limit.simulated:.4g}", theory
+    return f" {word}", limit.stable, f"{factor * limit.simulated:.4g}", theory, own
 
 
 def write_planes(rig: Rig, planes: Iterable[Plane], path: Path) -> None:
