@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.rigs import say_stale
@@ -16,6 +18,8 @@ from coupled.outputs import Outputs
 
 if TYPE_CHECKING:
     from coupled.flight.manoeuvre import Manoeuvre
+    from coupled.live.dashboard.page import Page
+    from coupled.live.hands import Wishes
     from coupled.live.host import Watcher
     from coupled.live.session import LiveFlight
 
@@ -40,6 +44,9 @@ def live(
         str,
         typer.Option(help="Who moves a simulated loader: pilot (the run's), page or stick."),
     ] = "",
+    axes: Annotated[
+        str, typer.Option(metavar="N,N,N", help="The stick's axes: column, wheel, pedals; − turns.")
+    ] = "1,0,3",
     unmeasured: Annotated[
         bool, typer.Option("--unmeasured", help="The loader at udp:// does not measure δ.")
     ] = False,
@@ -49,6 +56,13 @@ def live(
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="As fast as the loader answers, not in real time.")
     ] = False,
+    dashboard: Annotated[
+        bool, typer.Option("--dashboard", help="Open a page in the browser; see its address.")
+    ] = False,
+    bind: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Where the page is served; loopback only.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0: a free one.")] = 0,
     flightgear: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Send the view to FlightGear.")
     ] = "",
@@ -77,8 +91,12 @@ def live(
 
     if bool(run) == bool(rig):
         raise InputError("coupled live", "", "give a run, or --rig RIG, one of the two")
-    who = hand or ("pilot" if run else "page")
-    flown = run_live(run, case, duration, who) if run else rig_live(rig, duration, who)
+    who = hand or ("pilot" if run else "page" if dashboard else "")
+    if rig and loader == "sim" and who not in ("page", "stick"):
+        raise InputError(rig, "--hand", "is missing: page, with --dashboard, or stick")
+    if who == "page" and not dashboard:
+        raise InputError("--hand", "page", "needs --dashboard")
+    flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)
     path = output or Path("out") / f"{flown.name}.csv"
     check_suffix(path)
     inputs = _inputs(flown)
@@ -87,32 +105,95 @@ def live(
     check_json(json_file, [*inputs, path, manifest_path(path)])
     say_stale(flown.rig)
     limits = Limits(_positive("--force-limit", force_limit), _positive("--rate-limit", rate_limit))
-    watchers: list[Watcher] = []
-    if flightgear:
-        watchers.append(_flightgear(flightgear))
-    link = open_link(loader, flown.rig, lockstep, not unmeasured)
-    keys = Keys()
-    plan = Plan(
-        paced=not lockstep,
-        link=link,
-        limits=limits,
-        adapt=adapt,
-        watchers=[*watchers, keys],
-        warn=lambda text: err.print(f"[yellow]{text}[/]"),
-    )
-    try:
+    warn = _Warner()
+    with ExitStack() as ending:
+        keys = Keys()
+        ending.callback(keys.close)
+        watchers: list[Watcher] = [keys]
+        if flightgear:
+            watchers.append(_flightgear(flightgear))
+        page = _page(flown, bind, port, ending) if dashboard else None
+        if page is not None:
+            watchers.append(page)
+            warn.page = page
+        plan = Plan(
+            paced=not lockstep,
+            link=open_link(loader, flown.rig, lockstep, not unmeasured),
+            wishes=_wishes(who, loader, axes, page),
+            limits=limits,
+            adapt=adapt,
+            watchers=watchers,
+            warn=warn,
+            save=lambda record: write_record(record, _so_far(path)),
+        )
         flight = fly_live(flown, plan)
-    finally:
-        keys.close()
-    with Outputs() as outputs:
-        write_record(flight.record, outputs.at(path))
-        keep_json(flight.record.manifest["live"], json_file, outputs)
-    if json_file != "-":
-        _print(flight, path)
-    print_json(flight.record.manifest["live"], json_file)
+        with Outputs() as outputs:
+            write_record(flight.record, outputs.at(path))
+            keep_json(flight.record.manifest["live"], json_file, outputs)
+        if json_file != "-":
+            _print(flight, path)
+        print_json(flight.record.manifest["live"], json_file)
+        if page is not None:
+            _finish(page, flight, path)
     if flight.record.ended_early:
         err.print(f"[yellow]ended early:[/] {flight.record.ended_early}; the record is kept")
         raise typer.Exit(1)
+
+
+class _Warner:
+    """Says a warning on the terminal, and on the page where there is one."""
+
+    def __init__(self) -> None:
+        self.page: Page | None = None
+
+    def __call__(self, text: str) -> None:
+        err.print(f"[yellow]{escape(text)}[/]", soft_wrap=True)
+        if self.page is not None:
+            self.page.warn(text)
+
+
+def _so_far(path: Path) -> Path:
+    """Return where a record is written while the flight goes on."""
+    return path.with_name(f"{path.stem}-so-far{path.suffix}")
+
+
+def _page(flown: Manoeuvre, address: str, port: int, ending: ExitStack) -> Page:
+    """Open the page, and print where it is."""
+    from coupled.live.attach import needs
+
+    for package in ("starlette", "uvicorn", "websockets"):
+        needs(package, "--dashboard")
+    from coupled.live.dashboard.page import Page
+
+    page = Page([str(name) for name in flown.rig.controls], address, port)
+    ending.callback(page.end)
+    say(f"page: {page.url}")
+    return page
+
+
+def _wishes(who: str, loader: str, axes: str, page: Page | None) -> Wishes | None:
+    """Return what moves the hands of a simulated loader; None for a run's pilots."""
+    if loader != "sim" or who == "pilot":
+        return None
+    if who == "stick":
+        from coupled.live.attach import needs
+
+        needs("pygame", "--hand stick")
+        from coupled.live.stick import Stick
+
+        return Stick(axes)
+    return page
+
+
+def _finish(page: Page, flight: LiveFlight, path: Path) -> None:
+    """Show on the page what was flown, held against its rig, until its user leaves."""
+    from coupled.live.verdict import diagnosed
+
+    page.finish(phase="diagnosing", record=str(path))
+    page.finish(phase="done", diagnosis=diagnosed(flight))
+    say("the page stays open until it is closed there, or by Ctrl-C")
+    with suppress(KeyboardInterrupt):
+        page.wait()
 
 
 def _positive(option: str, value: float) -> float:

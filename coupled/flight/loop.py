@@ -8,9 +8,9 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, Protocol
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.bench import Airframe, Bench
+from coupled.flight.companion import Aboard, Companion
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.gusts import Gusts
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
-from coupled.flight.pilot.base import Start
+from coupled.flight.pilot.base import Look, Start
 from coupled.flight.served import Served
 from coupled.record.channels import (
     ALTITUDE,
@@ -39,46 +40,12 @@ from coupled.rig.compiled import bound
 from coupled.rig.control import ControlArray
 from coupled.rig.equations import specified_gradient
 from coupled.rig.frame import addresses, step_frame_at
-from coupled.rig.packing import Hand, pack
+from coupled.rig.packing import pack
 from coupled.rig.recorder import lateness, stamp
 from coupled.timing import timed
 
 Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Aboard:
-    """A flight's arrays, which who goes along may read and change between frames.
-
-    controls  the rig's controls as the kernels hold them, shape (n,)
-    script    the hands' force in N and held deflection on all nodes, shape (n, 2, nodes)
-    data      the record, shape (frames, channels); rows to come hold noise
-    hands     what each pilot's hand is, by the control
-    """
-
-    manoeuvre: Manoeuvre
-    airframe: Airframe
-    channels: tuple[str, ...]
-    controls: ControlArray
-    script: Floats
-    data: Floats
-    hands: dict[str, Hand]
-
-
-class Companion(Protocol):
-    """Who goes along with a flight, frame by frame: a live host."""
-
-    elsewhere: bool  # hand and loader are real: the rig's are not simulated
-
-    def board(self, aboard: Aboard) -> None:
-        """Begin, with the aircraft in trim."""
-
-    def before(self, k: int, motion: tuple[float, ...]) -> str:
-        """Do what precedes frame k; return why the flight is to end, or an empty string."""
-
-    def after(self, k: int, commands: tuple[float, float, float]) -> None:
-        """Take the surface commands of frame k before the aircraft has them."""
 
 
 def fly(
@@ -107,8 +74,7 @@ def fly(
     script = _script(names, actions, frames * substeps + 1, h)
     data = _noise(channels, rig.noise, frames, manoeuvre.seed)
     noise = data.copy() if lateness(rig) else None
-    hands = controls["state"]["hand"]
-    looks = [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
+    looks = _looks(controls, names, actions)
     served = Served(manoeuvre, controls)
     extra: list[tuple[float, ...]] = []
 
@@ -120,7 +86,10 @@ def fly(
     ended: EndedEarly | None = None
     done = 0
     if companion is not None:
-        companion.board(Aboard(manoeuvre, airframe, channels, controls, script, data, grips))
+        so_far = partial(_so_far, manoeuvre, channels, (data, noise), (served, extra))
+        companion.board(
+            Aboard(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
+        )
     try:
         with timed("fly"):
             for k in range(frames):
@@ -148,6 +117,26 @@ def fly(
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
     return _flown(manoeuvre, channels, (data[:done], noise), (served, extra), ended)
+
+
+def _looks(
+    controls: ControlArray, names: Sequence[str], actions: dict[ControlName, Action]
+) -> list[tuple[Any, Look]]:
+    """Return the hands whose pilots look at the motion, and how each looks."""
+    hands = controls["state"]["hand"]
+    return [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
+
+
+def _so_far(
+    manoeuvre: Manoeuvre,
+    channels: tuple[str, ...],
+    flown: tuple[Floats, Floats | None],
+    beside: tuple[Served, Sequence[tuple[float, ...]]],
+    rows: int,
+) -> Record:
+    """Return the record of the first rows of a flight that goes on."""
+    data, noise = flown
+    return _flown(manoeuvre, channels, (data[:rows].copy(), noise), beside, None)
 
 
 def _flown(

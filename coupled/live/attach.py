@@ -10,6 +10,7 @@ from coupled.api.rigs import load_rig
 from coupled.errors import InputError, nearest
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.runfile import read_run
+from coupled.live.brunner import open_cls2sim
 from coupled.live.hands import LiveHand
 from coupled.live.link import Link, split_address
 from coupled.live.udp import UdpLink
@@ -33,6 +34,8 @@ def open_link(url: str, rig: Rig, lockstep: bool, deflection: bool) -> Link | No
     """
     if url == "sim":
         return None
+    if url.startswith("cls2sim://"):
+        return open_cls2sim(url, rig)
     scheme, host, port = split_address(url)
     if scheme == "udp":
         return UdpLink(host, port, rig, deflection, lockstep)
@@ -57,13 +60,13 @@ def run_live(run: str, case: str, duration_s: float | None, hand: str) -> Manoeu
     return flown
 
 
-def rig_live(rig: str, duration_s: float | None, hand: str) -> Manoeuvre:
+def rig_live(rig: str, duration_s: float | None) -> Manoeuvre:
     """Return a rig under a live hand on each control, to be flown until it is stopped.
 
     It ends after `duration_s`, two hours unless given. A bench has the q̄ of its schedule's
     middle. Raises InputError.
     """
-    _check(duration_s, hand)
+    _check(duration_s, "page")
     loaded, bench = load_rig(rig), None
     if loaded.flight is None:
         pressures = next(iter(loaded.controls.values())).schedule.dynamic_pressure

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.loop import Aboard
+from coupled.flight.companion import Aboard
 from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, WATCHDOG_s
 from coupled.live.safety import Fade, Limiter, Limits
 from coupled.record.channels import channel
@@ -19,6 +19,7 @@ from coupled.rig.frame import addresses, step_frame_at
 
 ANSWER_s = 10.0  # how long the host waits for a loader's first answer
 GONE_s = 30.0  # and for one again, before the flight ends
+AT_REST = 0.25  # of the travel: within it a control rests, before a flight
 GONE = f"the loader has not answered for {GONE_s:g} s"
 _IDLE = Order(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -42,7 +43,7 @@ class Attached:
         paced: bool,
         warn: Callable[[str], None],
     ) -> None:
-        rig = aboard.manoeuvre.rig
+        self._rig = rig = aboard.manoeuvre.rig
         self.link, self._aboard, self._paced, self._warn = link, aboard, paced, warn
         self.frame_s = 1.0 / rig.frame_rate
         self._limiters = [Limiter(limits, c.travel, self.frame_s) for c in rig.controls.values()]
@@ -71,6 +72,7 @@ class Attached:
                 problem = f"does not answer within {ANSWER_s:g} s; start the loader first"
                 raise InputError(self.link.name, "", problem)
         self._take(sample.controls)
+        self._check_rest()
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
         place = addresses(controls, self._aboard.script, row, elsewhere=True)
@@ -86,6 +88,16 @@ class Attached:
             self.listen(0.0)
             if time.monotonic() - self._seen > ANSWER_s:
                 problem = "has stopped answering while its forces came in"
+                raise InputError(self.link.name, "", problem)
+
+    def _check_rest(self) -> None:
+        """Refuse to let forces into a control that stands far from its trim."""
+        for (name, control), now in zip(self._rig.controls.items(), self._measured, strict=True):
+            if abs(now.computed) > AT_REST * control.travel:
+                share = 100.0 * now.computed / control.travel
+                problem = (
+                    f"the {name} stands at {share:.0f} % of its travel; let it rest at neutral"
+                )
                 raise InputError(self.link.name, "", problem)
 
     def _wait_frame(self) -> None:
@@ -133,18 +145,19 @@ class Attached:
         share, orders = self._fade.move(not self.lost), []
         for i, limiter in enumerate(self._limiters):
             m = controls["state"]["modification"][i]
+            own = self.link.own_load(i, self._measured[i].computed)
             asked = Order(
                 float(m["first"]),
                 float(m["second"]),
                 float(m["break_computed"]),
                 float(m["breakout"]),
-                float(row[self._force_at[i]]),
+                float(row[self._force_at[i]]) + own,
                 float(row[self._gradient_at[i]]),
                 0.0,
             )
             sent = limiter.order(asked, share)
             orders.append(sent)
-            row[self._force_at[i]] = sent.force
+            row[self._force_at[i]] = sent.force - own
             row[self._deflection_at[i]] = self._measured[i].deflection
         self._orders = tuple(orders)
         self.link.send(self._orders, RUN if share == 1.0 else FADING if share > 0.0 else OFF)

@@ -7,6 +7,8 @@ frame. After it the orders go to the loader, and what was flown to estimate, vie
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
@@ -14,15 +16,18 @@ from typing import Any, Protocol
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.loop import Aboard
+from coupled.flight.companion import Aboard
 from coupled.live.attached import Attached
 from coupled.live.hands import Follower, Wishes
 from coupled.live.link import Link
+from coupled.live.measured import only_measured
 from coupled.live.pacing import Pacer
 from coupled.live.safety import Limits
 from coupled.live.service import Adaptation, BendEstimator
 from coupled.live.switches import Switches
 from coupled.record.channels import channel
+from coupled.record.record import Record
+from coupled.rig.serving import check_led, lead, led, services_of
 
 STOPPED = "stopped"
 Motion = tuple[float, ...]
@@ -30,7 +35,10 @@ Motion = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Word:
-    """A word of the user: `stop`, `mark` with a `text`, `set` of the switch `text`, `event`."""
+    """A word of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
+
+    `text` names the switch or the service, of a `control`; it is also a mark's text.
+    """
 
     what: str
     text: str = ""
@@ -60,8 +68,8 @@ class Plan:
 
     `paced` is real time, else lock-step: as fast as the loader answers. `link` is a real loader;
     without it `wishes` moves the hands on the simulated one. `adapt` gives K of service to the
-    compensation. `warn` hears what a pilot must know at once. `triggers` are events that a user
-    may let happen, by name.
+    compensation. `warn` hears what a pilot must know at once; `save` takes a record so far, in a
+    thread.
     """
 
     paced: bool = True
@@ -71,7 +79,7 @@ class Plan:
     adapt: bool = False
     watchers: Sequence[Watcher] = ()
     warn: Callable[[str], None] = lambda text: None
-    triggers: dict[str, Callable[[], None]] = field(default_factory=dict)
+    save: Callable[[Record], None] | None = None
 
 
 @dataclass
@@ -79,7 +87,7 @@ class Happened:
     """What was done and found on a live flight; times in s."""
 
     marks: list[tuple[float, str]] = field(default_factory=list)
-    events: list[tuple[float, str]] = field(default_factory=list)
+    led: list[tuple[float, str, str, float]] = field(default_factory=list)  # control, service, to
     alarms: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K
     adapted: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K̂
 
@@ -94,6 +102,7 @@ class Host:
         self.attached: Attached | None = None
         self.time_s = 0.0
         self.aboard: Aboard | None = None
+        self._saving: threading.Thread | None = None
 
     def board(self, aboard: Aboard) -> None:
         """Begin, with the aircraft in trim: meet the loader and let its forces in."""
@@ -140,16 +149,67 @@ class Host:
         return ""
 
     def _obey(self, word: Word) -> None:
-        if word.what == "mark":
+        if word.what == "save":
+            self._save()
+        elif word.what == "mark":
             self.happened.marks.append((self.time_s, word.text[:200]))
-        elif word.what == "event" and word.text in self.plan.triggers:
-            self.plan.triggers[word.text]()
-            self.happened.events.append((self.time_s, word.text))
+        elif word.what == "lead":
+            self._lead_service(word)
         elif word.what == "set":
             try:
                 self.switches.set(self.time_s, word.control, word.text, word.value)
             except InputError as error:
                 self.plan.warn(str(error))
+
+    def _lead_service(self, word: Word) -> None:
+        """Lead a service of a simulated loader, as an event of a run does."""
+        assert self.aboard is not None
+        control, service, value = word.control, word.text, word.value
+        try:
+            if self.elsewhere:
+                raise InputError("service", service, "is the real loader's own; ask for it there")
+            check_led(self.switches.rig, control, service, value, "service", service)
+        except InputError as error:
+            self.plan.warn(str(error))
+            return
+        lead(self.aboard.controls, self.names, control, service, value)
+        self.happened.led.append((self.time_s, control, service, value))
+
+    def services(self) -> dict[str, dict[str, float]]:
+        """Return what may be led of each simulated control, and how it stands."""
+        if self.elsewhere or self.aboard is None:
+            return {}
+        found: dict[str, dict[str, float]] = {}
+        for name in self.names:
+            for service in services_of(name):
+                with contextlib.suppress(InputError):
+                    check_led(self.switches.rig, name, service, 0.0, "service", service)
+                    stands = led(self.aboard.controls, self.names, name, service)
+                    found.setdefault(name, {})[service] = stands
+        return found
+
+    def _save(self) -> None:
+        """Let the record so far be written, beside the flight."""
+        rows, save, aboard = round(self.time_s / self.frame_s), self.plan.save, self.aboard
+        if save is not None and aboard is not None and rows > 1:
+
+            def write() -> None:
+                save(self.kept(aboard.so_far(rows), stopped=True))
+
+            self._saving = threading.Thread(target=write)
+            self._saving.start()
+
+    def kept(self, record: Record, stopped: bool) -> Record:
+        """Return a record with what its manifest says of the live flight.
+
+        A flight that was `stopped` by its user has not ended early.
+        """
+        manifest: dict[str, Any] = {**record.manifest, "live": self.as_dict()}
+        manifest["live"]["stopped"] = stopped
+        if stopped:
+            manifest["ended_early"] = None
+        kept = Record(record.channels, record.data, manifest)
+        return only_measured(kept, self.plan.link, self.names) if self.plan.link else kept
 
     def _lead(self, wishes: Wishes, k: int) -> None:
         """Write the hands' way over the frame to come."""
@@ -188,6 +248,8 @@ class Host:
     def farewell(self) -> None:
         """Fade the loader's forces out, and end what looks on; called however a flight ended."""
         try:
+            if self._saving is not None:
+                self._saving.join()
             if self.attached is not None:
                 self.attached.farewell()
             elif self.plan.link is not None:

@@ -72,6 +72,12 @@ class Link(Protocol):
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest valid sample since the last call, waiting for one so long at most."""
 
+    def own_load(self, i: int, computed: float) -> float:
+        """Return the load at δc in d that control i's loader leaves to the host, N.
+
+        0 for a loader with a spring of its own. It is asked once a frame.
+        """
+
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
         """Send the orders of a frame; `mode` says whether forces are on, fading or off."""
 

@@ -108,6 +108,14 @@ class Pacer:
         self._begun = now
         self._frames = k + 1
 
+    def recent(self) -> dict[str, Any]:
+        """Return the figures of the last minute or so, for the page."""
+        done, span = self._frames, 8192
+        first = max(0, done - span)
+        work = self._work[first : max(done - 1, first)]
+        late = self._late[first:done]
+        return Lateness(late, work, self.missed, 1e3 * self._frame_s).as_dict()
+
     def result(self) -> Lateness:
         """Return how late the frames were so far."""
         done = self._frames

@@ -101,6 +101,10 @@ class UdpLink:
             raise BadPacketError("answers older orders")
         return sample
 
+    def own_load(self, i: int, computed: float) -> float:
+        """Return 0: the loader has its basic gradient, damping and breakout itself."""
+        return 0.0
+
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
         """Send the orders of a frame; a wire that takes none drops them."""
         self._sequence = (self._sequence + 1) % (1 << 32)

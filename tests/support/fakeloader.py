@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 import os
+import socket
+import struct
 import sys
 from collections.abc import Sequence
 
@@ -27,6 +29,8 @@ from coupled.rig.compiled import entry
 
 Floats = NDArray[np.float64]
 RIG = "report-column"
+COUNTS = 100.0  # of CLS2Sim to a newton; the fake's own, since no source gives the real one
+PROFILE_N_per_m, BASIC_N_per_m = 1000.0, 560.4
 NOISE = (0.15, 2e-5, 2e-5)  # standard deviations of F, δc and δ
 
 
@@ -56,6 +60,7 @@ class Twin:
 
     def __init__(self, given: dict[str, float]) -> None:
         self._hand, noise = given.pop("hand", 40.0), given.pop("noise", 1.0)
+        rests = given.pop("rests", 0.0)
         self._dies = given.pop("dies", math.inf)
         rig = load_rig(RIG)
         twin = nominal_twin(rig)
@@ -64,8 +69,10 @@ class Twin:
         self._frame_s = 1.0 / rig.frame_rate
         self._noise, self._random = noise * np.array(NOISE), np.random.default_rng(7)
         self.frames = 0
+        self._offset = 0.0
         self._force = self._grip = 0.0
         self.travel = rig.controls["column"].travel
+        self._state["x"] = rests * self.travel
         advance(self._numbers, self._state.copy(), np.zeros(NODES + 1), np.zeros(4))
 
     def hand(self, t: Floats) -> Floats:
@@ -81,9 +88,20 @@ class Twin:
         if t[0] >= self._dies:
             os._exit(9)
         force = self.hand(t)
-        self._grip = advance(self._numbers, self._state, force, np.array(order[:4]))
+        both = force + self._offset  # the motor's acts with the hand's, but bends nothing
+        grip = advance(self._numbers, self._state, both, np.array(order[:4]))
+        self._grip = grip - float(self._numbers["bend"][0]) * self._offset
         self._force = float(force[-1])
         self.frames += 1
+
+    def bare(self) -> None:
+        """Take the loader's own spring and damping away: the host makes the whole load."""
+        self._numbers["basic_gradient"] = self._numbers["damping"] = 0.0
+
+    def push(self, force_N: float) -> None:
+        """Run a frame under a force of the motor, held over it."""
+        self._offset = force_N
+        self.run((0.0, 0.0, 0.0, 0.0))
 
     def measured(self) -> tuple[float, float, float]:
         """Return F, δc and δ as measured."""
@@ -107,11 +125,67 @@ def serve_udp(port: int, twin: Twin) -> None:
         quiet = 0 if heard else quiet + 1
 
 
+def serve_cls2sim(port: int, twin: Twin) -> None:
+    """Be CLS2Sim's external control over UDP, with COUNTS to a newton; a frame a request.
+
+    The hardware has no spring: the host's force moves mass and damping, and it gives positions
+    from 0 to 1.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+        wire.bind(("127.0.0.1", port))
+        wire.settimeout(10.0)
+        print("ready", wire.getsockname()[1], flush=True)
+        twin.bare()
+        while True:
+            try:
+                packet, host = wire.recvfrom(512)
+            except TimeoutError:
+                return
+            if len(packet) != 20:
+                continue
+            command, elevator, *_ = struct.unpack("<i4i", packet)
+            if command == 0xAF:
+                twin.push(elevator / COUNTS)
+                share = 0.5 + 0.5 * twin.measured()[1] / twin.travel
+                wire.sendto(struct.pack("<i4f", 0xAF, share, 0.5, 0.5, 0.5), host)
+
+
+def serve_v2(port: int, twin: Twin) -> None:
+    """Be CLS2Sim's protocol v2 over TCP: force and position are read, the profile is scaled."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as door:
+        door.bind(("127.0.0.1", port))
+        door.listen(1)
+        print("ready", door.getsockname()[1], flush=True)
+        wire, _ = door.accept()
+        wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    scale, asked = 100, b""
+    while packet := wire.recv(4096):
+        asked += packet
+        while len(asked) >= 12:
+            command, _, what = struct.unpack_from("<3I", asked)
+            size = 14 if command == 0xCE else 12
+            if len(asked) < size:
+                break
+            body, asked = asked[12:size], asked[size:]
+            if command == 0xD0:
+                if what == 0x20:  # the first of a frame's two questions
+                    gradient = PROFILE_N_per_m * scale / 100.0 - BASIC_N_per_m
+                    twin.run((gradient, gradient, 0.0, 0.0))
+                    value = struct.pack("<i", round(COUNTS * twin.measured()[0]))
+                else:
+                    value = struct.pack("<f", twin.measured()[1] / twin.travel)
+                wire.sendall(struct.pack("<HBH", 9, 0, 1) + value)
+            else:
+                if command == 0xCE:
+                    (scale,) = struct.unpack("<H", body)
+                wire.sendall(struct.pack("<HB", 3, 0))
+
+
 def main() -> None:
     """Read the command line, and serve."""
     kind, port, *words = sys.argv[1:]
     given = {name: float(value) for name, _, value in (word.partition("=") for word in words)}
-    serve = {"udp": serve_udp}[kind]
+    serve = {"udp": serve_udp, "cls2sim": serve_cls2sim, "v2": serve_v2}[kind]
     serve(int(port), Twin(given))
 
 

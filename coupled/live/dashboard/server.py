@@ -1,0 +1,215 @@
+"""The page's process: HTTP for its files, a websocket for what is flown and what is asked for.
+
+It binds to loopback unless given another address. Every request needs the token of this flight; a
+websocket must come from the page itself (its Origin is the address that it is served at). What a
+browser asks for is checked here, and once more by the host.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import secrets
+import signal
+import socket
+import threading
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from coupled.live.dashboard.board import Board
+
+STATIC = Path(__file__).parent / "static"
+FILES = {
+    "": ("index.html", "text/html; charset=utf-8"),
+    "live.js": ("live.js", "text/javascript; charset=utf-8"),
+    "drawing.js": ("drawing.js", "text/javascript; charset=utf-8"),
+    "live.css": ("live.css", "text/css; charset=utf-8"),
+    "uplot.js": ("uPlot.iife.min.js", "text/javascript; charset=utf-8"),
+    "uplot.css": ("uPlot.min.css", "text/css; charset=utf-8"),
+}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; connect-src 'self'; style-src 'self'"
+    " 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+RATE_Hz = 60.0
+MOST_VIEWERS = 8
+LARGEST_bytes = 2048
+WORDS = ("stop", "mark", "set", "lead", "save", "hand", "leave")
+
+
+@dataclass(frozen=True)
+class Door:
+    """Where the page is served, and the token that opens it."""
+
+    address: str
+    port: int
+    token: str
+
+    @property
+    def url(self) -> str:
+        """Return what a user opens."""
+        shown = f"[{self.address}]" if ":" in self.address else self.address
+        return f"http://{shown}:{self.port}/?token={self.token}"
+
+
+def word_of(text: str) -> dict[str, Any] | None:
+    """Return what a browser asked for, or None for what is no word of the page."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(found, dict) or found.get("what") not in WORDS:
+        return None
+    plain: dict[str, Any] = {"what": found["what"]}
+    for key in ("text", "control"):
+        value = found.get(key, "")
+        if not isinstance(value, str) or len(value) > 200:
+            return None
+        plain[key] = value
+    value = found.get("value", 0.0)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        return None
+    return plain | {"value": float(value)}
+
+
+class Server:
+    """The application: one flight's page."""
+
+    def __init__(self, door: Door, board: Board, host: Connection, width: int) -> None:
+        self._door, self._board, self._host, self._width = door, board, host, width
+        self._viewers = 0
+        self._handed = asyncio.Lock()
+
+    def app(self) -> Starlette:
+        """Return the application."""
+        routes = [
+            Route("/{name:path}", self.file, methods=["GET"]),
+            WebSocketRoute("/ws", self.socket),
+        ]
+        return Starlette(routes=list(reversed(routes)))
+
+    def _known(self, token: str) -> bool:
+        return secrets.compare_digest(token.encode(), self._door.token.encode())
+
+    def _own_host(self, host: str) -> bool:
+        """Tell whether a request names this server: a page elsewhere cannot borrow its name."""
+        name = host.rpartition(":")[0].strip("[]")
+        if self._door.address in ("0.0.0.0", "::"):
+            return bool(name)
+        return name in {self._door.address, "localhost", "127.0.0.1", "::1"}
+
+    async def file(self, request: Request) -> Response:
+        """Serve one of the page's files."""
+        name = request.path_params["name"]
+        if not self._own_host(request.headers.get("host", "")):
+            return PlainTextResponse("another host", 403, HEADERS)
+        if not self._known(request.query_params.get("token", "")):
+            problem = "No token, or another flight's. Open the whole line that was printed."
+            return PlainTextResponse(problem, 403, HEADERS)
+        if name not in FILES:
+            return PlainTextResponse("no such file", 404, HEADERS)
+        file, kind = FILES[name]
+        body = (STATIC / file).read_text(encoding="utf-8")
+        if name == "":
+            body = body.replace("TOKEN", self._door.token)
+        return Response(body, media_type=kind, headers=HEADERS)
+
+    async def socket(self, socket: WebSocket) -> None:
+        """Send what is flown 60 times a second, and take what is asked for."""
+        host = socket.headers.get("host", "")
+        own = self._own_host(host) and socket.headers.get("origin") == f"http://{host}"
+        if not own or not self._known(socket.query_params.get("token", "")):
+            await socket.close(1008)
+            return
+        if self._viewers >= MOST_VIEWERS:
+            await socket.close(1013)
+            return
+        await socket.accept()
+        self._viewers += 1
+        sender = asyncio.create_task(self._send(socket))
+        held: set[str] = set()
+        try:
+            while True:
+                word = word_of(await socket.receive_text())
+                if word is not None:
+                    if word["what"] == "hand":
+                        held.add(word["control"])
+                    self._pass(word)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._viewers -= 1
+            sender.cancel()
+            for control in held:  # who has gone holds nothing
+                self._pass({"what": "hand", "text": "", "control": control, "value": 0.0})
+
+    def _pass(self, word: dict[str, Any]) -> None:
+        with contextlib.suppress(OSError):
+            self._host.send_bytes(json.dumps(word).encode())
+
+    async def _send(self, socket: WebSocket) -> None:
+        seen, count = -1, 0
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                seen, state = self._board.state(seen)
+                if state:
+                    await socket.send_text(state)
+                count, rows = self._board.rows(count, self._width)
+                if len(rows):
+                    await socket.send_bytes(rows.astype(np.float32).tobytes())
+                await asyncio.sleep(1.0 / RATE_Hz)
+
+
+def bind(address: str, port: int) -> socket.socket:
+    """Return a listening socket; raises OSError."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    wire = socket.socket(family, socket.SOCK_STREAM)
+    wire.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    wire.bind((address, port))
+    wire.listen(64)  # before its address is given away
+    return wire
+
+
+def serve(address: str, port: int, token: str, memory: Any, host: Connection, width: int) -> None:
+    """Be the page's process: say where it is, serve it, and end when the host has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's
+    try:
+        wire = bind(address, port)
+    except OSError as error:
+        host.send_bytes(json.dumps({"problem": error.strerror or str(error)}).encode())
+        return
+    door = Door(address, int(wire.getsockname()[1]), token)
+    app = Server(door, Board(memory), host, width).app()
+    config = uvicorn.Config(
+        app,
+        log_level="critical",
+        ws="websockets-sansio",
+        ws_max_size=LARGEST_bytes,
+        timeout_graceful_shutdown=1,
+        lifespan="off",
+    )
+    server = uvicorn.Server(config)
+
+    def watch() -> None:
+        with contextlib.suppress(OSError, EOFError):
+            host.recv_bytes()
+        server.should_exit = True
+
+    threading.Thread(target=watch, daemon=True).start()
+    host.send_bytes(json.dumps({"url": door.url}).encode())
+    asyncio.run(server.serve(sockets=[wire]))

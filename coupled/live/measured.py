@@ -1,0 +1,50 @@
+"""What a rig is to a host whose loader is real: its readings are measured, not simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.live.hands import LiveHand
+from coupled.live.link import Link
+from coupled.record.channels import channel
+from coupled.record.record import Record
+from coupled.rig.parameters import Sensing
+
+
+def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
+    """Return the manoeuvre as a host flies it whose loader is real.
+
+    What simulates the loader's electronics, its gauge and its noise, is left out: the readings
+    have their own.
+    """
+    rig = manoeuvre.rig
+    neutral: dict[str, Any] = {"noise": {}}
+    for name, control in rig.controls.items():
+        kept = {key: getattr(control.sensing, key) for key in ("s1", "s2", "s3", "full_scale")}
+        neutral[f"controls.{name}.sensing"] = Sensing().model_copy(update=kept)
+        neutral |= {f"controls.{name}.loader.{key}": 0.0 for key in _MULTIPLIER}
+    pilots = dict.fromkeys(rig.controls, LiveHand(real=True))
+    return replace(manoeuvre, rig=rig.changed(neutral), pilots=pilots)
+
+
+_MULTIPLIER = ("multiplier_offset_N", "multiplier_drift_N_per_s")
+
+
+def only_measured(record: Record, link: Link, controls: Sequence[str]) -> Record:
+    """Return a record without what its loader did not measure."""
+    lacking: set[str] = set()
+    for name in controls:
+        lacking |= {channel(name, "force_step"), channel(name, "stop"), channel(name, "hand_force")}
+        if not link.measures_force:
+            lacking.add(channel(name, "force"))
+        if not link.measures_deflection:
+            lacking.add(channel(name, "deflection"))
+    kept = [i for i, name in enumerate(record.channels) if name not in lacking]
+    names = tuple(record.channels[i] for i in kept)
+    manifest = {**record.manifest, "channels": list(names)}
+    return Record(names, np.ascontiguousarray(record.data[:, kept]), manifest)

@@ -1,0 +1,67 @@
+"""CLS2Sim's connection, by TCP or UDP, and what a user has to say of the loader behind it."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+from dataclasses import dataclass
+
+from coupled.errors import InputError
+from coupled.live.udp import resolved
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a user has to say of a loader, for which no source has it.
+
+    counts_per_N  the protocol's number for a newton; negative where it counts the other way
+    turn          the controls whose position counts the other way
+    profile       gradient of the loader's own force profile, N/d, at `scale`; v2 only
+    """
+
+    counts_per_N: float
+    turn: frozenset[str] = frozenset()
+    profile: float = 0.0
+    scale: float = 0.0
+
+
+class Transport:
+    """A connection by TCP or UDP; bytes that came, in their order."""
+
+    def __init__(self, kind: str, host: str, port: int, name: str) -> None:
+        family, address = resolved(host, port, name)
+        self._stream = kind == "tcp"
+        self._socket = socket.socket(
+            family, socket.SOCK_STREAM if self._stream else socket.SOCK_DGRAM
+        )
+        self._socket.settimeout(3.0)
+        try:
+            self._socket.connect(address)
+        except OSError as error:
+            self._socket.close()
+            problem = f"does not answer: {error.strerror or error}; start CLS2Sim first"
+            raise InputError(name, "", problem) from None
+        if self._stream:
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.setblocking(False)
+
+    def send(self, packet: bytes) -> None:
+        """Send; a wire that takes none drops it."""
+        with contextlib.suppress(OSError):
+            self._socket.send(packet)
+
+    def receive(self) -> bytes:
+        """Return a datagram, or what came of the stream; nothing where nothing did."""
+        try:
+            return self._socket.recv(4096)
+        except OSError:
+            return b""
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something comes, so long at most."""
+        select.select([self._socket], [], [], max(0.0, seconds))
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()

@@ -1,0 +1,140 @@
+"""Who flies live: a stick's axes, and a hand that goes where the stick says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from coupled.errors import InputError
+from coupled.live.attach import rig_live, run_live
+from coupled.live.hands import Follower
+from coupled.live.host import Host, Plan, Word
+from coupled.live.session import fly_live
+from coupled.live.stick import Stick, axes_of
+
+
+class Device:
+    """A stick of three axes."""
+
+    def __init__(self) -> None:
+        self.places = [0.25, -0.5, 0.01]
+
+    def get_name(self) -> str:
+        return "a device"
+
+    def get_numaxes(self) -> int:
+        return len(self.places)
+
+    def get_axis(self, number: int, /) -> float:
+        return self.places[number]
+
+
+def test_axes_are_taken_by_number_and_turned_by_a_minus() -> None:
+    stick = Stick("-1,0,2", device=Device())
+    assert (stick.read("column"), stick.read("wheel"), stick.read("pedals")) == (0.5, 0.25, 0.0)
+    assert Stick("1,0,7", device=Device()).read("pedals") == 0.0
+
+
+@pytest.mark.parametrize("words", ["", "x", "1,,2", "--1", "99"])
+def test_axes_that_are_none_are_refused(words: str) -> None:
+    with pytest.raises(InputError, match="--axes"):
+        axes_of(words)
+
+
+def test_where_no_stick_is_it_is_said() -> None:
+    pytest.importorskip("pygame")
+    with pytest.raises(InputError, match="no stick"):
+        Stick(number=60)
+
+
+def test_a_follower_is_smooth_and_stays_within_the_travel() -> None:
+    follower = Follower(0.1, 1.0 / 120.0)
+    way = [follower.move(5.0) for _ in range(120)]
+    assert way[0] == pytest.approx(0.1 * -math.expm1(-1.0 / 120.0 / 0.04))
+    assert max(way) == pytest.approx(0.1)
+    assert follower.move(math.nan) == way[-1]
+
+
+class Wanted:
+    """Wants the control at 20 % of its travel from the start."""
+
+    name = "test"
+
+    def read(self, control: str) -> float:
+        return 0.2
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Looker:
+    """Says words at given times."""
+
+    def __init__(self, *words: tuple[float, Word]) -> None:
+        self._words = list(words)
+
+    def board(self, host: Host) -> None:
+        self._host = host
+
+    def look(self, host: Host, k: int) -> None:
+        """Do nothing at a frame."""
+
+    def words(self) -> list[Word]:
+        due = [word for time, word in self._words if time <= self._host.time_s]
+        self._words = self._words[len(due) :]
+        return due
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_a_hand_goes_where_the_stick_says_with_the_force_that_takes() -> None:
+    manoeuvre = rig_live("report-column", 4.0)
+    record = fly_live(manoeuvre, Plan(paced=False, wishes=Wanted())).record
+    held = record.between(3.0, 4.0)
+    travel = manoeuvre.rig.controls["column"].travel
+    assert held["column_deflection_m"] == pytest.approx(0.2 * travel, rel=0.01)
+    wanted = held["column_gradient_N_per_m"] * held["column_deflection_m"]
+    assert held["column_force_N"] == pytest.approx(wanted, rel=0.02)
+
+
+def test_switches_marks_and_stop_act_at_their_frame() -> None:
+    warned: list[str] = []
+    words = [
+        (2.0, Word("set", "deflection", "column", 0.0)),
+        (2.5, Word("mark", "here")),
+        (3.0, Word("set", "friction", "column", 1e6)),
+        (3.0, Word("set", "nonsense", "column", 1.0)),
+        (3.5, Word("stop")),
+    ]
+    plan = Plan(paced=False, wishes=Wanted(), watchers=[Looker(*words)], warn=warned.append)
+    flight = fly_live(rig_live("report-column", None), plan)
+    record, live = flight.record, flight.record.manifest["live"]
+    assert flight.stopped
+    assert record.ended_early is None
+    assert len(record) == 420
+    gap = record["column_estimate_m"] - record["column_computed_m"]
+    assert np.all(gap[240:] == 0.0)
+    assert np.all(gap[60:240] > 0.0)
+    assert live["marks"] == [[2.5, "here"]] or live["marks"] == [(2.5, "here")]
+    assert len(live["switched"]) == 1
+    assert (flight.since_s, flight.rig.controls["column"].compensation.deflection) == (2.0, False)
+    assert len(warned) == 2
+
+
+def test_a_bench_is_flown_live_too() -> None:
+    record = fly_live(rig_live("bench", 1.0), Plan(paced=False, wishes=Wanted())).record
+    assert len(record) > 50
+    assert record["column_deflection_m"][-1] > 0.0
+
+
+def test_what_cannot_be_flown_is_refused() -> None:
+    for bad in (0.0, -1.0, 8000.0):
+        with pytest.raises(InputError, match="--duration"):
+            run_live("capture", "", bad, "pilot")
+    with pytest.raises(InputError, match="--hand"):
+        run_live("capture", "", None, "foot")
+    with pytest.raises(InputError, match="--case"):
+        run_live("capture", "no such", None, "pilot")

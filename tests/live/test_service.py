@@ -1,0 +1,93 @@
+"""K in service: found without bias, frozen without excitation, alarmed, and adapted to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.api.rigs import load_rig
+from coupled.live.service import LEAST_N, Adaptation, BendEstimator, ServiceBend
+from coupled.plots.service import lost_share
+from tests.support.softening import TIMES, SOFTENS_s, softened
+
+FRAME_s = 1.0 / 120.0
+COLUMN = load_rig("report-column").controls["column"]
+K = COLUMN.loader.bend
+
+
+def seen(bend: float, force: np.ndarray, noise: float, seed: int) -> ServiceBend:
+    """Return what is found of a control held still at δc = 0 under a force, δ = K·F + noise."""
+    estimator = BendEstimator(COLUMN, FRAME_s)
+    random = np.random.default_rng(seed)
+    for f in force:
+        estimator.look(float(f), 0.0, bend * f + 1e-3 + noise * random.standard_normal())
+    return estimator.now
+
+
+def test_the_slope_is_that_of_least_squares_without_noise() -> None:
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(1200))
+    found = seen(1.3e-4, force, 0.0, 0)
+    assert found.bend == pytest.approx(1.3e-4, rel=1e-9)  # the zero of 1 mm does no harm
+    assert found.excitation_N == pytest.approx(30.0 / np.sqrt(2.0), rel=0.02)
+
+
+def test_the_interval_holds_k_as_often_as_it_says() -> None:
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(720))
+    held = 0
+    for seed in range(100):
+        found = seen(K, force, 1e-4, seed)
+        assert found.bend is not None and found.error is not None
+        held += abs(found.bend - K) < 1.96 * found.error
+    assert 88 <= held <= 100  # 95 % of 100, within 3 standard deviations
+
+
+def test_a_hand_that_does_too_little_teaches_nothing() -> None:
+    active = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(720))
+    idle = 0.5 * LEAST_N * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(3600))
+    estimator = BendEstimator(COLUMN, FRAME_s)
+    for f in active:
+        estimator.look(float(f), 0.0, K * f)
+    before = estimator.now.bend
+    for f in idle:
+        estimator.look(float(f), 0.0, 3.0 * K * f)
+    assert estimator.now.frozen
+    assert estimator.now.bend == pytest.approx(before, rel=0.02)  # but for the second it takes
+
+
+def test_adaptation_is_slow_bounded_and_needs_to_be_sure() -> None:
+    sure = ServiceBend(3.0 * K, 0.01 * K, 20.0, frozen=False, alarm=True)
+    adaptation, used = Adaptation(K, 2189.0), K
+    for k in range(60 * 120):
+        found = adaptation.look(k * FRAME_s, sure)
+        if found is not None:
+            assert abs(found - used) <= 0.05 * 0.25 * K * (1.0 + 1e-9)
+            used = found
+    assert used == pytest.approx(2.0 * K)  # its bound
+    unsure = ServiceBend(3.0 * K, 0.5 * K, 20.0, frozen=False, alarm=True)
+    idle = ServiceBend(3.0 * K, 0.01 * K, 20.0, frozen=True, alarm=True)
+    assert Adaptation(K, 2189.0).look(0.0, unsure) is None
+    assert Adaptation(K, 2189.0).look(0.0, idle) is None
+    stiff = Adaptation(K, 0.5 / K)  # K̂·G_T stays below 0.8
+    for k in range(60 * 120):
+        stiff.look(k * FRAME_s, sure)
+    assert stiff.assumed == pytest.approx(1.6 * K)
+
+
+def test_adapted_compensation_keeps_the_authority_that_a_fixed_one_loses() -> None:
+    fixed, adapted = softened(adapt=False), softened(adapt=True)
+    softer = (TIMES - 1.0) * K * 2189.1  # of G_T·δ that the host does not know of
+    expected = softer / (1.0 + softer)
+    for record in (fixed, adapted):
+        time, lost = lost_share(record, "column")
+        before = (time > 12.0) & (time < SOFTENS_s - 3.0)  # the sweep is there in full
+        assert abs(lost[before]).max() < 0.004
+        (alarm,) = record.manifest["live"]["alarms"]
+        assert SOFTENS_s < alarm[0] < SOFTENS_s + 15.0
+    late_fixed, late_adapted = (
+        lost[(time > 65.0) & (time < 82.0)]
+        for time, lost in (lost_share(r, "column") for r in (fixed, adapted))
+    )
+    assert late_fixed.mean() == pytest.approx(expected, rel=0.05)
+    assert abs(late_adapted).max() < 0.006
+    found = adapted.manifest["live"]["bend_in_service"]["column"]
+    assert found["low"] < TIMES * K < found["high"] or abs(found["bend"] / K - TIMES) < 0.005
