@@ -209,7 +209,7 @@ class Host:
         if stopped:
             manifest["ended_early"] = None
         kept = Record(record.channels, record.data, manifest)
-        return only_measured(kept, self.plan.link, self.names) if self.plan.link else kept
+        return only_measured(kept, self.plan.link, self.switches.rig) if self.plan.link else kept
 
     def _lead(self, wishes: Wishes, k: int) -> None:
         """Write the hands' way over the frame to come."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +13,7 @@ from coupled.live.link import Link
 from coupled.record.channels import channel
 from coupled.record.record import Record
 from coupled.rig.parameters import Sensing
+from coupled.rig.rig import Rig
 
 
 def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
@@ -35,11 +35,17 @@ def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
 _MULTIPLIER = ("multiplier_offset_N", "multiplier_drift_N_per_s")
 
 
-def only_measured(record: Record, link: Link, controls: Sequence[str]) -> Record:
-    """Return a record without what its loader did not measure."""
+def only_measured(record: Record, link: Link, rig: Rig) -> Record:
+    """Return a record without what its loader did not measure.
+
+    F_mod of a hybrid loader is among it: the loader's own multiplier makes it of δc as it is, and
+    what the host would make of its reading would pass for a product that is held over the frame.
+    """
     lacking: set[str] = set()
-    for name in controls:
+    for name, control in rig.controls.items():
         lacking |= {channel(name, "force_step"), channel(name, "stop"), channel(name, "hand_force")}
+        if control.loader.multiplier == "hybrid":
+            lacking.add(channel(name, "modifying_force"))
         if not link.measures_force:
             lacking.add(channel(name, "force"))
         if not link.measures_deflection:

@@ -115,7 +115,7 @@ def serve_udp(port: int, twin: Twin) -> None:
     loader = Loader(port)
     print("ready", loader.port, flush=True)
     quiet = 0
-    while quiet < 150:  # 15 s
+    while quiet < 600:  # 60 s: a host may have to compile first
 
         def act(orders: Sequence[Block]) -> None:
             if loader.fresh and loader.mode == RUN:
@@ -133,7 +133,7 @@ def serve_cls2sim(port: int, twin: Twin) -> None:
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
         wire.bind(("127.0.0.1", port))
-        wire.settimeout(10.0)
+        wire.settimeout(60.0)
         print("ready", wire.getsockname()[1], flush=True)
         twin.bare()
         while True:

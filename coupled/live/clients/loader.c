@@ -63,7 +63,7 @@ int main(int count, char **words) {
     }
     setsockopt(wire, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     coupled_init(&loader, 1);
-    while (quiet < 100) { /* 10 s */
+    while (quiet < 600) { /* 60 s */
         socklen_t length = sizeof host;
         ssize_t size = recvfrom(wire, bytes, sizeof bytes, 0, (struct sockaddr *)&host, &length);
         quiet = size < 0 ? quiet + 1 : 0;
