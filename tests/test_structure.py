@@ -35,6 +35,7 @@ ORDER += [
     "rig",
     "record/importing",
     "flight",
+    "models",
     "authority",
     "export",
     "campaign",

@@ -13,6 +13,7 @@ from coupled.cli import (
     live,
     logs,
     maps,
+    models,
     new,
     stability,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "logs",
     "main",
     "maps",
+    "models",
     "new",
     "stability",
 ]

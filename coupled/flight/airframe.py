@@ -232,8 +232,8 @@ class JSBSimAirframe:
                 problem = newton_trim(fdm, flight)
             elif started:
                 fdm["simulation/do_simple_trim"] = 1
-        except (RuntimeError, jsbsim.BaseError):
-            raise self.fault("calibrated_airspeed_m_per_s", where + "; choose others") from None
+        except (RuntimeError, jsbsim.BaseError) as error:
+            problem = "JSBSim: " + " ".join((_log.text or str(error)).split())[-120:]
         if problem:
             raise self.fault("calibrated_airspeed_m_per_s", f"{where}: {problem}; choose others")
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):

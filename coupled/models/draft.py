@@ -1,0 +1,165 @@
+"""A first rig for a model: a commented rig file, in which every guess is marked as one.
+
+What is known is found: where the model trims, which controls a rig can lead, how fast and how slow
+it flies. The rest are guesses of three classes by the empty mass, taken from the shipped rigs of a
+light aircraft, a trainer and a jet transport. The column's gradient grows with q̄, as a reversible
+control's does, up to a greatest force at full travel; K is that of Cleveland's report.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from coupled.models.survey import Surveyed
+from coupled.record.channels import SURFACES, ControlName, unit_of
+
+_BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
+_RIM_m = 0.15  # a wheel's radius
+_MOST_BENT = 0.3  # of the travel, at the stiffest gradient: K·G_T
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """What is guessed of one control: SI, at the grip; on a wheel at the rim, by the angle."""
+
+    travel: float
+    mass: float
+    damping: float
+    breakout_N: float
+    friction_N: float
+    full_force_N: float  # at full travel and the highest q̄
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A class of aircraft, up to an empty mass."""
+
+    name: str
+    most_kg: float
+    controls: dict[str, Hardware]
+
+
+_KINDS = (
+    Kind(
+        "a light aircraft, as the shipped c172p",
+        2500.0,
+        {
+            "column": Hardware(0.10, 4.0, 120.0, 2.0, 2.0, 330.0),
+            "wheel": Hardware(1.40, 0.15, 3.3, 2.0, 2.0, 100.0),
+            "pedals": Hardware(0.07, 4.0, 120.0, 15.0, 5.0, 300.0),
+        },
+    ),
+    Kind(
+        "a trainer or fighter, as the shipped t37",
+        20000.0,
+        {
+            "column": Hardware(0.14, 4.0, 75.0, 2.0, 2.0, 300.0),
+            "wheel": Hardware(0.24, 1.0, 16.0, 2.0, 2.0, 100.0),
+            "pedals": Hardware(0.08, 5.0, 140.0, 10.0, 5.0, 500.0),
+        },
+    ),
+    Kind(
+        "a transport, as the shipped b747",
+        1e9,
+        {
+            "column": Hardware(0.16, 6.0, 100.0, 38.0, 12.0, 500.0),
+            "wheel": Hardware(1.53, 0.25, 4.0, 13.0, 9.0, 80.0),
+            "pedals": Hardware(0.10, 5.0, 140.0, 85.0, 15.0, 350.0),
+        },
+    ),
+)
+
+
+def kind_of(mass_kg: float) -> Kind:
+    """Return the class whose numbers are guessed for an empty mass; 0 for an unknown one."""
+    return next(kind for kind in _KINDS if mass_kg <= kind.most_kg)
+
+
+def draft(found: Surveyed, name: str, folder: Path | None = None) -> str:
+    """Return the text of a first rig file for a surveyed model that trims.
+
+    `folder` is the model's own, where it is none that coupled finds by itself.
+    """
+    flight = found.flight
+    assert flight is not None
+    kind = kind_of(found.mass_kg)
+    said = f"its empty mass of {found.mass_kg:,.0f} kg" if found.mass_kg else "no mass in its file"
+    lines = [
+        f"# {found.model}: a first rig, written by `coupled new rig`.",
+        "#",
+        "# Found: where it trims, which controls move it. Guessed: all that is marked `guess`, as",
+        f"# for {kind.name} (by {said}).",
+        "# Put your own numbers in their place.",
+    ]
+    if folder is not None:
+        lines.append(f"# coupled finds the model once {folder.name}/ lies in its aircraft/ folder.")
+    lines += ["", f'name = "{name}"', "frame_rate_Hz = 120.0", *_flight(found)]
+    for control in found.controls:
+        lines += _control(control, kind.controls[control], found)
+    for lack in found.lacking:
+        lines += ["", f"# {lack}"]
+    return "\n".join([*lines, ""])
+
+
+def _flight(found: Surveyed) -> list[str]:
+    flight = found.flight
+    assert flight is not None
+    holds = "holds it hands off" if found.holds else "does not hold it hands off: fly short runs"
+    lines = ["", "[flight]", f'model = "{found.model}"']
+    lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
+    lines.append(
+        f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
+        f"  # trims from {found.slowest:g} to {found.fastest:g} at this height, as far as was tried"
+    )
+    if not found.direct:
+        lines.append("direct_controls = false         # a law or lag of the model's own is between")
+    if flight.properties:
+        lines += ["", "[flight.properties]"]
+        lines += [f'"{key}" = {value!r}  # gear up' for key, value in flight.properties.items()]
+    return lines
+
+
+def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str]:
+    d, low, high = unit_of(control), _pressure(found.slowest), _pressure(found.fastest)
+    bend = _BEND_m_per_N if d == "m" else _BEND_m_per_N / _RIM_m
+    if control == "pedals":
+        bend *= 0.5
+    stiffest = min(guess.full_force_N / guess.travel, _MOST_BENT / bend)
+    softest = max(stiffest * low / high, 0.05 * stiffest)
+    rows = (low, high) if high > 1.05 * low else (0.0, high)
+    gradients = (softest, stiffest) if high > 1.05 * low else (stiffest, stiffest)
+    at = f"controls.{control}"
+    return [
+        "",
+        f"[{at}]",
+        f'surface = "{SURFACES[control]}"',
+        f"travel_{d} = {guess.travel:g}  # guess",
+        f"length_m = {_RIM_m if d == 'rad' else 0.6:g}  # guess",
+        "",
+        f"[{at}.loader]",
+        f"mass_kg = {guess.mass:g}  # guess",
+        f"damping_N_s_per_{d} = {guess.damping:g}  # guess",
+        f"basic_gradient_N_per_{d} = {gradients[0]:.4g}  # guess: the softest of the schedule",
+        f"breakout_N = {guess.breakout_N:g}  # guess",
+        f"friction_N = {guess.friction_N:g}  # guess",
+        'multiplier = "hybrid"',
+        "servo_frequency_Hz = 18.0  # guess",
+        "servo_damping_ratio = 0.7  # guess",
+        f"bend_{d}_per_N = {bend:.4g}  # guess: K of Cleveland's column",
+        "",
+        f"[{at}.schedule]",
+        "# q̄ at the slowest and the fastest trim, found; gradients in proportion to it, a guess",
+        f"dynamic_pressure_Pa = [{rows[0]:.0f}.0, {rows[1]:.0f}.0]",
+        f"total_gradient_N_per_{d} = [{gradients[0]:.4g}, {gradients[1]:.4g}]",
+        "",
+        f"[{at}.compensation]",
+        "deflection = true",
+        "gradient = true",
+        f"bend_{d}_per_N = {bend:.4g}  # what the host takes K for",
+    ]
+
+
+def _pressure(calibrated_m_per_s: float) -> float:
+    """Return q̄ in Pa at a calibrated airspeed, without compressibility."""
+    return 0.5 * 1.225 * calibrated_m_per_s**2

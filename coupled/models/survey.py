@@ -1,0 +1,218 @@
+"""Where a JSBSim model trims, found by search, and how its controls move, found by flying.
+
+The first speed to try is that at which the wing carries the weight at a moderate lift coefficient,
+
+    V = √(2·W/(ρ₀·S·C_L)),
+
+by the wing's area and the empty weight in the model's own file; then faster and slower ones, and
+other heights. Each try is JSBSim's own full trim, as a rig's. Of the states that trim, one that
+holds is preferred: hands off for some seconds it neither meets the ground nor turns over.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from coupled.errors import InputError
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import packaged_models
+from coupled.flight.direct import check_direct_controls
+from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
+from coupled.resources import aircraft_folder, shipped_rigs
+from coupled.rig.parameters import Flight
+from coupled.schema import load_toml
+from coupled.units import FOOT_m
+
+FRAME_s = 1.0 / 120.0
+_LIFT = (0.4, 0.25, 0.6, 0.15, 0.9, 0.08, 1.3)  # lift coefficients at the empty weight, in order
+_ALTITUDES_m = (1500.0, 300.0, 5000.0, 9000.0, 15000.0)
+_SPEEDS_m_per_s = (50.0, 90.0, 30.0, 140.0, 20.0, 220.0)  # of a model that does not say its wing
+_DENSITY_kg_per_m3 = 1.225
+_TO_kg = {"LBS": 0.45359237, "KG": 1.0, "SLUG": 14.5939}
+_TO_m2 = {"FT2": FOOT_m**2, "M2": 1.0}
+_GEAR_UP = {"gear/gear-cmd-norm": 0.0}
+_HOLDS_s = 5.0
+_LONGEST_s = 12.0  # spent on one model
+_TURNED_rad = 0.5
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """What was found of a model; SI.
+
+    `flight` is a state in which it trims and `holds` whether it keeps it hands off; without one,
+    `why` has JSBSim's own reason. `controls` are those that a rig can lead, `direct` whether they
+    all move their surface at once; `lacking` says what keeps the others out.
+    """
+
+    model: str
+    flight: Flight | None
+    holds: bool = False
+    why: str = ""
+    controls: tuple[ControlName, ...] = ()
+    direct: bool = True
+    lacking: tuple[str, ...] = ()
+    slowest: float = 0.0  # calibrated airspeed at which it trims at that height, m/s
+    fastest: float = 0.0
+    mass_kg: float = 0.0  # empty
+    rigs: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the findings by name, as JSON takes them."""
+        flight = self.flight
+        return {
+            "model": self.model,
+            "trims": flight is not None,
+            "altitude_m": flight.altitude if flight else None,
+            "calibrated_airspeed_m_per_s": flight.calibrated_airspeed if flight else None,
+            "holds": self.holds,
+            "why_not": self.why,
+            "controls": list(self.controls),
+            "direct_controls": self.direct if self.controls else None,
+            "lacking": list(self.lacking),
+            "rigs": list(self.rigs),
+        }
+
+
+def known_models() -> dict[str, Path]:
+    """Return the models that are here, packaged and our own: {name: folder of all models}."""
+    own = aircraft_folder()
+    ours = {f.name: own for f in own.iterdir() if (f / f"{f.name}.xml").is_file()}
+    return dict(sorted({**packaged_models(), **ours}.items(), key=lambda one: one[0].lower()))
+
+
+def rigs_by_model() -> dict[str, list[str]]:
+    """Return the shipped rigs of each model."""
+    found: dict[str, list[str]] = {}
+    for name, path in shipped_rigs().items():
+        if model := load_toml(path).get("flight", {}).get("model"):
+            found.setdefault(model, []).append(name)
+    return found
+
+
+def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
+    """Return what is found of a model that lies in the folder `home` of all models.
+
+    With `speeds` the range of speeds is sought as well. Raises nothing for a model that fails.
+    """
+    rigs = tuple(rigs_by_model().get(model, ()))
+    mass = _mass_kg(home / model / f"{model}.xml")
+    ended_s = time.monotonic() + _LONGEST_s
+    found, why = None, ""
+    for flight in _tries(model, home):
+        problem = _trims(flight, home)
+        if not problem:
+            holds = _holds(flight, home)
+            if found is None or holds:
+                found = (flight, holds)
+            if holds:
+                break
+        else:  # the first try is the likeliest, and its reason the one that counts
+            why = why or problem.partition("JSBSim: ")[2].partition("; choose")[0] or problem
+        if time.monotonic() > ended_s:
+            break
+    if found is None:
+        return Surveyed(model, None, why=why, rigs=rigs, mass_kg=mass)
+    flight, holds = found
+    controls, direct, lacking = _controls(flight, home)
+    flight = flight.model_copy(update={"direct_controls": direct})
+    slowest = fastest = flight.calibrated_airspeed
+    if speeds:
+        slowest, fastest = (_furthest(flight, home, step) for step in (0.9, 1.1))
+    return Surveyed(
+        *(model, flight, holds, "", controls, direct, lacking),
+        *(slowest, fastest, mass, rigs),
+    )
+
+
+def _tries(model: str, home: Path) -> Iterator[Flight]:
+    """Yield states to try, the likeliest first, with the gear up where there is one to raise."""
+    speeds = _likely_speeds(home / model / f"{model}.xml")
+    places = [(i + 2 * j, v, h) for i, v in enumerate(speeds) for j, h in enumerate(_ALTITUDES_m)]
+    gear: dict[str, float] | None = None
+    for _, speed, altitude in sorted(places):
+        flight = Flight(model=model, altitude=altitude, calibrated_airspeed=speed)
+        if gear is None:
+            raised = flight.model_copy(update={"properties": _GEAR_UP})
+            lacks = "has no property" in _trims(raised, home)
+            gear = {} if lacks else _GEAR_UP
+        yield flight.model_copy(update={"properties": gear})
+
+
+def _likely_speeds(file: Path) -> Sequence[float]:
+    area, mass = _quantity(file, "wingarea", _TO_m2), _mass_kg(file)
+    if area <= 0.0 or mass <= 0.0:
+        return _SPEEDS_m_per_s
+    loading = 2.0 * 9.80665 * mass / (_DENSITY_kg_per_m3 * area)
+    return [round(math.sqrt(loading / lift), 1) for lift in _LIFT]
+
+
+def _mass_kg(file: Path) -> float:
+    return _quantity(file, "emptywt", _TO_kg)
+
+
+def _quantity(file: Path, tag: str, units: dict[str, float]) -> float:
+    """Return a number of a model's file in SI, 0 where it does not say."""
+    try:
+        element = ElementTree.parse(file).getroot().find(f".//{tag}")
+        if element is None:
+            return 0.0
+        first = next(iter(units.values()))
+        return float(element.text or 0.0) * units.get(element.get("unit", "").upper(), first)
+    except (OSError, ValueError, ElementTree.ParseError):
+        return 0.0
+
+
+def _trims(flight: Flight, home: Path) -> str:
+    """Return why a model does not trim, in JSBSim's words, or an empty string."""
+    try:
+        make_aircraft(flight, FRAME_s, ("column",), [home], "model")
+    except InputError as error:
+        return error.problem
+    return ""
+
+
+def _holds(flight: Flight, home: Path) -> bool:
+    """Tell whether a trimmed aircraft keeps its attitude, hands off, for some seconds."""
+    aircraft = make_aircraft(flight, FRAME_s, ("column", "wheel"), [home], "model")
+    start = aircraft.motion()
+    for _ in range(round(_HOLDS_s / FRAME_s)):
+        aircraft.step((0.0, 0.0, 0.0))
+        if aircraft.trouble():
+            return False
+    now = aircraft.motion()
+    turned = max(abs(now[at] - start[at]) for at in (PITCH, ROLL))
+    return math.isfinite(turned) and turned < _TURNED_rad
+
+
+def _controls(flight: Flight, home: Path) -> tuple[tuple[ControlName, ...], bool, tuple[str, ...]]:
+    """Return the controls that a rig can lead, whether at once, and what the others lack."""
+    for direct in (True, False):
+        asked = flight.model_copy(update={"direct_controls": direct})
+        led, lacking = list[ControlName](), list[str]()
+        for control in CONTROL_NAMES:
+            try:
+                check_direct_controls(asked, FRAME_s, (control,), (home,), "model")
+                led.append(control)
+            except InputError as error:
+                reason = error.problem.partition("direct controls: it ")[2] or error.problem
+                lacking.append(f"{control}: {reason.partition(';')[0]}")
+        if "column" in led:
+            return tuple(led), direct, tuple(lacking)
+    return (), False, tuple(lacking)
+
+
+def _furthest(flight: Flight, home: Path, step: float) -> float:
+    """Return the speed furthest from a trimmed one at which it trims, by steps of a factor."""
+    speed = flight.calibrated_airspeed
+    for _ in range(15):
+        further = round(speed * step, 1)
+        if _trims(flight.model_copy(update={"calibrated_airspeed": further}), home):
+            break
+        speed = further
+    return speed

@@ -1,0 +1,134 @@
+"""JSBSim's models, surveyed: where they trim, what moves them, and a first rig that flies."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from coupled.authority.compare import fly_and_judge
+from coupled.flight.manoeuvre import Manoeuvre
+from coupled.flight.pilot import Step
+from coupled.models.draft import draft, kind_of
+from coupled.models.survey import Surveyed, known_models, survey
+from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled, files
+
+MODELS = known_models()
+
+
+def test_a_model_that_trims_is_found_with_its_controls_and_rigs() -> None:
+    found = survey("T37", MODELS["T37"], speeds=True)
+    assert found.flight is not None
+    assert found.holds
+    assert found.controls == ("column", "wheel", "pedals")
+    assert found.direct
+    assert found.rigs == ("report-column", "t37")
+    assert found.mass_kg == pytest.approx(4056 * 0.4536, rel=1e-3)  # JSBSim's empty weight
+    # It trims from 90 to 320 kt, as was measured by hand; the search goes by tenths.
+    assert found.slowest < 50.0
+    assert found.fastest > 150.0
+
+
+def test_a_model_that_does_not_trim_has_jsbsims_own_reason() -> None:
+    lacking = survey("L17", MODELS["L17"])
+    assert lacking.flight is None
+    assert "fcs/flaps-pos-deg does not exist" in lacking.why
+    glider = survey("minisgs", MODELS["minisgs"])
+    assert "udot doesn't appear to be trimmable" in glider.why
+
+
+def test_a_law_of_the_models_own_is_told_from_direct_controls() -> None:
+    found = survey("f16", MODELS["f16"])
+    assert found.controls
+    assert not found.direct
+    mixed = survey("A320", MODELS["A320"])
+    assert mixed.controls == ("column", "wheel")
+    assert mixed.lacking[0].startswith("pedals: moves its rudder by more than the command")
+
+
+def fly_first_rig(found: Surveyed, folder: Path) -> None:
+    """Fly a pull on a drafted rig: it is read, it trims, the nose goes up, at both speeds."""
+    file = folder / "first.toml"
+    file.write_text(draft(found, "first"), encoding="utf-8")
+    for speed in (found.slowest, found.fastest):
+        rig = read_rig(file, {"flight.calibrated_airspeed_m_per_s": speed})
+        column = rig.controls["column"]
+        pull = Step(force_N=column.loader.breakout + column.loader.friction + 20.0)
+        flown = fly_and_judge(Manoeuvre(rig, {"column": pull}, 2.0))
+        assert not flown.ended_early, found.model
+        assert flown.record["column_deflection_m"][-1] > 0.0
+        assert (flown.outcome.peak_rate_rad_per_s or 0.0) > 0.0
+
+
+def test_a_first_rig_flies(tmp_path: Path) -> None:
+    fly_first_rig(survey("F80C", MODELS["F80C"], speeds=True), tmp_path)
+
+
+def test_every_guess_of_a_first_rig_is_marked_as_one() -> None:
+    found = survey("J3Cub", MODELS["J3Cub"])
+    text = draft(found, "cub")
+    assert kind_of(found.mass_kg).name in text
+    for key in ("travel_m", "mass_kg", "damping_N_s_per_m", "friction_N", "bend_m_per_N"):
+        line = next(line for line in text.splitlines() if line.startswith(key))
+        assert "# guess" in line, line
+    for key in ("altitude_m", "calibrated_airspeed_m_per_s"):
+        line = next(line for line in text.splitlines() if line.startswith(key))
+        assert "trims" in line, line
+
+
+def test_the_command_lists_models_and_writes_a_rig(tmp_path: Path) -> None:
+    done = coupled(tmp_path, "models", "T37", "L17", "--json", "models.json", columns=200)
+    assert done.returncode == 0, done.stderr
+    assert "1 of 2 trim, 1 can be flown by a rig" in done.stdout
+    first, second = json.loads((tmp_path / "models.json").read_text())
+    assert first["trims"]
+    assert first["rigs"] == ["report-column", "t37"]
+    assert "does not exist" in second["why_not"]
+    done = coupled(tmp_path, "new", "rig", "OV10", "first.toml")
+    assert done.returncode == 0, done.stderr
+    assert read_rig(tmp_path / "first.toml").flight is not None
+
+
+def test_a_rig_is_written_for_the_folder_of_a_model(tmp_path: Path) -> None:
+    shutil.copytree(MODELS["J3Cub"] / "J3Cub", tmp_path / "mycub")
+    (tmp_path / "mycub" / "J3Cub.xml").rename(tmp_path / "mycub" / "mycub.xml")
+    done = coupled(tmp_path, "new", "rig", "./mycub")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "mycub.toml").read_text()
+    assert 'model = "mycub"' in text
+    assert "mycub/ lies in its aircraft/ folder" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("new", "rig", "T73"), "no JSBSim model"),
+        (("new", "rig", "L17"), "fcs/flaps-pos-deg does not exist"),
+        (("new", "rig", "T37", "rig.txt"), "ends in .toml"),
+        (("models", "T73"), "there is no JSBSim model 'T73'"),
+    ],
+)
+def test_what_cannot_be_surveyed_is_refused_in_a_line(
+    tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = coupled(tmp_path, *words)
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
+    assert files(tmp_path) == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", MODELS)
+def test_every_packaged_model_that_jsbsim_trims_flies_with_a_first_rig(
+    model: str, tmp_path: Path
+) -> None:
+    found = survey(model, MODELS[model], speeds=True)
+    if found.flight is None:
+        assert found.why
+    elif found.controls:
+        fly_first_rig(found, tmp_path)
+    else:
+        assert found.lacking
