@@ -93,7 +93,7 @@ def _say(made: Export, folder: Path, others: list[str]) -> None:
     for line in made.left:
         err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
     for line in others:
-        err.print(f"[yellow]no script:[/] {escape(line)}; export it with --case", soft_wrap=True)
+        err.print(f"[yellow]no script:[/] {escape(line)}", soft_wrap=True)
     if made.said:
         err.print(f"[yellow]JSBSim says:[/] {escape(made.said)}", soft_wrap=True)
     if not made.within:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from coupled.errors import InputError
 from coupled.export.script import Floats, Move, Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
@@ -25,8 +26,12 @@ _GUST, _MILSPEC = "atmosphere/cosine-gust/", "atmosphere/turbulence/milspec/"
 
 
 def add_conditions(script: Script, manoeuvre: Manoeuvre) -> None:
-    """Add a manoeuvre's wind, gust, turbulence and events."""
+    """Add a manoeuvre's wind, gust, turbulence and events. Raises InputError for any other."""
     given = manoeuvre.conditions
+    if key := unknown_condition(manoeuvre):
+        problem = "is not exported: a script of JSBSim has wind, gust, turbulence, and events of"
+        problem += " engine_out, trim and property"
+        raise InputError(manoeuvre.file, key, problem)
     if given.wind is not None:
         _add_wind(script, given.wind)
     if given.gust is not None:
@@ -35,6 +40,19 @@ def add_conditions(script: Script, manoeuvre: Manoeuvre) -> None:
         _add_turbulence(script, given.turbulence, manoeuvre.seed)
     for event in given.event.values():
         _add_event(script, event, manoeuvre)
+
+
+def unknown_condition(manoeuvre: Manoeuvre) -> str:
+    """Return the key of a condition that a script cannot have, or an empty string."""
+    given = manoeuvre.conditions
+    for key in type(given).model_fields:
+        if getattr(given, key) and key not in ("wind", "gust", "turbulence", "event"):
+            return key
+    for name, event in given.event.items():
+        led = event.trim is not None or event.of_model is not None
+        if not led and event.engine_out is None:
+            return f"event.{name}"
+    return ""
 
 
 def _add_wind(script: Script, wind: Wind) -> None:

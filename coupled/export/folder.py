@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coupled.errors import InputError
+from coupled.export.befalling import unknown_condition
 from coupled.export.model import Files
 from coupled.export.write import Export, Flown
 from coupled.flight.altered import ALTERATIONS
@@ -69,13 +70,17 @@ def exportable(rig: Rig, cases: Sequence[Manoeuvre]) -> tuple[list[Flown], list[
     """
     flown, others = list[Flown](), list[str]()
     for case in cases:
-        why = _differs(rig, case.rig)
-        if why:
-            others.append(f"{case.name}: {case.label}: {why}")
+        if key := unknown_condition(case):
+            others.append(f"{case.name}: {case.label}: {key} is not exported")
+            continue
+        if why := _differs(rig, case.rig):
+            others.append(f"{case.name}: {case.label}: {why}; export it with --case")
             continue
         switched = [c for c in case.configurations if c != "calibrated low"]
         if len(switched) < len(case.configurations):
-            others.append(f"{case.name}: {case.label}, calibrated low: its S₁ is another")
+            others.append(
+                f"{case.name}: {case.label}, calibrated low: its S₁ is another; make a rig of it"
+            )
         flown.append(Flown(case, tuple(switched)))
     return flown, others
 

@@ -28,13 +28,8 @@ from coupled.schema import Section, file_keys
 
 # Written out, not taken from the sections: what is added there is not known here.
 EXPORTED: Mapping[type[Section], frozenset[str]] = {
-    Rig: frozenset(("name", "frame_rate", "controls", "flight", "structure")),
-    Control: frozenset(
-        (
-            *("surface", "travel", "length", "loader", "schedule", "compensation", "sensing"),
-            *("gains", "rigging", "calibration"),
-        )
-    ),
+    Rig: frozenset(("name", "frame_rate", "controls")),
+    Control: frozenset((*("surface", "travel", "length"),)),
     Loader: frozenset(
         (
             *("mass", "damping", "basic_gradient", "breakout", "friction", "breakaway"),
@@ -66,7 +61,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     Structure: frozenset(
         (
             *("column_by_wheel", "column_by_pedals", "wheel_by_column", "wheel_by_pedals"),
-            *("pedals_by_column", "pedals_by_wheel", "assumed"),
+            *("pedals_by_column", "pedals_by_wheel"),
         )
     ),
     Compliance: frozenset(
@@ -90,6 +85,7 @@ WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
         "loader_rate": "the export chooses the loader's rate itself",
         "noise": "noise of the record; the export's channels have none",
     },
+    Loader: {"tolerance": "how well the numbers are known; nothing in flight depends on it"},
     Gains: dict.fromkeys(
         ("mechanical_advantage", "s1_over_s2", "s3_over_s2", "low_gradient"),
         "a note of the bench; nothing in flight depends on it",
@@ -164,6 +160,8 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
     for key, name in file_keys(kind, d).items():
         field, value = kind.model_fields[name], getattr(section, name)
         dotted = f"{path}.{key}" if path else key
+        if isinstance(value, Section):  # its own keys say more
+            continue
         if name in exported or value == field.get_default(call_default_factory=True):
             continue
         if name in without:
@@ -172,7 +170,8 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
             default = field.get_default(call_default_factory=True)
             raise InputError(file, dotted, f"{refused[name]}; leave it at {default!r}")
         else:
-            problem = "is not known to the export, which leaves nothing out in silence"
+            default = field.get_default(call_default_factory=True)
+            problem = f"is not exported, nor left out in silence: leave it at {default!r}"
             raise InputError(file, dotted, problem)
     return left
 

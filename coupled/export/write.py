@@ -93,6 +93,9 @@ def export(
     flown: list[tuple[Manoeuvre, Configuration, str, Record]] = []
     jobs = [(run.manoeuvre, each) for run in runs for each in run.configurations]
     for done, (manoeuvre, configuration) in enumerate(jobs):
+        if configuration == "calibrated low":
+            problem = "calibrated low has another S₁: it is no switch of an exported rig"
+            raise InputError(manoeuvre.file, "configurations", problem)
         if progress is not None:
             progress(f"{manoeuvre.label}, {configuration}", done, 2 * len(jobs))
         name = script_name(manoeuvre, configuration, runs)

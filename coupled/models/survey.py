@@ -57,7 +57,7 @@ class Surveyed:
     controls: tuple[ControlName, ...] = ()
     direct: bool = True
     lacking: tuple[str, ...] = ()
-    slowest: float = 0.0  # calibrated airspeed at which it trims at that height, m/s
+    slowest: float = 0.0  # calibrated airspeed at which it flies so at that height, m/s
     fastest: float = 0.0
     mass_kg: float = 0.0  # empty
     rigs: tuple[str, ...] = ()
@@ -123,7 +123,7 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
     flight = flight.model_copy(update={"direct_controls": direct})
     slowest = fastest = flight.calibrated_airspeed
     if speeds:
-        slowest, fastest = (_furthest(flight, home, step) for step in (0.9, 1.1))
+        slowest, fastest = (_furthest(flight, home, controls, step) for step in (0.9, 1.1))
     return Surveyed(
         *(model, flight, holds, "", controls, direct, lacking),
         *(slowest, fastest, mass, rigs),
@@ -207,12 +207,18 @@ def _controls(flight: Flight, home: Path) -> tuple[tuple[ControlName, ...], bool
     return (), False, tuple(lacking)
 
 
-def _furthest(flight: Flight, home: Path, step: float) -> float:
-    """Return the speed furthest from a trimmed one at which it trims, by steps of a factor."""
+def _furthest(flight: Flight, home: Path, controls: tuple[ControlName, ...], step: float) -> float:
+    """Return the speed furthest from a trimmed one at which it flies by its controls.
+
+    Sought by steps of a factor.
+    """
     speed = flight.calibrated_airspeed
     for _ in range(15):
         further = round(speed * step, 1)
-        if _trims(flight.model_copy(update={"calibrated_airspeed": further}), home):
+        there = flight.model_copy(update={"calibrated_airspeed": further})
+        try:
+            check_direct_controls(there, FRAME_s, controls, (home,), "model")
+        except InputError:
             break
         speed = further
     return speed
