@@ -79,11 +79,13 @@ def _asked(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[M
 
 def _say(made: Export, folder: Path, others: list[str]) -> None:
     if made.beside:
-        table = Table("script", "deflection", "force", "F_mod", "lost", box=None, pad_edge=False)
+        table = Table(
+            "run", "case", "deflection", "force", "F_mod", "lost", box=None, pad_edge=False
+        )
         for one in made.beside:
             lost = "" if one.loss is None else f"{100.0 * one.loss:+.3f}"
             table.add_row(
-                escape(f"{one.case}, {one.configuration}"),
+                *(one.run, escape(f"{one.case}, {one.configuration}")),
                 *(f"{100.0 * x:.3f} %" for x in (one.deflection, one.force, one.modifying_force)),
                 lost,
             )

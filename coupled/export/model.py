@@ -74,7 +74,27 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
         place = folder / PurePosixPath(path.relative_to(home / name).as_posix())
         if place not in found:
             found[place] = read_bytes(path)
-    return found | _shared(found, folder)
+    found |= _shared(found, folder)
+    shown = folder / f"{name}-set.xml"
+    if shown not in found:
+        found[shown] = flightgear_set(name, systems).encode()
+    return found
+
+
+def flightgear_set(name: str, systems: Sequence[str]) -> str:
+    """Return the file by which FlightGear knows an aircraft, each joystick's axis a hand."""
+    names = [at.removeprefix("coupled-") for at in systems]
+    hands = "".join(f'<{control}><hand type="double">1</hand></{control}>' for control in names)
+    return f"""<?xml version="1.0"?>
+<PropertyList>
+  <sim>
+    <description>{name} with control loaders</description>
+    <flight-model>jsb</flight-model>
+    <aero>{name}</aero>
+  </sim>
+  <fdm><jsbsim><coupled>{hands}</coupled></jsbsim></fdm>
+</PropertyList>
+"""
 
 
 def _home(flight: Flight, file: object) -> Path:
@@ -119,23 +139,26 @@ def _top_level(text: bytes) -> Iterator[tuple[str, int]]:
 
 
 def _shared(files: Files, folder: PurePosixPath) -> Files:
-    """Return what the files name that lies in JSBSim's own folders, and what that names."""
+    """Return what the files name that lies in JSBSim's own folders, and what that names.
+
+    It is put into the model's own folder, where JSBSim looks first and FlightGear only.
+    """
     root = next(iter(packaged_models().values())).parent
     found: Files = {}
     waiting = list(files.values())
     while waiting:
         for element in _parsed(waiting.pop()).iter():
             name = element.attrib.get("file", "").removesuffix(".xml")
-            places = {"engine": "engine", "thruster": "engine", "system": "systems"}
+            places = {"engine": "Engines", "thruster": "Engines", "system": "Systems"}
             if not name or element.tag not in places:
                 continue
-            file = PurePosixPath(places[element.tag], f"{name}.xml")
-            own = "Systems" if element.tag == "system" else "Engines"
-            here = {folder / f"{name}.xml", folder / own / f"{name}.xml"}
-            if here & files.keys() or file in found or not (root / file).is_file():
+            place = folder / places[element.tag] / f"{name}.xml"
+            source = root / ("systems" if element.tag == "system" else "engine") / f"{name}.xml"
+            here = {folder / f"{name}.xml", place}
+            if here & (files.keys() | found.keys()) or not source.is_file():
                 continue
-            found[file] = read_bytes(root / file)
-            waiting.append(found[file])
+            found[place] = read_bytes(source)
+            waiting.append(found[place])
     return found
 
 

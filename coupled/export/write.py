@@ -173,7 +173,8 @@ def run_files(
     script.started |= switches(rig, configuration)
     lead_pilots(script, manoeuvre, record)
     add_conditions(script, manoeuvre)
-    aircraft, start = model_name(rig.flight), f"coupled-{name}"
+    case = name.removesuffix("-" + configuration.replace(" ", "-"))
+    aircraft, start = model_name(rig.flight), f"coupled-{case}"
     text = script.text(name, aircraft, start, 1.0 / step_rate(rig), manoeuvre.duration_s)
     return {
         PurePosixPath("scripts", f"{name}.xml"): text.encode(),

@@ -22,7 +22,7 @@ def test_a_folder_stands_for_itself(tmp_path: Path) -> None:
         "out/737/aircraft/737/737.xml",
         "out/737/aircraft/737/Systems/coupled-column.xml",
         "out/737/aircraft/737/Systems/coupled-pedals.xml",
-        "out/737/engine/CFM56.xml",
+        "out/737/aircraft/737/Engines/CFM56.xml",
         "out/737/scripts/from-table-compensated.xml",
     } <= written
     assert all(name.startswith("out/737/") for name in written)
