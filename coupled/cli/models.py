@@ -11,7 +11,8 @@ from rich.table import Table
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.new import new, write_new
-from coupled.cli.terminal import check_json, give_json, out, progress
+from coupled.cli.progress import progress
+from coupled.cli.terminal import check_json, give_json, out
 from coupled.errors import InputError, nearest
 
 if TYPE_CHECKING:
