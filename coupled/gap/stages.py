@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from coupled.gap.floors import given_noise, noise_in, with_error
 from coupled.gap.noise import Noise
 from coupled.gap.output import Output, Predict, echoed, spread, white
+from coupled.gap.ratchet import passed_noise, unratcheted
 from coupled.gap.sensed import Sensed
 from coupled.gap.served import asked, left, neutral, services
 from coupled.gap.smooth import rate_of, smoothed
@@ -259,16 +260,18 @@ class Reader:
         levels = self._heard("computed"), self._heard("force")
         smooth, smooth_force = smoothed(computed), smoothed(force)
         others = {name: smoothed(signal) for name, signal in self.others().items()}
+        noise = passed_noise(self.rig, (computed, force), levels)
 
         def driven(c: Floats, f: Floats) -> Predict:
             nodes = on_nodes(self.rig, c)
 
-            def predict(rig: Rig) -> Floats:
+            def at(rig: Rig, times: float) -> Floats:
                 sensed = Sensed(rig, self.control)
-                at, pull = nodes / sensed.scale_on_nodes(len(nodes)), sensed.force(f)
-                return sensed.zero + drive_linkage(rig, self.control, at, pull, others)
+                moved = (nodes + times * noise[0]) / sensed.scale_on_nodes(len(nodes))
+                pull = sensed.force(f + times * noise[1])
+                return sensed.zero + drive_linkage(rig, self.control, moved, pull, others)
 
-            return predict
+            return lambda rig: unratcheted(rig, self.control, at)
 
         def noisy(rig: Rig, k: int) -> Floats:
             c = with_error(smooth, k, levels[0])

@@ -53,6 +53,7 @@ SURFACE_KNOWN = 1e-4  # chosen: of its span, to which the model's map of command
 FLIGHT_KNOWN = 1e-4  # chosen: of its span, to which measured surfaces replay the motion
 SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axis has no spring
 RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts
+RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size ratchets a play by √2 times as much
 NOISE_TRIES = 4  # chosen: samples of the input's noise that are carried through a stage
 SURFACE_SHAKE_s = 1.0  # chosen: for so long each of the other controls is held off neutral
 SURFACE_SHAKE = 0.1  # chosen: of its travel
