@@ -34,8 +34,8 @@ class Parameter:
 
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
-    that `may_vanish` can be 0 while the effect is there. `host` is what the host calls its own
-    number for it, which is then to be set.
+    that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
+    its own number for it, which is then to be set.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Parameter:
     scanned: bool = True
     shape: bool = False
     inverse: bool = False
-    may_vanish: bool = False
+    may_end: bool = False
     host: str = ""
 
     def named(self, control: str) -> str:

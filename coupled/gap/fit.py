@@ -156,8 +156,8 @@ def _fit(
     half = np.hypot(half, [MODEL_ERROR * p.size(v) for p, v in zip(frees, values, strict=True)])
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
-    small &= ~np.array([p.may_vanish for p in frees])
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
+    stuck &= ~np.array([p.may_end for p in frees])
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),

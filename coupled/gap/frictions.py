@@ -38,10 +38,18 @@ _CONTACT = Parameter(
 )
 
 
+_ELASTIC = Parameter(
+    *("elastic_share", "loader.friction_elastic_share", "value", 0, 0.98, (0.3,)),
+    scanned=False,
+    shape=True,
+    may_end=True,
+)
+
+
 def _one_way(name: str, *starts_N: float) -> Parameter:
     """Return the friction in one direction of motion above the nominal one."""
     number = Parameter(name, f"loader.friction_{name}", "added", 0, 60, starts_N)
-    return replace(number, may_vanish=True)
+    return replace(number, may_end=True)
 
 
 FRICTIONS: tuple[Effect, ...] = (
@@ -60,7 +68,7 @@ FRICTIONS: tuple[Effect, ...] = (
     Effect(
         "presliding_friction",
         "loader",
-        (_level(1.5), replace(_CONTACT, scanned=False, shape=True, inverse=True)),
+        (_level(1.5), replace(_CONTACT, scanned=False, shape=True, inverse=True), _ELASTIC),
         _DRAWN,
     ),
     # By itself it is the same law as plain friction of the mean with a constant force of half the

@@ -69,7 +69,7 @@ LINKAGE: tuple[Effect, ...] = (
             replace(
                 value("damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05),
                 scanned=False,
-                may_vanish=True,
+                may_end=True,
             ),
         ),
         Signature("force", "bent", "loop", 1.5),

@@ -42,16 +42,17 @@ class FrictionParameters(Protocol):
     pull: float  # more where the control moves aft, N
     push: float  # and where it moves forward, N
     by_load: float  # and for each N that the loader carries
+    elastic_share: float  # of the bristles' length, bent before any of it slips
     dry: int  # whether there is any
     rigid: int  # and its contact is rigid
     varies: int  # with the direction or the load
 
 
-ELASTIC_SHARE = 0.3  # of the bristles' length, bent before any of it slips
 CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
 LEAST_N = 1e-9  # friction of bristles that carry none at this load
-SOLVED = 1e-12  # of the speeds at hand
+FADED = 6.0  # times the speed over which it fades, from which contacts do not damp
+SOLVED = 1e-9  # of the speeds at hand
 
 
 def _stiffness(given: Given) -> float:
@@ -82,6 +83,7 @@ FRICTION = Declaration(
         "pull": lambda g: g.control.loader.friction_pull,
         "push": lambda g: g.control.loader.friction_push,
         "by_load": lambda g: g.control.loader.friction_by_load,
+        "elastic_share": lambda g: g.control.loader.friction_elastic_share,
         "dry": _dry,
         "rigid": lambda g: _dry(g) and g.control.loader.friction_stiffness == 0.0,
         "varies": _varies,
@@ -123,7 +125,7 @@ def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tup
         return bent, bent
     side = 1.0 if way > 0.0 else -1.0
     most = level / p.stiffness
-    slips, soft = ELASTIC_SHARE * most, (1.0 - ELASTIC_SHARE) * most
+    slips, soft = p.elastic_share * most, (1.0 - p.elastic_share) * most
     z, left, area = side * bent, abs(way), 0.0
     if z < slips:
         straight = min(left, slips - z)
@@ -135,6 +137,14 @@ def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tup
         area += most * left - soft * nearer
         z += nearer
     return side * z, side * area / abs(way)
+
+
+@stage
+def _bending(p: FrictionParameters, level: float, bent: float, way: float) -> float:
+    """Return by how much bristles bend on for each d of the way, 1 where none of it slips."""
+    most = level / p.stiffness
+    left = most - (bent if way > 0.0 else -bent)
+    return min(max(left / ((1.0 - p.elastic_share) * most), 0.0), 1.0)
 
 
 @stage
@@ -165,11 +175,13 @@ def yielding_speed(
     u = (inertia * v + push - p.stiffness * bent) / (inertia + spring + p.contact_damping)
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
-        damping = p.contact_damping * math.exp(-fading * fading)
+        damping = 0.0
+        if abs(fading) < FADED:
+            damping = p.contact_damping * math.exp(-fading * fading)
         way = u * span
         after, mean = yielded(p, level, bent, way)
         force = p.stiffness * mean + damping * (after - bent) / span
-        slope = inertia
+        slope = inertia + damping * _bending(p, level, after, way)
         if way != 0.0:
             slope += max(p.stiffness * (after - mean) / way * span, 0.0)
         change = (push - force - inertia * (u - v)) / slope

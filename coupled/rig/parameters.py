@@ -30,6 +30,7 @@ class Loader(Section):
     breakaway: float = quantity("N", 0.0, ge=0)
     stribeck_rate: float = quantity("{d}_per_s", 0.002, gt=0)
     friction_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
+    friction_elastic_share: float = quantity("", 0.3, ge=0, le=0.99)
     friction_pull: float = quantity("N", 0.0, ge=0)
     friction_push: float = quantity("N", 0.0, ge=0)
     friction_by_load: float = quantity("", 0.0, ge=0, le=0.9)
