@@ -22,6 +22,7 @@ from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice, search
 from coupled.gap.compensation import compensation_gap
 from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.effect import Effect
 from coupled.gap.healthy import Baseline
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
@@ -31,7 +32,7 @@ from coupled.gap.result import (
 from coupled.gap.shrink import floors_of, shrink
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
-from coupled.gap.thresholds import GUILTY_FROM
+from coupled.gap.thresholds import GUILTY_FROM, MOST
 from coupled.gap.where import remains, where
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -147,8 +148,18 @@ class _Judge:
 
     @property
     def blamed(self) -> set[str]:
-        """The stages of the effects found."""
-        return {step.effect.stage for step in self.choice.steps}
+        """The stages of the effects found.
+
+        One that shows in its neighbours alone is blamed where half of a gap there is closed.
+        """
+        settled = stage_gaps(self.outputs, self.choice.settled.rig)
+
+        def closes(effect: Effect) -> bool:
+            seen = [out for out in effect.shows_in if out in settled]
+            return any(self.last[out] < (1.0 - MOST) * settled[out] for out in seen)
+
+        effects = [step.effect for step in self.choice.steps]
+        return {e.stage for e in effects if e.stage in e.shows_in or closes(e)}
 
     def stages(self) -> tuple[StageResult, ...]:
         """Return the stages that the records have, in the order of the chain."""

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.output import Output
+from coupled.gap.thresholds import MODEL_ERROR
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -35,7 +36,8 @@ class Parameter:
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
-    its own number for it, which is then to be set.
+    its own number for it, which is then to be set. `model_error` is how
+    well, relative, the physics of a right effect gives it.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Parameter:
     shape: bool = False
     inverse: bool = False
     may_end: bool = False
+    model_error: float = MODEL_ERROR
     host: str = ""
 
     def named(self, control: str) -> str:
@@ -201,6 +204,8 @@ def apply(
     changes: dict[str, Any] = {}
     for effect in effects:
         for p in effect.parameters:
+            if p.key in changes:  # of an effect before it, which it shares
+                continue
             value = values.get(effect.value_key(p), 0.0)
             value = value if abs(value) >= SMALLEST else 0.0
             changes[p.key] = p.entered(p.nominal(rig, control), value)

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 
 from coupled.gap.effect import Effect, Parameter, possible
 from coupled.gap.output import Output, Part, memory
-from coupled.gap.thresholds import DIFFERENCE, DIFFERENCE_STEPS, FIT_ITERATIONS, MODEL_ERROR
+from coupled.gap.thresholds import DIFFERENCE, DIFFERENCE_STEPS, FIT_ITERATIONS
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -62,7 +62,8 @@ def fit(
     Starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. `nuisances` are settings, free within their tolerance: fitted, but nothing found.
     Effects that share no output are fitted each on its own, so that neither's misfit misleads
-    the other; with `only`, just those that share one with it, and the others stay at `start`. A
+    the other; of effects that free the same number the first fits it, and the others have it
+    from there. With `only`, just those that share one with it, and the others stay at `start`. A
     set that the physics cannot give stands at its bounds.
     """
     every = [*effects, *nuisances]
@@ -80,6 +81,10 @@ def fit(
             continue
         keys, frees = _free(group)
         values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
+    for key, owner in shared(every).items():
+        values[key] = values[owner]
+        if owner in low:
+            low[key], high[key] = low[owner], high[owner]
     rig = possible(nominal, control, every, values)
     if rig is None:
         rig, bound = nominal, tuple(values)
@@ -153,7 +158,8 @@ def _fit(
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     half = _half_width(best, len(ours), np.concatenate(number)) * scale
     values = best.x * scale
-    half = np.hypot(half, [MODEL_ERROR * p.size(v) for p, v in zip(frees, values, strict=True)])
+    sizes = [p.model_error * p.size(v) for p, v in zip(frees, values, strict=True)]
+    half = np.hypot(half, sizes)
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
@@ -223,8 +229,21 @@ def _half_width(found: Any, outputs: int, groups: NDArray[np.intp]) -> Floats:
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:
-    pairs = [(e.value_key(p), p) for e in effects for p in e.free]
+    others = shared(effects)
+    pairs = [(e.value_key(p), p) for e in effects for p in e.free if e.value_key(p) not in others]
     return [key for key, _ in pairs], [p for _, p in pairs]
+
+
+def shared(effects: Sequence[Effect]) -> dict[str, str]:
+    """Return {a value's key: that of the same number of the rig, which an effect before it has}."""
+    owner: dict[str, str] = {}
+    found = {}
+    for effect in effects:
+        for p in effect.free:
+            key = effect.value_key(p)
+            if owner.setdefault(p.key, key) != key:
+                found[key] = owner[p.key]
+    return found
 
 
 def _starts(

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from coupled.gap.effect import Effect, Likeness, Parameter, Signature
-from coupled.gap.thresholds import FAINT_STRIBECK_d_per_s
+from coupled.gap.thresholds import YIELDING_ERROR, FAINT_STRIBECK_d_per_s
 
 _DRAWN = Signature("speed", "missing")
 
@@ -34,7 +34,8 @@ _FADING = Parameter(
     "stribeck_{d}_per_s", "loader.stribeck_rate_{d}_per_s", "value", 2e-4, 0.05, (2e-3,)
 )
 _CONTACT = Parameter(
-    "stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}", "value", 1e2, 1e8, (1e4, 1e5)
+    *("stiffness_N_per_{d}", "loader.friction_stiffness_N_per_{d}", "value", 1e2, 1e8, (1e4, 1e5)),
+    model_error=YIELDING_ERROR,
 )
 
 
@@ -43,6 +44,7 @@ _ELASTIC = Parameter(
     scanned=False,
     shape=True,
     may_end=True,
+    model_error=YIELDING_ERROR,
 )
 
 

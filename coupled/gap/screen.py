@@ -74,7 +74,7 @@ def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, floa
     """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
     if effect.seen is None:
         shapes = max([len(p.starts) for p in effect.free], default=1)
-        return [_sizes(case, effect, shape) for shape in range(shapes)]
+        return [_sizes(case, current, effect, shape) for shape in range(shapes)]
     seen = effect.seen(case.outputs, current.rig, case.control)
     return [
         [
@@ -84,7 +84,7 @@ def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, floa
     ]
 
 
-def _sizes(case: Case, effect: Effect, shape: int) -> list[dict[str, float]]:
+def _sizes(case: Case, current: Fit, effect: Effect, shape: int) -> list[dict[str, float]]:
     """Return sets of an effect's parameters to try; one where each has to be flown."""
     flown = STAGE_OF[effect.stage].flown
     found = []
@@ -96,7 +96,7 @@ def _sizes(case: Case, effect: Effect, shape: int) -> list[dict[str, float]]:
                 value = 1.0 + SCREEN_FACTORS[k] * (start - 1.0)
             elif not flown and p.scanned:
                 value = SCREEN_SIZES[k] * start
-            value += p.base(case.nominal, case.control)
+            value += p.base(current.rig, case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
         found.append(values)
     return found

@@ -67,6 +67,7 @@ SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fittin
 # Fitting (`fit`).
 DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls between its jumps
 MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, another integrator
+YIELDING_ERROR = 0.12  # of a contact's numbers: noise of F walks it; 12 % off with 0.15 N of noise
 FIT_ITERATIONS = 40  # chosen
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
 
