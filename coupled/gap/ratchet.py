@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from coupled.gap.noise import Noise
 from coupled.gap.output import Floats
 from coupled.gap.smooth import Smoother
 from coupled.gap.thresholds import RATCHET
@@ -23,16 +24,16 @@ from coupled.rig.rig import Rig
 
 
 def passed_noise(
-    rig: Rig, signals: tuple[Floats, Floats], levels: tuple[float, float]
+    rig: Rig, signals: tuple[Floats, Floats], noises: tuple[Noise, Noise]
 ) -> tuple[Floats, Floats]:
-    """Return samples of what the smoothers of δc and F pass of white noise of these rms.
+    """Return samples of what the smoothers of δc and F pass of their noise.
 
     δc's on the loader's nodes, in d, F's at the frames, in N.
     """
     rng = np.random.default_rng(47)
     computed, force = (
-        Smoother.of(signal).smooth(rng.normal(0.0, level, len(signal)))
-        for signal, level in zip(signals, levels, strict=True)
+        Smoother.of(signal).smooth(noise.sample(len(signal), rng))
+        for signal, noise in zip(signals, noises, strict=True)
     )
     return on_nodes(rig, computed), force
 

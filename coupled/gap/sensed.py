@@ -59,6 +59,10 @@ class Sensed:
             nodes = on_nodes(self.rig, self.as_the_host_had_it(recorded))
         return self._unread(nodes)
 
+    def both(self, computed: Floats, recorded: Floats) -> tuple[Floats, Floats]:
+        """Return δc on the nodes and F at the frames from what was read of them there."""
+        return computed / self.scale_on_nodes(len(computed)), self.force(recorded)
+
     def as_the_host_had_it(self, recorded: Floats) -> Floats:
         """Return F as the host read it, N: without the recorder's late stamps."""
         return stamped(recorded, -self._of.force_stamp * self.rig.frame_rate)

@@ -1,8 +1,7 @@
 """Each stage's residual: what is measured less what the stage makes of its measured input.
 
 The chain is cut at every measured signal, so that a fault upstream is inherited by nobody.
-Inputs are smoothed first (`smooth`). A residual is divided by the channel's floor: its own
-white noise, estimated by fourth differences (gain √70), and the input's carried through the stage.
+Inputs are smoothed (`smooth`). A residual is over its floor: its own noise and its inputs'.
 
     schedule      q̄ → G_T                       surface   δ̂, q̄ → its position
     loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
@@ -10,8 +9,7 @@ white noise, estimated by fourth differences (gain √70), and the input's carri
     linkage       δc, F → δ
     compensation  δc, F → δ̂ (the host's own arithmetic)
 
-A wrong scale S₁ is not a stage that can be driven alone: it shows in the loader's, the
-multiplier's and the linkage's residuals at once, so it is judged on all three.
+A wrong scale S₁ cannot be driven alone: it shows in all three of loader, multiplier and linkage.
 """
 
 from __future__ import annotations
@@ -258,7 +256,7 @@ class Reader:
     def _linkage(self) -> list[Output]:
         computed, force, measured = map(self.signal, ("computed", "force", "deflection"))
         levels = self._heard("computed"), self._heard("force")
-        smooth, smooth_force = smoothed(computed), smoothed(force)
+        smooth, smooth_force = map(smoothed, (computed, force))
         others = {name: smoothed(signal) for name, signal in self.others().items()}
         noise = passed_noise(self.rig, (computed, force), levels)
 
@@ -267,18 +265,17 @@ class Reader:
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = Sensed(rig, self.control)
-                moved = (nodes + times * noise[0]) / sensed.scale_on_nodes(len(nodes))
-                pull = sensed.force(f + times * noise[1])
-                return sensed.zero + drive_linkage(rig, self.control, moved, pull, others)
+                driven_by = sensed.both(nodes + times * noise[0], f + times * noise[1])
+                return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
             return lambda rig: unratcheted(rig, self.control, at)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            c = with_error(smooth, k, levels[0])
-            return driven(c, with_error(smooth_force, k + NOISE_TRIES, levels[1]))(rig)
+            f = with_error(smooth_force, k + NOISE_TRIES, levels[1])
+            return driven(with_error(smooth, k, levels[0]), f)(rig)
 
-        name, predict = self._name("deflection"), driven(smooth, smooth_force)
-        return [self._made("linkage", name, measured, predict, noisy, self._heard("deflection"))]
+        made = (measured, driven(smooth, smooth_force), noisy, self._heard("deflection"))
+        return [self._made("linkage", self._name("deflection"), *made)]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)
