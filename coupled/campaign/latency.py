@@ -41,6 +41,7 @@ AT_ONCE: dict[str, Any] = {
     "loader.delay_s": 0.0,
     "loader.modifying_lag_s": 0.0,
     "loader.multiplier": "hybrid",
+    "loader.bend_frequency_Hz": 0.0,
     "schedule.pressure_lag_s": 0.0,
     "compensation.inertia_gradient_N_per_{d}": None,
     "compensation.mass_factor": None,
