@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import islice
 
 LONGEST = 200  # characters of a user's word that a message repeats
 LONGEST_MESSAGE = 3000  # characters of a whole message
+MISSING = "is missing"  # the problem of a key that must be given
 LISTED = 100  # known words that a hint lists
 _SEARCHED = 2000  # known words that a hint is sought among
 
@@ -39,7 +41,8 @@ class InputError(ValueError):
     """Input that cannot be used. Its text is the one line that a user sees.
 
     Parameters: `file` where the fault stands, `key` within it (dotted; may be
-    empty), and `problem`, which also says what would be right.
+    empty), and `problem`, which also says what would be right. `more` are further
+    faults of the same file, each a line of its own.
 
     >>> import coupled
     >>> try:
@@ -49,14 +52,53 @@ class InputError(ValueError):
     t38: is no shipped rig; did you mean t37?
     """
 
-    def __init__(self, file: object, key: str, problem: str) -> None:
+    def __init__(
+        self, file: object, key: str, problem: str, more: Sequence[InputError] = ()
+    ) -> None:
+        self.more = tuple(more)
         self.file, self.key, self.problem = shown(str(file)), shown(key), _sentence(problem)
         where = f"{self.file}: {self.key}: " if key else f"{self.file}: "
         super().__init__(where + self.problem)
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+    def __reduce__(
+        self,
+    ) -> tuple[type[InputError], tuple[str, str, str, tuple[InputError, ...]]]:
         """Let it pass from one process to another."""
-        return InputError, (self.file, self.key, self.problem)
+        return InputError, (self.file, self.key, self.problem, self.more)
+
+    @property
+    def every(self) -> tuple[InputError, ...]:
+        """The fault, and the further ones of its file."""
+        return (self, *self.more)
+
+
+@contextmanager
+def collected(faults: list[InputError]) -> Iterator[None]:
+    """Keep the faults of what is done within, so that those of the rest are found, too."""
+    try:
+        yield
+    except InputError as error:
+        faults += [InputError(one.file, one.key, one.problem) for one in error.every]
+
+
+def together(faults: Sequence[InputError]) -> InputError:
+    """Return the faults of a file as one that is raised: the first, with the others."""
+    every = [one for fault in faults for one in fault.every]
+    hints = " ".join(one.problem for one in every)
+    found: dict[tuple[str, str], InputError] = {}
+    for one in every:
+        name = one.key.rpartition(".")[2]
+        renamed = f"give {name} instead" in hints or f"did you mean {name}?" in hints
+        wrong = any(
+            other.key.startswith(f"{one.key}.")
+            or (other.key == one.key and other.problem != MISSING)
+            for other in every
+        )
+        if one.problem == MISSING and (renamed or wrong):
+            continue  # it is there, by another name or with a fault of its own
+        found.setdefault((one.key, one.problem), InputError(one.file, one.key, one.problem))
+    first, *others = found.values()
+    return InputError(first.file, first.key, first.problem, others)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

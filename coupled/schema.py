@@ -15,7 +15,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from coupled.errors import InputError, nearest
+from coupled.errors import MISSING, InputError, collected, nearest, together
 from coupled.files import read_text
 
 
@@ -55,6 +55,7 @@ S = TypeVar("S", bound=Section)
 LARGEST = 1e12  # no quantity of a rig or a record is larger, in SI
 SMALLEST = 1e-30  # nor any but zero smaller
 MOST_TOML_bytes = 2**20  # tomllib takes seconds for a MiB
+MOST_FAULTS = 20  # of one table that are named
 MOST_DOTS = 100  # in a dotted key; tomllib's time grows with their square
 
 
@@ -116,14 +117,20 @@ def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) 
     """Return the table, once it is one and has only known keys."""
     if not isinstance(table, dict):
         raise InputError(file, path, f"should be a table, is {_shown(table)}")
+    faults = []
     for key in table:
         if key in keys:
             continue
         dotted = f"{path}.{key}" if path else key
         meant = _other_unit(key, keys)
-        if meant:
-            raise InputError(file, dotted, f"wrong unit: give {meant} instead")
-        raise InputError(file, dotted, f"unknown key; {nearest(key, keys)}")
+        hint = f"unknown key; {nearest(key, keys)}"
+        faults.append(
+            InputError(file, dotted, f"wrong unit: give {meant} instead" if meant else hint)
+        )
+        if len(faults) == MOST_FAULTS:
+            break
+    if faults:
+        raise together(faults)
     return table
 
 
@@ -145,25 +152,10 @@ def _other_unit(key: str, keys: Mapping[str, object]) -> str:
 
 
 _UNITS = frozenset(
-    (
-        *("m", "mm", "cm", "in", "inch", "ft", "rad", "deg", "degrees"),
-        *("kg", "g", "lb", "lbs", "lbf", "slug", "n", "kn", "pa", "psf", "psi"),
-        *(
-            "s",
-            "ms",
-            "min",
-            "h",
-            "hz",
-            "kt",
-            "kts",
-            "knots",
-            "per",
-            "norm",
-            "v",
-            "volt",
-            "volts",
-            "bits",
-        ),
+    re.findall(
+        r"\w+",
+        "m mm cm in inch ft rad deg degrees kg g lb lbs lbf slug n kn pa psf psi s ms min h hz kt"
+        " kts knots per norm v volt volts bits",
     )
 )
 
@@ -174,24 +166,33 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
     `path` is the dotted place of the table in `file`; `d` the unit of deflection.
     """
     keys = file_keys(section, d)
-    table = known_keys(table, keys, file, path)
+    if not isinstance(table, dict):
+        known_keys(table, keys, file, path)
+    faults: list[InputError] = []
+    with collected(faults):
+        known_keys(table, keys, file, path)
     values = {}
-    for key, given in table.items():
-        value = given
+    for key in [key for key in table if key in keys]:
         kind = section.model_fields[keys[key]].annotation
         dotted = f"{path}.{key}" if path else key
-        if isinstance(kind, type) and issubclass(kind, Section):
-            value = build(kind, value, file, dotted, d)
-        else:
-            _refuse_unreal(value, file, dotted)
-        values[keys[key]] = value
+        with collected(faults):
+            value = table[key]
+            if isinstance(kind, type) and issubclass(kind, Section):
+                value = build(kind, value, file, dotted, d)
+            else:
+                _refuse_unreal(value, file, dotted)
+            values[keys[key]] = value
+    made: S | None = None
     try:
-        return section(**values)
+        made = section(**values)
     except ValidationError as error:
-        raise _first_fault(error, keys, file, path) from None
+        faults += _faults(error, keys, file, path)
     except InputError as error:  # of a section that names itself
         dotted = f"{path}.{error.key}" if path else error.key
-        raise InputError(file, dotted, error.problem) from None
+        faults.append(InputError(file, dotted, error.problem))
+    if faults or made is None:
+        raise together(faults)
+    return made
 
 
 def grouped(changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -262,17 +263,25 @@ def _refuse_unreal(value: Any, file: object, key: str) -> None:
 def _first_fault(
     error: ValidationError, keys: Mapping[str, str], file: object, path: str
 ) -> InputError:
-    fault = error.errors()[0]
+    return together(_faults(error, keys, file, path))
+
+
+def _faults(
+    error: ValidationError, keys: Mapping[str, str], file: object, path: str
+) -> list[InputError]:
+    """Return each fault that a section's values have, under its key in the file."""
     by_field = {field: key for key, field in keys.items()}
-    place = [str(part) for part in fault["loc"]]
-    if place:
-        place[0] = by_field.get(place[0], place[0])
-    dotted = ".".join(([path] if path else []) + place)
-    if fault["type"] == "missing":
-        return InputError(file, dotted, "is missing")
-    message = fault["msg"]
-    message = message[0].lower() + message[1:]
-    return InputError(file, dotted, f"{message}, is {_shown(fault['input'])}")
+    found: dict[str, InputError] = {}
+    for fault in error.errors():
+        place = [str(part) for part in fault["loc"]]
+        if place:
+            place[0] = by_field.get(place[0], place[0])
+        dotted = ".".join(([path] if path else []) + place)
+        message = fault["msg"]
+        message = f"{message[0].lower()}{message[1:]}, is {_shown(fault['input'])}"
+        problem = MISSING if fault["type"] == "missing" else message
+        found.setdefault(dotted, InputError(file, dotted, problem))
+    return list(found.values())
 
 
 def _shown(value: object) -> str:

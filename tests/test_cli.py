@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -267,7 +268,7 @@ HOSTILE = [
 @pytest.mark.parametrize(
     ("which", "old", "new"), HOSTILE, ids=[str(i) for i in range(len(HOSTILE))]
 )
-def test_hostile_files_end_in_one_line(folder: Path, which: str, old: str, new: str) -> None:
+def test_hostile_files_end_in_a_line_a_fault(folder: Path, which: str, old: str, new: str) -> None:
     """Found by trying: each of these once died, hung, or wrote where it should not."""
     (folder / "t.csv").write_text("time_s,column_force_N\n0,0\n1,1\n")
     rig = (ROOT / RIG).read_text(encoding="utf-8")
@@ -284,7 +285,7 @@ def test_hostile_files_end_in_one_line(folder: Path, which: str, old: str, new: 
     done = coupled(folder, "fly", "short.toml")
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("error: "), done.stderr
-    assert done.stderr.count("\n") == 1
+    assert all(line.startswith("error: ") for line in done.stderr.splitlines())
     assert len(done.stderr) < 700
     assert done.stdout == ""
     assert files(folder.parent) == before
@@ -323,3 +324,36 @@ def test_a_dollar_sign_is_a_word_and_a_bracket_a_file(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert coupled(folder, "fly", "short.toml", "-o", "r[1].csv").returncode == 0
     assert coupled(folder, "plot", "r[1].csv", "--figure", "$x.png").returncode == 0
+
+
+def test_units_of_people_are_theirs_and_those_of_files_stay(folder: Path) -> None:
+    words = ("compare", "short.toml", "--no-figure", "--json", "t.json")
+    si, us = coupled(folder, *words), coupled(folder, *words, "--units", "us")
+    assert us.returncode == 0, us.stderr
+    kept = json.loads((folder / "t.json").read_text())
+    assert kept[0]["force_N"] == pytest.approx(40.0)
+    assert "force needed, N" in si.stdout
+    [row] = [line for line in us.stdout.splitlines() if "force needed, lb" in line]
+    assert [float(cell) for cell in row.split()[-2:]] == [9.0, 9.0]  # 40 N are 8.99 lb
+    assert "hand's travel, in" in us.stdout
+    expected = SHORT + '\n[[expect]]\nmeasure = "force_N"\nmost = 44.4822\n'
+    (folder / "held.toml").write_text(expected)
+    assert "≤ 10 lb" in coupled(folder, "check", "held.toml", "--units", "us").stdout
+    assert "≤ 44.48 N" in coupled(folder, "check", "held.toml").stdout
+    refused = coupled(folder, "compare", "short.toml", "--units", "uk")
+    assert refused.returncode == 2
+
+
+def test_a_shell_completes_commands() -> None:
+    environment = {
+        **os.environ,
+        "_COUPLED_COMPLETE": "complete_bash",
+        "COMP_WORDS": "coupled new r",
+        "COMP_CWORD": "2",
+    }
+    script = "import sys; sys.argv = ['coupled']; from coupled.__main__ import command; command()"
+    done = subprocess.run(
+        [sys.executable, "-c", script], check=False, env=environment, capture_output=True, text=True
+    )
+    assert {"run", "readings"} <= set(done.stdout.split()), done
+    assert "sweep" not in done.stdout

@@ -27,7 +27,17 @@ PACKAGE = Path(__file__).parents[1] / "coupled"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # A room may import from the rooms left of it.
-ORDER = ["errors", "timing", "units", "files", "outputs", "parallel", "schema", "resources"]
+ORDER = [
+    "errors",
+    "timing",
+    "units",
+    "display",
+    "files",
+    "outputs",
+    "parallel",
+    "schema",
+    "resources",
+]
 ORDER += [
     "record/channels",
     "plots/histories",

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from coupled.display import System, shown
 from coupled.record.channels import unit_of
-from coupled.units import DEGREE_rad
+from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight, Outcome
@@ -49,36 +50,43 @@ FIGURES: tuple[Figure, ...] = (
     Figure("loss_closed_form", "  by closed form, %", lambda x: f"{100 * x:.2f}"),
     Figure("felt_ratio", "felt of specified gradient", lambda x: f"{x:.3f}"),
     Figure("felt_ratio_closed_form", "  by closed form", lambda x: f"{x:.3f}"),
-    Figure("force_N", "force needed, N", lambda x: f"{x:.1f}"),
-    Figure("force_step_N", "force step, N", lambda x: f"{x:.2f}"),
+    Figure("force_N", "force needed, {force}", lambda x: f"{x:.1f}"),
+    Figure("force_step_N", "force step, {force}", lambda x: f"{x:.2f}"),
     Figure("peak_rate_rad_per_s", "peak {rate} rate, °/s", lambda x: f"{x / DEGREE_rad:.2f}"),
     Figure("peak_load_factor", "peak load factor", lambda x: f"{x:.3f}"),
     Figure("time_to_attitude_s", "time to {change:.1f}° of {angle}, s", lambda x: f"{x:.2f}"),
 )
 
 
-def rows(flights: Sequence[Flight]) -> Iterator[tuple[str, list[str]]]:
+def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str, list[str]]]:
     """Yield each figure that any of the flights has: its label, and how it is written of each."""
     manoeuvre = flights[0].manoeuvre
     rate, angle = _WORDS[manoeuvre.control]
     change = manoeuvre.measure.attitude_change / DEGREE_rad
-    size, unit = _travel(manoeuvre)
+    size, unit = _travel(manoeuvre, system)
+    force = shown("force_N", system)
+    factors = {"hand_travel_norm": size, "force_N": force.factor, "force_step_N": force.factor}
     for figure in FIGURES:
-        factor = size if figure.field == "hand_travel_norm" else 1.0
+        factor = factors.get(figure.field, 1.0)
         written = [figure.written(flight.outcome, factor) for flight in flights]
         if any(text != NONE for text in written):
-            yield figure.label.format(rate=rate, angle=angle, change=change, unit=unit), written
+            yield (
+                figure.label.format(
+                    rate=rate, angle=angle, change=change, unit=unit, force=force.unit
+                ),
+                written,
+            )
 
 
-def _travel(manoeuvre: Manoeuvre) -> tuple[float, str]:
+def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
     """Return the travel of the control that is looked at, and the unit it is written in."""
     travel = manoeuvre.rig.controls[manoeuvre.control].travel
     if unit_of(manoeuvre.control) == "rad":
         return travel / DEGREE_rad, "°"
-    return 1000.0 * travel, "mm"
+    return (travel / INCH_m, "in") if system == "us" else (1000.0 * travel, "mm")
 
 
-def further(case: Sequence[Flight]) -> str:
+def further(case: Sequence[Flight], system: System = "si") -> str:
     """Return why authority is lost where a force moves the surface as on the rigid rig.
 
     Nothing where the hand does not hold a force, or moves no further for it.
@@ -92,9 +100,10 @@ def further(case: Sequence[Flight]) -> str:
     further = abs(bent.hand_travel_norm) - abs(rigid.hand_travel_norm)
     if not further > _NOTICED:
         return ""
-    size, unit = _travel(manoeuvre)
+    size, unit = _travel(manoeuvre, system)
+    digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
-    places = [f"{size * abs(each.hand_travel_norm):.0f} {unit}" for each in (bent, rigid)]
+    places = [f"{size * abs(each.hand_travel_norm):.{digits}f} {unit}" for each in (bent, rigid)]
     alike = abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)
     surface = "the surface goes about as far, while" if alike else "and"
     return (

@@ -120,4 +120,4 @@ def _verdict(
         return judge_expectation(expect, flight, other)
     except UnjudgedError as why:
         where = (scenario.name, scenario.label, configuration)
-        return Verdict(*where, expect.words, None, *expect.bounds, str(why))
+        return Verdict(*where, expect.words, None, *expect.bounds, str(why), expect.quantity)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from coupled.authority.compare import Flight
 from coupled.campaign.standards import StandardFigure, judge_standard
 from coupled.campaign.unjudged import UnjudgedError
+from coupled.display import System, shown, unit_in
 from coupled.flight.expectation import Expect
 from coupled.record.channels import TIME
 
@@ -26,7 +27,8 @@ Bounds = tuple[float | None, float | None]
 class Verdict:
     """What became of one expectation on one flight; `value` and its bounds in one unit.
 
-    `problem` says why a figure could not be had; there is none then.
+    `problem` says why a figure could not be had; there is none then. `quantity` is a name that
+    ends in the unit of value and bounds, as `force_N`.
     """
 
     run: str
@@ -37,6 +39,7 @@ class Verdict:
     least: float | None
     most: float | None
     problem: str = ""
+    quantity: str = ""
 
     @property
     def margin(self) -> float | None:
@@ -50,25 +53,43 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
-        return {**self.__dict__, "margin": self.margin, "passed": self.passed}
+        table = {key: value for key, value in self.__dict__.items() if key != "quantity"}
+        unit = unit_in(self.quantity).replace("_per_", "/")
+        return {**table, "unit": unit, "margin": self.margin, "passed": self.passed}
 
 
-def wanted(verdict: Verdict) -> str:
-    """Return the bounds, as `0.2 to 0.3`, `≥ 0.2` or `≤ 0.3`."""
-    least, most = verdict.least, verdict.most
+def wanted(verdict: Verdict, system: System = "si") -> str:
+    """Return the bounds with their unit, as `0.2 to 0.3 N`, `≥ 0.2 N` or `≤ 0.3 N`."""
+    unit = shown(verdict.quantity, system)
+    least, most = (
+        None if bound is None else unit.written(bound) for bound in (verdict.least, verdict.most)
+    )
     if least is not None and most is not None:
-        return f"{least:.4g} to {most:.4g}"
-    if least is not None:
-        return f"≥ {least:.4g}"
-    return "" if most is None else f"≤ {most:.4g}"
+        text = f"{least} to {most}"
+    elif least is not None:
+        text = f"≥ {least}"
+    else:
+        text = "" if most is None else f"≤ {most}"
+    return f"{text} {unit.unit}".strip() if text else ""
 
 
-def finding(verdict: Verdict) -> str:
+def figures(verdict: Verdict, system: System = "si") -> tuple[str, str]:
+    """Return what was found, and its margin, each with its unit; a dash where there is none."""
+    if verdict.value is None or verdict.margin is None:
+        return "–", "–"
+    unit = shown(verdict.quantity, system)
+    pair = (unit.written(verdict.value), unit.written(verdict.margin, 2))
+    found, margin = (f"{text} {unit.unit}".strip() for text in pair)
+    return found, margin
+
+
+def finding(verdict: Verdict, system: System = "si") -> str:
     """Return what was found, in one line."""
-    bounds = f" (wanted {wanted(verdict)})" if wanted(verdict) else ""
+    bounds = f" (wanted {wanted(verdict, system)})" if wanted(verdict) else ""
     if verdict.value is None or verdict.margin is None:
         return verdict.problem + bounds
-    return f"{verdict.value:.6g}{bounds}, margin {verdict.margin:.3g}"
+    found, margin = figures(verdict, system)
+    return f"{found}{bounds}, margin {margin}"
 
 
 def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | None) -> Verdict:
@@ -81,7 +102,8 @@ def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | Non
     run = flight.manoeuvre
     what = expect.words + figure.note
     bounds = (figure.least, figure.most)
-    return Verdict(run.name, run.label, flight.configuration, what, figure.value, *bounds)
+    where = (run.name, run.label, flight.configuration, what)
+    return Verdict(*where, figure.value, *bounds, quantity=expect.quantity)
 
 
 def _figure(expect: Expect, flight: Flight, other: Flight | None) -> StandardFigure:

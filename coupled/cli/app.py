@@ -29,11 +29,12 @@ from coupled.cli.process import (
     silence_streams,
 )
 from coupled.cli.terminal import ReaderGoneError, err, out, say_error
+from coupled.display import System
 from coupled.errors import InputError, shown
 from coupled.timing import parts
 
 app = typer.Typer(
-    add_completion=False,
+    add_completion=True,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -41,6 +42,7 @@ app = typer.Typer(
     epilog="[dim]First steps: coupled runs · coupled compare · coupled diagnose --help[/]",
 )
 
+_FAULTS = 3000  # characters of a file's faults that are printed
 _GARBAGE = 100_000  # a command is short: its garbage is looked for less often
 
 RunArgument = Annotated[
@@ -48,6 +50,14 @@ RunArgument = Annotated[
 ]
 JsonOption = Annotated[
     str, typer.Option("--json", metavar="FILE", help="Write the table as JSON; - prints it.")
+]
+
+
+UnitsOption = Annotated[
+    System,
+    typer.Option(
+        "--units", help="What people read: si, or us for lb, in, kt, ft. Files stay in SI."
+    ),
 ]
 
 
@@ -81,14 +91,15 @@ def _run() -> int:
     except (ReaderGoneError, BrokenPipeError):
         return PIPE_CLOSED
     except InputError as error:
-        line = str(error)
+        line = _lines_of(error)
     except TyperException as error:  # a word of the command line that it does not know
         words = " ".join(error.format_message().split())
         line = shown(words, 400) + " (coupled --help shows what there is)"
     except (OSError, MemoryError) as error:
         line = said_of(error)
     with contextlib.suppress(OSError):
-        say_error(line)
+        for each in line.split("\n"):
+            say_error(each)
     return REFUSED
 
 
@@ -97,6 +108,17 @@ def check_cluster(workers: int | None, cluster: str) -> tuple[int, str]:
     if cluster and workers is not None:
         raise InputError("--workers", "", "a cluster has its own; leave it out")
     return workers or 0, cluster
+
+
+def _lines_of(error: InputError) -> str:
+    """Return the faults of a file, a line each; how many more there are where that is long."""
+    lines = [str(one) for one in error.every]
+    kept = lines[:1]
+    for line in lines[1:]:
+        if len("\n".join([*kept, line])) > _FAULTS:
+            return "\n".join([*kept, f"{error.file}: {len(lines) - len(kept)} more faults"])
+        kept.append(line)
+    return "\n".join(kept)
 
 
 def _version(wanted: bool) -> None:

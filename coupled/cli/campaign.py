@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app, check_cluster
+from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
 from coupled.cli.process import asked_to_stop
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
@@ -19,6 +19,7 @@ from coupled.resources import find, shipped_sweeps
 
 if TYPE_CHECKING:
     from coupled.campaign.sweep import SweepResult
+    from coupled.display import System
 
 
 @app.command(
@@ -30,6 +31,7 @@ def check(
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Fly runs and hold them against their expectations; exit code 1 if any fails."""
     from coupled.campaign.check import check as check_runs
@@ -62,7 +64,7 @@ def check(
 
             write_report(report, outputs, inputs, lambda made: reported(checked, made))
     if json_file != "-":
-        print_verdicts(out, checked.verdicts)
+        print_verdicts(out, checked.verdicts, units)
         if junit is not None:
             say(f"JUnit XML: {junit}")
         say_report(report)
@@ -95,6 +97,7 @@ def sweep(
     ] = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Fly a run over values of its parameters, to one table; called again, it goes on."""
     from coupled.campaign.journal import JOURNAL
@@ -128,7 +131,7 @@ def sweep(
     except KeyboardInterrupt:
         err.print("[yellow]interrupted:[/] finished flights are kept; the same command goes on")
         raise typer.Exit(130) from None
-    _show(found, target, path, json_file, report)
+    _show(found, target, path, json_file, (report, units))
 
 
 def _say_found(found: int, flights: int) -> None:
@@ -141,9 +144,17 @@ def _say_found(found: int, flights: int) -> None:
 
 
 def _show(
-    found: SweepResult, target: Path, path: Path, json_file: str, report: Path | None
+    found: SweepResult,
+    target: Path,
+    path: Path,
+    json_file: str,
+    handed: tuple[Path | None, System],
 ) -> None:
-    """Draw and print a sweep's table, with its indices or boundaries where they are asked for."""
+    """Draw and print a sweep's table, with its indices or boundaries where they are asked for.
+
+    `handed` is the report's file, if any, and the units of the tables.
+    """
+    report, units = handed
     from coupled.campaign.sensitivity import INDICES, write_indices
     from coupled.campaign.sweep import TABLE
     from coupled.cli.tables.campaign import print_indices, print_survival, print_sweep
@@ -163,7 +174,7 @@ def _show(
             inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
             write_report(report, outputs, inputs, lambda made: sweep_report(found, made))
     if json_file != "-":
-        print_sweep(out, table, asked.keep)
+        print_sweep(out, table, asked.keep, units)
         print_survival(out, found.limits)
         say(f"table: {target / TABLE}  ({len(table)} flights)")
         if found.indices:

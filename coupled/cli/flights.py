@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from coupled.cli.app import JsonOption, RunArgument, app
+from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_stale
@@ -36,6 +36,7 @@ def compare(
     json_file: JsonOption = "",
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -71,7 +72,7 @@ def compare(
 
             write_report(report, outputs, inputs, lambda made: comparison_report(flights, made))
     if json_file != "-":
-        print_comparison(out, flights)
+        print_comparison(out, flights, units)
         if not no_figure:
             say(f"figure: {path}")
         say_report(report)

@@ -119,6 +119,15 @@ class Expect(Section):
         return self.configuration in (None, configuration)
 
     @property
+    def quantity(self) -> str:
+        """A name that ends in the unit of the figure and its bounds."""
+        if self.reaches is not None or self.standard in LATENCIES:
+            return "time_s"
+        if self.standard in RATES:
+            return "rate_rad_per_s"
+        return self.channel or self.measure or "force_N"
+
+    @property
     def words(self) -> str:
         """What is looked at, for people."""
         text = self.channel or self.measure or self.standard or ""

@@ -10,7 +10,7 @@ import copy
 from pathlib import Path
 from typing import Any, cast
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, collected, nearest, together
 from coupled.flight.conditions import Conditions, build_conditions
 from coupled.flight.expectation import Expect, check_expectations
 from coupled.flight.manoeuvre import (
@@ -60,16 +60,7 @@ def manoeuvres_from_table(table: dict[str, Any], file: Path) -> list[Manoeuvre]:
     """Return the cases of a run from its file's tables; `file` is named in faults."""
     pilots = table.pop("pilot", None)
     keys = {**file_keys(RunFile, "m"), "pilot": "pilot"}
-    known_keys(table, keys, file, "")
-    if "bench" in table:
-        table["bench"] = build(PressureProfile, table["bench"], file, "bench")
-    build_conditions(table, file)
-    for key, each in (("case", Case), ("expect", Expect)):
-        listed = table.get(key, [])
-        if not isinstance(listed, list):
-            raise InputError(file, key, f"each is written [[{key}]]")
-        table[key] = [build(each, item, file, f"{key}[{i}]") for i, item in enumerate(listed)]
-    run = build(RunFile, table, file, "")
+    run = _checked_run(table, keys, pilots, file)
     if run.bench is not None:
         run.bench.check(file)
     _refuse_duplicates(run, file)
@@ -78,6 +69,38 @@ def manoeuvres_from_table(table: dict[str, Any], file: Path) -> list[Manoeuvre]:
     channels = {each.label: each.channels for each in found}
     check_expectations(run.expect, file, channels, run.configurations, run.duration)
     return found
+
+
+def _checked_run(table: dict[str, Any], keys: dict[str, str], pilots: Any, file: Path) -> RunFile:
+    """Return a run file's tables, checked; all their faults are raised together."""
+    faults: list[InputError] = []
+    with collected(faults):
+        known_keys(table, keys, file, "")
+    if "bench" in table:
+        with collected(faults):
+            table["bench"] = build(PressureProfile, table["bench"], file, "bench")
+    with collected(faults):
+        build_conditions(table, file)
+    for key, each in (("case", Case), ("expect", Expect)):
+        listed = table.get(key, [])
+        if not isinstance(listed, list):
+            faults.append(InputError(file, key, f"each is written [[{key}]]"))
+            continue
+        made = []
+        for i, item in enumerate(listed):
+            with collected(faults):
+                made.append(build(each, item, file, f"{key}[{i}]"))
+        table[key] = made
+    if not faults:
+        return build(RunFile, table, file, "")
+    sections = ("bench", "case", "expect", *Conditions.model_fields)
+    plain = {key: value for key, value in table.items() if key in keys and key not in sections}
+    with collected(faults):
+        build(RunFile, plain, file, "")
+    with collected(faults):
+        rig = read_rig(find(str(table.get("rig", "")), shipped_rigs(), "rig", beside=file.parent))
+        _pilots(pilots, rig, file)
+    raise together(faults)
 
 
 def _manoeuvre(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> Manoeuvre:

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from coupled.campaign.check import CheckResult
 from coupled.campaign.verdict import Verdict as Judged
-from coupled.campaign.verdict import finding, wanted
+from coupled.campaign.verdict import figures, finding, wanted
 from coupled.reports.page import Made, Mark, Report, Section, Table, Verdict, passed
 
 _HEADS = ("", "case", "expected of", "configuration", "found", "wanted", "margin")
@@ -40,5 +40,6 @@ def _row(verdict: Judged) -> tuple[str | Mark, ...]:
     if verdict.value is None or verdict.margin is None:
         what = f"{verdict.what}: {verdict.problem}"
         return mark, verdict.case, what, verdict.configuration, "–", wanted(verdict), "–"
-    numbers = (f"{verdict.value:.4g}", wanted(verdict), f"{verdict.margin:.3g}")
+    found, margin = figures(verdict)
+    numbers = (found, wanted(verdict), margin)
     return mark, verdict.case, verdict.what, verdict.configuration, *numbers

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from coupled.errors import InputError
+from coupled.errors import InputError, collected, together
 from coupled.record.channels import CONTROL_NAMES, unit_of
 from coupled.rig.parameters import Control, Flight
 from coupled.rig.rig import Rig, checked
@@ -36,18 +36,28 @@ def change(table: dict[str, Any], key: str, value: Any) -> bool:
 
 def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
     """Return a rig from the tables of a rig file; `file` is named in faults."""
-    known_keys(table, file_keys(Rig, "m"), file, "")
+    known = file_keys(Rig, "m")
+    values = {key: value for key, value in table.items() if key in known}
+    faults: list[InputError] = []
+    with collected(faults):
+        known_keys(table, known, file, "")
     controls = table.get("controls")
     if not isinstance(controls, dict) or not controls:
-        raise InputError(file, "controls", f"needs at least one of {', '.join(CONTROL_NAMES)}")
-    known_keys(controls, dict.fromkeys(CONTROL_NAMES), file, "controls")
-    values = dict(table)
-    values["controls"] = {
-        name: build(Control, controls[name], file, f"controls.{name}", unit_of(name))
-        for name in CONTROL_NAMES
-        if name in controls
-    }
-    if "flight" in table:
-        values["flight"] = build(Flight, table["flight"], file, "flight")
+        problem = f"needs at least one of {', '.join(CONTROL_NAMES)}"
+        raise together([*faults, InputError(file, "controls", problem)])
+    with collected(faults):
+        known_keys(controls, dict.fromkeys(CONTROL_NAMES), file, "controls")
+    made: dict[str, Control] = {}
+    for name in [name for name in CONTROL_NAMES if name in controls]:
+        with collected(faults):
+            made[name] = build(Control, controls[name], file, f"controls.{name}", unit_of(name))
+    values["controls"] = made
+    if "flight" in values:
+        with collected(faults):
+            values["flight"] = build(Flight, values.pop("flight"), file, "flight")
+    if faults:
+        with collected(faults):  # the rest, without controls to be judged by
+            build(Rig, {**values, "controls": {}}, file, "")
+        raise together(faults)
     rig = build(Rig, values, file, "")
     return checked(rig, file)

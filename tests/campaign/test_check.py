@@ -355,7 +355,7 @@ def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
     failure, error = suite.find(".//failure"), suite.find(".//error")
     assert failure is not None
     assert error is not None
-    assert failure.get("message") == "40 (wanted ≤ 30), margin -10"
+    assert failure.get("message") == "40 N (wanted ≤ 30 N), margin -10 N"
     assert (error.get("message") or "").startswith("never reached; at last it is 40")
     rows = json.loads((tmp_path / "t.json").read_text())
     assert [row["passed"] for row in rows] == [True, True, False, False]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import change, read_rig, rig_from_table
 from coupled.rig.rigwrite import rig_text
+from coupled.schema import loads_toml
 from tests.support.rigs import BENCH, bench
 
 LOADER = "controls.column.loader"
@@ -158,3 +160,42 @@ def test_a_wheel_is_in_rad() -> None:
     wheel["travel_m"] = wheel.pop("travel_rad")
     with pytest.raises(InputError, match="give travel_rad instead"):
         rig_from_table(table, "t")
+
+
+FAULTY = """
+name = "my rig"
+frame_rate = 120
+[flight]
+model = "T37"
+altitude_m = "high"
+calibrated_airspeed_m_per_s = 100.0
+[controls.column]
+surface = "elevator"
+travel_in = 7
+[controls.column.loader]
+mass_kg = -4.0
+damping_N_s_per_m = 75.0
+basic_gradient_N_per_m = 560.4
+servo_frequency_Hz = 18.0
+servo_dampng_ratio = 0.7
+[controls.column.schedule]
+dynamic_pressure_Pa = [0.0, 1.0]
+"""
+
+
+def test_all_faults_of_a_file_are_named_at_once_and_each_once() -> None:
+    with pytest.raises(InputError) as fault:
+        rig_from_table(loads_toml(FAULTY, "f"), "f")
+    column = "controls.column"
+    assert [one.key for one in fault.value.every] == [
+        "frame_rate",
+        f"{column}.travel_in",
+        f"{column}.loader.servo_dampng_ratio",
+        f"{column}.loader.mass_kg",
+        f"{column}.schedule.total_gradient_N_per_m",
+        f"{column}.compensation",
+        "flight.altitude_m",
+        "name",
+    ]
+    assert str(fault.value) == "f: frame_rate: wrong unit: give frame_rate_Hz instead"
+    assert pickle.loads(pickle.dumps(fault.value)).every[-1].key == "name"

@@ -12,7 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from coupled.campaign.labels import parameter_label
+from coupled.campaign.verdict import figures as figures_of
 from coupled.campaign.verdict import wanted
+from coupled.display import System, shown, unit_in
 
 if TYPE_CHECKING:
     from coupled.campaign.sensitivity import SobolIndex
@@ -22,30 +24,33 @@ if TYPE_CHECKING:
 _SHOWN = 6  # parameters of a figure, the strongest
 
 
-def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
-    """Print a table a case, and how many passed."""
+def print_verdicts(console: Console, verdicts: Sequence[Verdict], system: System = "si") -> None:
+    """Print a table a case, figures with their units, and how many passed."""
     for (run, case), group in groupby(verdicts, key=lambda v: (v.run, v.case)):
         console.print(escape(run if run == case else f"{run}: {case}"), style="bold")
         table = Table("", "expected of", box=None, pad_edge=False)
         for head in ("found", "wanted", "margin"):
             table.add_column(head, justify="right", overflow="fold")
         for verdict in group:
-            table.add_row(*_cells(verdict))
+            table.add_row(*_cells(verdict, system))
         console.print(table)
         console.print()
     passed = sum(verdict.passed for verdict in verdicts)
     console.print(f"{passed} of {len(verdicts)} expectations hold", highlight=False)
 
 
-def _cells(verdict: Verdict) -> tuple[str, ...]:
+def _cells(verdict: Verdict, system: System) -> tuple[str, ...]:
     mark = "[green]pass[/]" if verdict.passed else "[red]FAIL[/]"
     what = f"{verdict.what} \\[{verdict.configuration}]"
     if verdict.value is None or verdict.margin is None:
-        return mark, f"{what}: {escape(verdict.problem)}", "–", wanted(verdict), "–"
-    return mark, what, f"{verdict.value:.4g}", wanted(verdict), f"{verdict.margin:.2g}"
+        return mark, f"{what}: {escape(verdict.problem)}", "–", wanted(verdict, system), "–"
+    found, margin = figures_of(verdict, system)
+    return mark, what, found, wanted(verdict, system), margin
 
 
-def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -> None:
+def print_sweep(
+    console: Console, found: pl.DataFrame, figures: Sequence[str], system: System = "si"
+) -> None:
     """Print how each figure lies over the flights that did not end early, and why others did."""
     flown = found.filter(pl.col("ended_early") == "")
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
@@ -58,14 +63,21 @@ def print_sweep(console: Console, found: pl.DataFrame, figures: Sequence[str]) -
         for name in figures:
             values = rows[name].drop_nulls()
             shares = [values.quantile(share, "linear") for share in (0.0, 0.05, 0.5, 0.95, 1.0)]
-            cells = ["–" if value is None else f"{value:.3g}" for value in shares]
-            table.add_row(f" {name}", *cells, str(len(values)))
+            unit = shown(name, system)
+            cells = ["–" if value is None else unit.written(value, 3) for value in shares]
+            table.add_row(f" {_named(name, unit.unit)}", *cells, str(len(values)))
     console.print(table, highlight=False)
     ended = found.filter(pl.col("ended_early") != "")
     if len(ended):
         first = ended.row(0, named=True)
         why = f"the first, flight {first['flight']}: {first['ended_early']}"
         console.print(f"[yellow]{len(ended)} of {len(found)} ended early[/]; {escape(why)}")
+
+
+def _named(name: str, unit: str) -> str:
+    """Return a figure's name in words, with the unit that it is shown in."""
+    plain = name.removesuffix(f"_{unit_in(name)}") if unit_in(name) else name
+    return f"{plain.replace('_', ' ')}, {unit}" if unit else plain.replace("_", " ")
 
 
 def print_indices(console: Console, indices: Sequence[SobolIndex]) -> None:

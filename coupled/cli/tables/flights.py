@@ -12,24 +12,25 @@ from rich.panel import Panel
 from rich.table import Table
 
 from coupled.authority.figures import further, rows
+from coupled.display import System
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
 
 
-def print_comparison(console: Console, flights: Sequence[Flight]) -> None:
+def print_comparison(console: Console, flights: Sequence[Flight], system: System = "si") -> None:
     """Print a comparison: its card, and a table a case (one in all for a single configuration)."""
     run = flights[0].manoeuvre
     width = min(92, console.width)
     console.print(Panel(escape(" ".join(run.card.split())), title=escape(run.name), width=width))
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     if len(cases) > 1 and all(len(case) == 1 for case in cases):
-        _print_table(console, "", [(f.outcome.case, f) for f in flights])
+        _print_table(console, "", [(f.outcome.case, f) for f in flights], system)
     else:
         for case in cases:
             title = case[0].outcome.case if len(cases) > 1 else ""
-            _print_table(console, title, [(f.configuration, f) for f in case])
-    for sentence in filter(None, map(further, cases)):
+            _print_table(console, title, [(f.configuration, f) for f in case], system)
+    for sentence in filter(None, (further(case, system) for case in cases)):
         console.print(f"{escape(sentence)}\n", highlight=False)
         break
     for flight in flights:
@@ -38,12 +39,14 @@ def print_comparison(console: Console, flights: Sequence[Flight]) -> None:
             console.print(f"{escape(o.case)}, {o.configuration}: ended early, {o.ended_early}")
 
 
-def _print_table(console: Console, title: str, columns: Sequence[tuple[str, Flight]]) -> None:
+def _print_table(
+    console: Console, title: str, columns: Sequence[tuple[str, Flight]], system: System
+) -> None:
     table = Table(box=None, title=escape(title) or None, title_justify="left", title_style="bold")
     table.add_column("", no_wrap=True)
     for head, _ in columns:
         table.add_column(escape(_broken(head)), justify="right", vertical="bottom")
-    for label, cells in rows([flight for _, flight in columns]):
+    for label, cells in rows([flight for _, flight in columns], system):
         table.add_row(label, *cells)
     console.print(table)
     console.print()

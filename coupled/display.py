@@ -1,0 +1,82 @@
+"""Units for people: what a quantity in SI is written in, and by which factor.
+
+A name ends in its unit, as `force_N` or `peak_rate_rad_per_s`. People get degrees, per cent and
+newtons, or with the system `us` pounds, inches, knots and feet. Files and JSON stay in SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from coupled.units import (
+    POUND_N,
+    DEGREE_rad,
+    FOOT_m,
+    INCH_m,
+    INCH_PER_POUND_m_per_N,
+    KNOT_m_per_s,
+    POUND_PER_INCH_N_per_m,
+    PSF_Pa,
+)
+
+System = Literal["si", "us"]
+SHARES: Final = ("loss", "loss_closed_form", "felt_ratio", "felt_ratio_closed_form")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a quantity is written in: the unit's word, and by what its SI number is multiplied."""
+
+    unit: str
+    factor: float = 1.0
+
+    def written(self, value: float, digits: int = 4) -> str:
+        """Return a number of so many figures, without its unit."""
+        text = f"{self.factor * value:.{digits}g}"
+        return "0" if float(text) == 0.0 else text
+
+
+_SI: Final[Mapping[str, Shown]] = {
+    "N": Shown("N"),
+    "m": Shown("m"),
+    "s": Shown("s"),
+    "Pa": Shown("Pa"),
+    "kg": Shown("kg"),
+    "Hz": Shown("Hz"),
+    "rad": Shown("°", 1.0 / DEGREE_rad),
+    "rad_per_s": Shown("°/s", 1.0 / DEGREE_rad),
+    "m_per_s": Shown("m/s"),
+    "N_per_m": Shown("N/m"),
+    "N_per_rad": Shown("N/°", DEGREE_rad),
+    "m_per_N": Shown("m/N"),
+    "norm": Shown("%", 100.0),
+}
+_US: Final[Mapping[str, Shown]] = {
+    **_SI,
+    "N": Shown("lb", 1.0 / POUND_N),
+    "m": Shown("in", 1.0 / INCH_m),
+    "Pa": Shown("lb/ft²", 1.0 / PSF_Pa),
+    "m_per_s": Shown("kt", 1.0 / KNOT_m_per_s),
+    "N_per_m": Shown("lb/in", 1.0 / POUND_PER_INCH_N_per_m),
+    "N_per_rad": Shown("lb/°", DEGREE_rad / POUND_N),
+    "m_per_N": Shown("in/lb", 1.0 / INCH_PER_POUND_m_per_N),
+}
+_ALTITUDE: Final = Shown("ft", 1.0 / FOOT_m)
+
+
+def unit_in(name: str) -> str:
+    """Return the unit that a name ends in, as `rad_per_s`; nothing where it has none."""
+    ends = [unit for unit in _SI if name == unit or name.endswith(f"_{unit}")]
+    return max(ends, key=len, default="")
+
+
+def shown(name: str, system: System = "si") -> Shown:
+    """Return what a quantity of this name is written in; a bare number as it is."""
+    if name in SHARES:
+        return Shown("%", 100.0)
+    unit = unit_in(name)
+    if system == "us" and unit == "m" and name.startswith("altitude"):
+        return _ALTITUDE
+    return (_US if system == "us" else _SI).get(unit, Shown(""))
