@@ -61,6 +61,7 @@ def test_a_date_is_given_and_not_taken(found: Documentation) -> None:
     assert (said["date"], said["revision"]) == ("1974-02-04", "B")
 
 
+@pytest.mark.slow
 def test_each_check_names_the_figure_that_shows_it(found: Documentation, tmp_path: Path) -> None:
     pages = draw_pages([found], {}, ISSUE, tmp_path, tmp_path / "d.pdf")
     cover, table, *figures = PdfReader(tmp_path / "d.pdf").pages
