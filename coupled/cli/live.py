@@ -127,6 +127,9 @@ def live(
             save=lambda record: write_record(record, _so_far(path)),
         )
         flight = fly_live(flown, plan)
+        if len(flight.record) < 2:
+            err.print("[yellow]ended before two frames were flown: there is no record[/]")
+            raise typer.Exit(1)
         with Outputs() as outputs:
             write_record(flight.record, outputs.at(path))
             keep_json(flight.record.manifest["live"], json_file, outputs)

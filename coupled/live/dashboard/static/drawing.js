@@ -53,14 +53,14 @@ function dot(pen, px, py, fill) {
   pen.fillStyle = fill; pen.beginPath(); pen.arc(px, py, 5, 0, 7); pen.fill();
 }
 
-function drawLoop(deflection, force, gradient, travel, unit) {
+function drawLoop(deflection, force, gradient, breakout, travel, unit) {
   const page = sheet("loop"), { pen } = page;
   const most = Math.max(20, 1.15 * Math.max(...force.map(Math.abs), 0));
   const wide = Math.max(0.25 * travel, 1.15 * Math.max(...deflection.map(Math.abs), 0));
   const { x, y } = axes(page, -wide, wide, -most, most, `deflection δ, ${unit}`, "force F, N");
   pen.strokeStyle = colour("--soft"); pen.setLineDash([5, 4]);
-  const end = Math.min(wide, most / gradient);
-  line(pen, [[x(-end), y(-end * gradient)], [x(end), y(end * gradient)]]);
+  const end = Math.max(0, Math.min(wide, (most - breakout) / gradient)), high = breakout + end * gradient;
+  line(pen, [[x(-end), y(-high)], [x(0), y(-breakout)], [x(0), y(breakout)], [x(end), y(high)]]);
   pen.setLineDash([]); pen.strokeStyle = colour("--one"); pen.lineWidth = 1.6;
   line(pen, deflection.map((d, i) => [x(d), y(force[i])]));
   if (deflection.length) dot(pen, x(deflection.at(-1)), y(force.at(-1)), colour("--one"));

@@ -65,9 +65,11 @@ function history() {
     series: [{ label: "time, s" }, series("δ", "--one"), series("δc", "--two"), series("δ̂", "--three")],
     legend: { live: false },
   }, [[], [], [], []], box);
+  fresh = true;
 }
 addEventListener("resize", () => { if (plot) history(); });
 
+const breakoutOf = c => state.switches && state.switches[c.name] ? state.switches[c.name].breakout : 0;
 const num = (v, digits) => Number.isFinite(v) ? v.toFixed(digits).replace("-", "−") : "—";
 function list(id, pairs) {
   by(id).innerHTML = "";
@@ -85,7 +87,7 @@ function draw() {
   const c = setup.controls[chosen], f = factor(c), unit = shownUnit(c), last = rows.at(-1), T = setup.frame_s;
   by("clock").textContent = `${num(last[0] * T, 1)} s`;
   const near = rows.slice(-Math.round(LOOP_s / T));
-  drawLoop(near.map(r => f * at(r, 2)), near.map(r => at(r, 0)), at(last, 4) / f, f * c.travel, unit);
+  drawLoop(near.map(r => f * at(r, 2)), near.map(r => at(r, 0)), at(last, 4) / f, breakoutOf(c), f * c.travel, unit);
   plot.setData([rows.map(r => r[0] * T), ...[2, 1, 3].map(n => rows.map(r => f * at(r, n)))]);
   drawSchedule(c.pressure_Pa, c.gradient.map(g => g / f), last[2], at(last, 4) / f, unit);
   const held = Math.abs(at(last, 2)) > 0.03 * c.travel;
