@@ -78,12 +78,16 @@ def test_v2_has_no_bit_for_pedals_that_a_source_gives() -> None:
         open_link(f"cls2sim://127.0.0.1:9?{V2}", load_rig("t37"), lockstep=True, deflection=False)
 
 
+@pytest.mark.slow
 def test_a_loader_far_from_neutral_gets_no_force() -> None:
     with pytest.raises(InputError, match="let it rest at neutral"):
         fly_with("cls2sim", "counts_per_N=100", 1.0, rests=0.4)
 
 
-@pytest.mark.parametrize(("kind", "words"), [("cls2sim", "counts_per_N=100"), ("v2", V2)])
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [pytest.param("cls2sim", "counts_per_N=100", marks=pytest.mark.slow), ("v2", V2)],
+)
 def test_a_fake_is_flown_and_feels_as_specified(kind: str, words: str) -> None:
     record = fly_with(kind, words, 20.0, hand=30.0)
     assert len(record) == 2400
