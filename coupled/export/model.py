@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
@@ -75,10 +76,26 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
         if place not in found:
             found[place] = read_bytes(path)
     found |= _shared(found, folder)
+    if flight.trim == "newton":
+        found = {place: _settable(text) for place, text in found.items()}
     shown = folder / f"{name}-set.xml"
     if shown not in found:
         found[shown] = flightgear_set(name, systems).encode()
     return found
+
+
+def _settable(text: bytes) -> bytes:
+    """Return a file in which each kinematic has an output, from which JSBSim lets it start.
+
+    Where JSBSim does not trim, what moves at a rate has to begin in its place (`start`).
+    """
+
+    def with_output(found: re.Match[bytes]) -> bytes:
+        name, inside = found[1], found[2]
+        output = b"" if b"<output>" in inside else b"  <output> %s </output>\n    " % name
+        return b'<kinematic name="%s">%s%s</kinematic>' % (name, inside, output)
+
+    return re.sub(rb'<kinematic name="([^"]*)">(.*?)</kinematic>', with_output, text, flags=re.S)
 
 
 def flightgear_set(name: str, systems: Sequence[str]) -> str:
@@ -91,6 +108,7 @@ def flightgear_set(name: str, systems: Sequence[str]) -> str:
     <description>{name} with control loaders</description>
     <flight-model>jsb</flight-model>
     <aero>{name}</aero>
+    <minimum-fg-version>2020.3.0</minimum-fg-version>
   </sim>
   <fdm><jsbsim><coupled>{hands}</coupled></jsbsim></fdm>
 </PropertyList>
