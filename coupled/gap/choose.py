@@ -20,6 +20,7 @@ from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.screen import screen
+from coupled.gap.settings import YIELDING
 from coupled.gap.thresholds import (
     FAINT_GAP,
     LAW_GAIN,
@@ -271,7 +272,8 @@ def _strained(case: Case, current: Fit) -> set[str]:
 
     It may then keep a stage within its limit that is off by more.
     """
-    settings = () if case.only_wide else case.known.values()
+    known = {} if case.only_wide else case.known
+    settings = [one for name, one in known.items() if name != YIELDING]
     return {one.stage for one in settings for p in one.free if one.value_key(p) in current.at_bound}
 
 

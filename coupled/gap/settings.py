@@ -6,16 +6,34 @@ the machine (`nominal`), its file holds how well each number is known, and that 
 
 from __future__ import annotations
 
-from coupled.gap.effect import Effect, setting_of
+from coupled.gap.effect import Effect, Parameter, Signature, setting_of
 from coupled.gap.library import EFFECTS
-from coupled.record.channels import ControlName
+from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
+
+CONTACT = "loader.friction_stiffness_N_per_{d}"
+YIELDING = "friction_stiffness"
 
 
 def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
     """Return {the effect that frees the same number: the setting, free within its tolerance}."""
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
-    return {effect.name: setting_of(effect, *ends) for effect, ends in known if ends is not None}
+    found = {effect.name: setting_of(effect, *ends) for effect, ends in known if ends is not None}
+    return found | _yielding(rig, control)
+
+
+def _yielding(rig: Rig, control: ControlName) -> dict[str, Effect]:
+    """Return the stiffness of the contact of a filed friction, where the file does not say it.
+
+    All dry friction yields before it slips, by up to half a millimetre: how far is no effect.
+    """
+    loader = rig.controls[control].loader
+    if loader.friction == 0.0 or loader.friction_stiffness > 0.0:
+        return {}
+    least = loader.friction / (YIELDS_rad if unit_of(control) == "rad" else YIELDS_m)
+    number = Parameter("", CONTACT, "value", least, 1e4 * least, (10.0 * least,))
+    return {YIELDING: Effect(f"setting of {YIELDING}", "loader", (number,), Signature("", ""))}
 
 
 def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float, float] | None:

@@ -62,6 +62,8 @@ LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is
 STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
 
 # Settings of the nominal rig (`case`).
+YIELDS_m = 5e-4  # the contract's: by how much friction may yield before it slips
+YIELDS_rad = 5e-3  # chosen: the same on a wheel of a tenth of a metre
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
 
 # Fitting (`fit`).
