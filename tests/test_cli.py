@@ -357,3 +357,16 @@ def test_a_shell_completes_commands() -> None:
     )
     assert {"run", "readings"} <= set(done.stdout.split()), done
     assert "sweep" not in done.stdout
+
+
+@pytest.mark.parametrize("columns", [30, 44, 60, 80, 120])
+def test_a_narrow_terminal_cuts_no_number(folder: Path, columns: int) -> None:
+    words = ("compare", "short.toml", "--no-figure")
+    wide = coupled(folder, *words, columns=120).stdout
+    [row] = [line for line in wide.splitlines() if "force needed, N" in line]
+    numbers = row.split()[-2:]
+    shown = coupled(folder, *words, columns=columns).stdout
+    assert "…" not in shown
+    assert max(len(line) for line in shown.splitlines()) <= columns
+    after = shown[shown.index("force needed") :]
+    assert [word for word in after.split() if word in numbers][:2] == numbers

@@ -10,23 +10,23 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from coupled.calibration.checks import ControlCheck
-from coupled.record.channels import unit_of
+from coupled.record.channels import ControlName, unit_of
 
 if TYPE_CHECKING:
-    from coupled.calibration.documentation import Documentation
     from coupled.rig.parameters import Control
+    from coupled.rig.rig import Rig
 
 _FORCE = ("force", "breakout")
 _SURFACE = "surface"
 _SAME = 0.02  # of K: a host's K̂ that is nearer is as good as right
 
 
-def reasons(found: Documentation) -> list[str]:
-    """Return why checks of a control fail, a sentence each; none where all pass."""
-    failed = [check for check in found.checks if not check.passed]
+def reasons(rig: Rig, name: ControlName, checks: Sequence[ControlCheck]) -> list[str]:
+    """Return why checks of a rig's control fail, a sentence each; none where all pass."""
+    failed = [check for check in checks if not check.passed]
     if not failed:
         return []
-    control, d = found.rig.controls[found.control], unit_of(found.control)
+    control, d = rig.controls[name], unit_of(name)
     sentences = _of_the_host(control, d)
     if control.loader.bend > 0.0:
         sentences += _of_the_bend(control, failed)

@@ -130,7 +130,9 @@ def _print(documents: Sequence[Documentation], every: bool, judged: bool) -> Non
     from coupled.cli.tables.calibration import print_checks
 
     for found in documents:
-        print_checks(out, found.control, found.checks, every, reasons(found))
+        print_checks(
+            out, found.control, found.checks, every, reasons(found.rig, found.control, found.checks)
+        )
     if not judged:
         out.print("no aircraft: the surface's position is not judged\n")
 

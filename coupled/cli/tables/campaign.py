@@ -14,6 +14,7 @@ from rich.table import Table
 from coupled.campaign.labels import parameter_label
 from coupled.campaign.verdict import figures as figures_of
 from coupled.campaign.verdict import wanted
+from coupled.cli.tables.whole import print_whole
 from coupled.display import System, shown, unit_in
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict], system: System
             table.add_column(head, justify="right", overflow="fold")
         for verdict in group:
             table.add_row(*_cells(verdict, system))
-        console.print(table)
+        print_whole(console, table)
         console.print()
     passed = sum(verdict.passed for verdict in verdicts)
     console.print(f"{passed} of {len(verdicts)} expectations hold", highlight=False)
@@ -66,7 +67,7 @@ def print_sweep(
             unit = shown(name, system)
             cells = ["–" if value is None else unit.written(value, 3) for value in shares]
             table.add_row(f" {_named(name, unit.unit)}", *cells, str(len(values)))
-    console.print(table, highlight=False)
+    print_whole(console, table)
     ended = found.filter(pl.col("ended_early") != "")
     if len(ended):
         first = ended.row(0, named=True)
@@ -93,7 +94,7 @@ def print_indices(console: Console, indices: Sequence[SobolIndex]) -> None:
         for index in ordered[:_SHOWN]:
             label = parameter_label(index.key).partition(",")[0]
             table.add_row(f" {escape(label)}", *_shares(index))
-    console.print(table, highlight=False)
+    print_whole(console, table)
 
 
 def _shares(index: SobolIndex) -> tuple[str, ...]:
@@ -119,4 +120,4 @@ def print_survival(console: Console, limits: Sequence[SurvivalLimit]) -> None:
         cells = ["–" if value is None else f"{value:.4g}" for value in places]
         name = f"[bold]{escape(limit.configuration)}[/]"
         table.add_row(name, f"{limit.survived} of {limit.flights}", *cells)
-    console.print(table, highlight=False)
+    print_whole(console, table)

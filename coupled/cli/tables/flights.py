@@ -12,6 +12,7 @@ from rich.panel import Panel
 from rich.table import Table
 
 from coupled.authority.figures import further, rows
+from coupled.cli.tables.whole import print_whole
 from coupled.display import System
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def _print_table(
         table.add_column(escape(_broken(head)), justify="right", vertical="bottom")
     for label, cells in rows([flight for _, flight in columns], system):
         table.add_row(label, *cells)
-    console.print(table)
+    print_whole(console, table)
     console.print()
 
 
