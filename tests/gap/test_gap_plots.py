@@ -94,7 +94,8 @@ def fit_of(nominal: Rig, effects: list[Effect]) -> Fit:
 
 
 def needs_flight(effect: Effect) -> bool:
-    return effect.stage in ("surface", "airframe") or effect.name == "bob_weight"
+    flown = any(p.key.startswith("flight.") for p in effect.parameters)
+    return flown or effect.stage == "surface" or effect.name == "bob_weight"
 
 
 def labels(figure: Figure) -> list[str]:
