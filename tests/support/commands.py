@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,9 +15,11 @@ from typing import TextIO
 from unittest.mock import patch
 
 from coupled.cli import main
+from coupled.cli.progress import MARK
 
 ROOT = Path(__file__).parents[2]
 TERMINAL = {"COLUMNS": "80", "NO_COLOR": "1"}
+_PROGRESS = re.compile(rf"{MARK} .*, after \d+ s$")
 HANDLED = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -38,13 +41,18 @@ def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.Complete
         except SystemExit as end:
             assert isinstance(end.code, int)
             code = end.code
-        texts = [_read(file) for file in (out, err)]
+        texts = [_without_progress(_read(file)) for file in (out, err)]
     return subprocess.CompletedProcess(words, code, *texts)
+
+
+def _without_progress(text: str) -> str:
+    """Return what a command printed, without the lines that a slow machine adds in a pipe."""
+    return "".join(line for line in text.splitlines(keepends=True) if not _PROGRESS.match(line))
 
 
 def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Give a command to a Python of its own, as from a shell; return what came."""
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-m", "coupled", *words],
         check=False,
         cwd=folder,
@@ -53,6 +61,8 @@ def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         text=True,
         timeout=300,
     )
+    done.stderr = _without_progress(done.stderr)
+    return done
 
 
 def files(folder: Path) -> set[str]:
