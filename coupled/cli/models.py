@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -94,7 +95,8 @@ def rig(
         raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls:
         raise InputError(model, "", f"has no control that a rig could lead: {found.lacking[0]}")
-    text = draft(found, path.stem, home / name if own else None)
+    folder = os.path.relpath(home, path.resolve().parent) if own else ""
+    text = draft(found, path.stem, folder)
     write_new(path, text, ".toml", "coupled new run, with this rig in it, and coupled compare")
 
 

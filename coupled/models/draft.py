@@ -8,8 +8,8 @@ control's does, up to a greatest force at full travel; K is that of Cleveland's 
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
-from pathlib import Path
 
 from coupled.models.survey import Surveyed
 from coupled.record.channels import SURFACES, ControlName, unit_of
@@ -76,10 +76,11 @@ def kind_of(mass_kg: float) -> Kind:
     return next(kind for kind in _KINDS if mass_kg <= kind.most_kg)
 
 
-def draft(found: Surveyed, name: str, folder: Path | None = None) -> str:
+def draft(found: Surveyed, name: str, folder: str = "") -> str:
     """Return the text of a first rig file for a surveyed model that trims.
 
-    `folder` is the model's own, where it is none that coupled finds by itself.
+    `folder` is where the model's own lies, from the rig file's place, where coupled does not
+    find it by itself.
     """
     flight = found.flight
     assert flight is not None
@@ -92,9 +93,7 @@ def draft(found: Surveyed, name: str, folder: Path | None = None) -> str:
         f"# for {kind.name} (by {said}).",
         "# Put your own numbers in their place.",
     ]
-    if folder is not None:
-        lines.append(f"# coupled finds the model once {folder.name}/ lies in its aircraft/ folder.")
-    lines += ["", f'name = "{name}"', "frame_rate_Hz = 120.0", *_flight(found)]
+    lines += ["", f'name = "{name}"', "frame_rate_Hz = 120.0", *_flight(found, folder)]
     for control in found.controls:
         lines += _control(control, kind.controls[control], found)
     for lack in found.lacking:
@@ -102,11 +101,13 @@ def draft(found: Surveyed, name: str, folder: Path | None = None) -> str:
     return "\n".join([*lines, ""])
 
 
-def _flight(found: Surveyed) -> list[str]:
+def _flight(found: Surveyed, folder: str) -> list[str]:
     flight = found.flight
     assert flight is not None
     holds = "holds it hands off" if found.holds else "does not hold it hands off: fly short runs"
     lines = ["", "[flight]", f'model = "{found.model}"']
+    if folder:
+        lines.append(f"model_folder = {json.dumps(folder)}  # where {found.model}/ lies")
     lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
     lines.append(
         f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"

@@ -236,6 +236,7 @@ class Flight(Section):
     """The JSBSim model, how it is loaded, trimmed and flown, factors on its moments, the air."""
 
     model: str = quantity("", min_length=1)
+    model_folder: str = ""
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
     flight_path: float = quantity("rad", 0.0, ge=-0.6, le=0.6)

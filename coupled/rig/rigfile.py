@@ -23,6 +23,23 @@ def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
     return rig_from_table(table, path)
 
 
+def _placed(flight: Any, file: object) -> Any:
+    """Return a `flight` table whose folder of models, if it names one, is a whole path.
+
+    A rig file names it from its own place, so that both can be moved together.
+    """
+    given = flight.get("model_folder") if isinstance(flight, dict) else None
+    if not isinstance(given, str) or not given:
+        return flight
+    base = file.parent if isinstance(file, Path) else Path()
+    folder = (base / given).resolve()
+    name = flight.get("model")
+    if isinstance(name, str) and not (folder / name / f"{name}.xml").is_file():
+        problem = f"{given!r} holds no {name}/{name}.xml; give the folder that the model's lies in"
+        raise InputError(file, "flight.model_folder", problem)
+    return {**flight, "model_folder": str(folder)}
+
+
 def change(table: dict[str, Any], key: str, value: Any) -> bool:
     """Set a dotted key of a table of tables in place; false where it leads through a value."""
     *parents, last = key.split(".")
@@ -54,7 +71,7 @@ def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
     values["controls"] = made
     if "flight" in values:
         with collected(faults):
-            values["flight"] = build(Flight, values.pop("flight"), file, "flight")
+            values["flight"] = build(Flight, _placed(values.pop("flight"), file), file, "flight")
     if faults:
         with collected(faults):  # the rest, without controls to be judged by
             build(Rig, {**values, "controls": {}}, file, "")

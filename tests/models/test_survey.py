@@ -99,7 +99,7 @@ def test_a_rig_is_written_for_the_folder_of_a_model(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "mycub.toml").read_text()
     assert 'model = "mycub"' in text
-    assert "mycub/ lies in its aircraft/ folder" in text
+    assert 'model_folder = "."' in text
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,75 @@
+"""A model of the user's own, in a folder that the rig file names from its own place."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.errors import InputError
+from coupled.flight.airframe import packaged_models
+from coupled.record.record import read_record
+from coupled.resources import shipped_rigs
+from coupled.rig.rigfile import read_rig
+from tests.support.commands import coupled
+
+RUN = """
+name = "short"
+card = "A pull on a rig of one's own."
+rig = "mine.toml"
+duration_s = 2.0
+[pilot.column]
+kind = "step"
+force_N = 20.0
+[[case]]
+label = "a pull"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with a copy of the T-37 under another name, a rig and a run."""
+    own = tmp_path / "models" / "MINE"
+    shutil.copytree(packaged_models()["T37"] / "T37", own)
+    (own / "T37.xml").rename(own / "MINE.xml")
+    rig = shipped_rigs()["t37"].read_text()
+    named = 'model = "MINE"\nmodel_folder = "models"'
+    (tmp_path / "mine.toml").write_text(rig.replace('model = "T37"', named))
+    (tmp_path / "short.toml").write_text(RUN)
+    return tmp_path
+
+
+def test_a_model_beside_the_rig_file_flies_as_the_packaged_one(folder: Path) -> None:
+    done = coupled(folder, "fly", "short.toml", "-o", "mine.csv")
+    assert done.returncode == 0, done.stderr
+    (folder / "packaged.toml").write_text(RUN.replace("mine.toml", "t37"))
+    assert coupled(folder, "fly", "packaged.toml", "-o", "packaged.csv").returncode == 0
+    mine, packaged = (read_record(folder / name) for name in ("mine.csv", "packaged.csv"))
+    np.testing.assert_array_equal(mine.data, packaged.data)
+
+
+def test_rig_and_model_may_be_moved_together(folder: Path) -> None:
+    moved = folder.with_name(folder.name + "-moved")
+    folder.rename(moved)
+    flight = read_rig(moved / "mine.toml").flight
+    assert flight is not None
+    assert Path(flight.model_folder) == moved / "models"
+
+
+def test_a_folder_without_the_model_is_named(folder: Path) -> None:
+    text = (folder / "mine.toml").read_text()
+    (folder / "mine.toml").write_text(text.replace('"models"', '"elsewhere"'))
+    with pytest.raises(InputError, match=r"mine.toml: flight.model_folder: 'elsewhere' holds no"):
+        read_rig(folder / "mine.toml")
+
+
+@pytest.mark.slow
+def test_a_first_rig_for_a_folder_flies_from_where_it_was_written(folder: Path) -> None:
+    done = coupled(folder, "new", "rig", "models/MINE", "first.toml")
+    assert done.returncode == 0, done.stderr
+    assert 'model_folder = "models"' in (folder / "first.toml").read_text()
+    (folder / "short.toml").write_text(RUN.replace("mine.toml", "first.toml"))
+    done = coupled(folder, "fly", "short.toml")
+    assert done.returncode == 0, done.stderr
