@@ -5,6 +5,8 @@ The equations are those of `rig/schedule`, `modification`, `sensing` and `compen
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from coupled.export.expression import (
@@ -18,6 +20,7 @@ from coupled.export.expression import (
 )
 from coupled.export.loader import has_extra, modifying
 from coupled.export.making import Made
+from coupled.rig.equations import total_to_computed
 from coupled.units import PSF_Pa
 
 PRESSURE = "aero/qbar-psf"
@@ -92,7 +95,9 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         edge = either(early, 0.0, edge)
     made_force = 1.0 / sensing.modifying_scale
     scale = made_force * (sensing.computed_scale if hybrid else 1.0)
-    on_computed = {"first": first / (1.0 - bend * first), "second": second / (1.0 - bend * second)}
+    assumed: Any = bend  # the report's functions take what multiplies and divides as numbers do
+    asked: dict[str, Any] = {"first": first, "second": second}
+    on_computed = {name: total_to_computed(each, assumed) for name, each in asked.items()}
     if has_extra(made):
         more = on_computed["first"] * bend * preload + (preload - control.assumed_breakout)
         made.once_a_frame("host/extra", made_force * more, "F_extra, which appendix C leaves out")

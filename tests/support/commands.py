@@ -16,6 +16,7 @@ from unittest.mock import patch
 
 from coupled.cli import main
 from coupled.cli.progress import MARK
+from coupled.cli.terminal import err, out
 
 ROOT = Path(__file__).parents[2]
 TERMINAL = {"COLUMNS": "80", "NO_COLOR": "1"}
@@ -31,9 +32,10 @@ def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.Complete
     with (
         patch.dict(os.environ, {**TERMINAL, "COLUMNS": str(columns)}),
         patch.object(sys, "argv", ["coupled", *words]),
+        _as_wide_as(columns),
         _standing_in(folder),
-        _to_file("stdout", 1) as out,
-        _to_file("stderr", 2) as err,
+        _to_file("stdout", 1) as printed,
+        _to_file("stderr", 2) as said,
     ):
         try:
             main()
@@ -41,7 +43,7 @@ def coupled(folder: Path, *words: str, columns: int = 80) -> subprocess.Complete
         except SystemExit as end:
             assert isinstance(end.code, int)
             code = end.code
-        texts = [_without_progress(_read(file)) for file in (out, err)]
+        texts = [_without_progress(_read(file)) for file in (printed, said)]
     return subprocess.CompletedProcess(words, code, *texts)
 
 
@@ -68,6 +70,19 @@ def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def files(folder: Path) -> set[str]:
     """Return the files that lie in a folder and below."""
     return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+
+
+@contextmanager
+def _as_wide_as(columns: int) -> Iterator[None]:
+    """Let the consoles be so wide: they may have taken another width when they were made."""
+    before = [(console, console.width) for console in (out, err)]
+    for console, _ in before:
+        console.width = columns
+    try:
+        yield
+    finally:
+        for console, width in before:
+            console.width = width
 
 
 @contextmanager
