@@ -17,6 +17,7 @@ from coupled.gap.case import Case, Tell
 from coupled.gap.effect import Effect, apply, value_of
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
+from coupled.gap.information import informative, says_nothing
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.screen import screen
@@ -31,6 +32,7 @@ from coupled.gap.thresholds import (
     SIMPLER_GAIN,
     SIMPLER_SHARE,
 )
+from coupled.gap.twolaws import even_reading
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -81,6 +83,12 @@ def search(
         best = _simplest(case, settled, ranked)
         steps.append(_step(case, settled, best, ranked))
         current = case.fit((*current.effects, best.effect), start=best.fit.values)
+        even = even_reading(current.effects, current.values)
+        if even is not None:
+            current = case.fit(even[0], start=even[1])
+            pair = current.effects[-2:]
+            steps[-1:] = [replace(steps[-1], effect=effect, rivals=()) for effect in pair]
+            continue
         needless = _needless(case, current)
         if needless is not None:
             steps = [step for step in steps if step.effect is not needless]
@@ -236,26 +244,12 @@ def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) ->
         ]
         fitted = min(tries, key=lambda one: one.cost)
         bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
-        if bound or says_nothing(case, effect, fitted):
+        if bound:
             continue
         if not _within_tolerance(case, effect, fitted):
             found.append((effect, fitted))
-    ranked = ranked_by_gain(case.outputs, current, found)
+    ranked = informative(case, current, found)
     return ranked if guilty or _surely_beyond(case, ranked) else []
-
-
-def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
-    """Tell whether an effect's interval holds the size at which it does nothing.
-
-    By its first number, the level; the others shape it. Of a limit, none is no size.
-    """
-    if not effect.free or effect.free[0].inverse:
-        return False
-    level = effect.free[0]
-    key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
-    if key not in fitted.low:
-        return False
-    return fitted.low[key] <= nothing <= fitted.high[key]
 
 
 def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:

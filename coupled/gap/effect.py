@@ -131,6 +131,7 @@ class Effect:
     `needs`        channels that every record must have for it to be tried
     `tolerance`    relative; its number is a setting, off by so much without being an effect
     `alike`        the effect for which it passes in a faint gap
+    `even`         two effects, friction and a force, that together are the same law
     `sample_error` relative standard error of its number, from what little of it a record meets
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
     """
@@ -143,6 +144,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     tolerance: float = 0.0
     alike: Likeness | None = None
+    even: tuple[str, str] | None = None
     sample_error: Callable[[Record, float], float] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
 

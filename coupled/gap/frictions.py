@@ -80,6 +80,7 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (_one_way("pull_N", 1.5, 0.5), _one_way("push_N", 0.5, 1.5)),
         _DRAWN,
+        even=("coulomb_friction", "force_offset"),
     ),
     Effect(
         "load_friction",

@@ -122,7 +122,7 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
     controls, direct, lacking = _controls(flight, home)
     flight = flight.model_copy(update={"direct_controls": direct})
     slowest = fastest = flight.calibrated_airspeed
-    if speeds:
+    if speeds and controls:
         slowest, fastest = (_furthest(flight, home, controls, step) for step in (0.9, 1.1))
     return Surveyed(
         *(model, flight, holds, "", controls, direct, lacking),

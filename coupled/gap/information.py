@@ -1,0 +1,42 @@
+"""Whether a record says anything of an effect: none is named by an interval that holds nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coupled.gap.case import Case
+from coupled.gap.effect import Effect
+from coupled.gap.fit import Fit
+from coupled.gap.gain import Candidate, ranked_by_gain
+from coupled.gap.library import EFFECTS
+from coupled.gap.thresholds import LEAST_GAIN
+
+
+def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -> list[Candidate]:
+    """Return the candidates whose intervals say something, by their gain.
+
+    Where none of them gains, one of a single number may, whose interval on half of the record is
+    as wide as what the others leave: the whole record judges it in the end.
+    """
+    open_ones = [one for one in found if says_nothing(case, *one)]
+    ranked = ranked_by_gain(case.outputs, current, [one for one in found if one not in open_ones])
+    if ranked and ranked[0].gain >= LEAST_GAIN:
+        return ranked
+    single = [one for one in open_ones if len(one[0].free) == 1]
+    others = ranked_by_gain(case.outputs, current, single) if single else ranked
+    # Two that are one law differ by rounding alone: the library's order settles it.
+    return sorted(others, key=lambda one: (-round(one.gain, 1), EFFECTS.index(one.effect)))
+
+
+def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect's interval holds the size at which it does nothing.
+
+    By its first number, the level; the others shape it. Of a limit, none is no size.
+    """
+    if not effect.free or effect.free[0].inverse:
+        return False
+    level = effect.free[0]
+    key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
+    if key not in fitted.low:
+        return False
+    return fitted.low[key] <= nothing <= fitted.high[key]

@@ -1,0 +1,35 @@
+"""Friction by direction is even friction with an offset: the reading given, and its numbers."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupled.gap.library import BY_NAME
+from coupled.gap.twolaws import UNEVEN, even_reading
+
+[UNEVEN_LAW] = [effect for effect in BY_NAME.values() if effect.even is not None]
+PULL, PUSH = (UNEVEN_LAW.value_key(number) for number in UNEVEN_LAW.free)
+
+
+@given(st.floats(0.1, 50.0), st.floats(1.0, 1.99), st.booleans())
+def test_the_even_reading_has_the_same_force_in_each_direction(
+    less_N: float, ratio: float, turned: bool
+) -> None:
+    pull, push = (less_N, ratio * less_N)[:: -1 if turned else 1]
+    read = even_reading((UNEVEN_LAW,), {PULL: pull, PUSH: push})
+    assert read is not None
+    (even, offset), values = read
+    friction, force = (values[one.value_key(one.free[0])] for one in (even, offset))
+    assert friction - force == pytest.approx(pull)
+    assert friction + force == pytest.approx(push)
+    assert set(values) == {even.value_key(even.free[0]), offset.value_key(offset.free[0])}
+
+
+def test_uneven_friction_and_a_friction_named_already_stay() -> None:
+    assert even_reading((UNEVEN_LAW,), {PULL: 1.0, PUSH: UNEVEN}) is None
+    assert UNEVEN_LAW.even is not None
+    even = BY_NAME[UNEVEN_LAW.even[0]]
+    assert even_reading((even, UNEVEN_LAW), {PULL: 1.0, PUSH: 1.2}) is None
+    assert even_reading((even,), {}) is None
