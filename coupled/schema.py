@@ -65,7 +65,7 @@ def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
 
 
 def named(key: str, default: Any = ..., **bounds: Any) -> Any:
-    """Declare a field whose key in a file is a word that Python keeps for itself."""
+    """Declare a field whose key in a file is a word that Python, or pydantic, keeps for itself."""
     return Field(default, json_schema_extra={"key": key}, **bounds)
 
 

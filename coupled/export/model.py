@@ -116,8 +116,8 @@ def flightgear_set(name: str, systems: Sequence[str]) -> str:
 
 
 def _home(flight: Flight, file: object) -> Path:
-    if flight.model_folder:
-        return Path(flight.model_folder)
+    if flight.folder:
+        return Path(flight.folder)
     own = aircraft_folder()
     if (own / flight.model / f"{flight.model}.xml").is_file():
         return own

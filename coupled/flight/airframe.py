@@ -149,8 +149,8 @@ class JSBSimAirframe:
         for folder in reversed(models):
             known |= {m.name: folder for m in folder.iterdir() if _is_model(m)}
         name = self._flight.model
-        if self._flight.model_folder:
-            known[name] = Path(self._flight.model_folder)
+        if self._flight.folder:
+            known[name] = Path(self._flight.folder)
         if name not in known:
             raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from coupled.schema import Section, quantity
+from coupled.schema import Section, named, quantity
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
@@ -236,7 +236,7 @@ class Flight(Section):
     """The JSBSim model, how it is loaded, trimmed and flown, factors on its moments, the air."""
 
     model: str = quantity("", min_length=1)
-    model_folder: str = ""
+    folder: str = named("model_folder", "")
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)
     flight_path: float = quantity("rad", 0.0, ge=-0.6, le=0.6)

@@ -34,8 +34,8 @@ def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
     found = dict(_within((), old, new, "m"))
     if old.flight is not None and new.flight is not None:
         found |= _within(("flight",), old.flight, new.flight, "m")
-        if new.flight.model_folder:  # whole, since what is written may lie elsewhere
-            found["flight", "model_folder"] = new.flight.model_folder
+        if new.flight.folder:  # whole, since what is written may lie elsewhere
+            found["flight", "model_folder"] = new.flight.folder
     for name, control in new.controls.items():
         d = unit_of(name)
         found |= _within(("controls", str(name)), old.controls[name], control, d)

@@ -55,7 +55,7 @@ def test_rig_and_model_may_be_moved_together(folder: Path) -> None:
     folder.rename(moved)
     flight = read_rig(moved / "mine.toml").flight
     assert flight is not None
-    assert Path(flight.model_folder) == moved / "models"
+    assert Path(flight.folder) == moved / "models"
 
 
 def test_a_folder_without_the_model_is_named(folder: Path) -> None:
