@@ -56,7 +56,8 @@ def import_log(
 ) -> None:
     """Make a record of your own log, and tell whether each channel can be true."""
     if (map_file is None) == (suggest is None):
-        raise InputError("coupled import", "--map", "give a map, or --suggest to have one proposed")
+        problem = "give a map, or --suggest to have one proposed: one of the two"
+        raise InputError("coupled import", "--map", problem)
     rig_file = find(rig, shipped_rigs(), "rig") if rig else None
     inputs = [*logs, *([rig_file] if rig_file else [])]
     if map_file is None:
@@ -110,6 +111,8 @@ def _suggest(
     from coupled.cli.tables.logs import print_proposal
     from coupled.record.importing.suggest.propose import propose
 
+    if target.suffix != ".toml":
+        raise InputError(target, "--suggest", "is a map: its name ends in .toml")
     check_target(target, inputs)
     check_json(json_file, [*inputs, target])
     proposal = propose(logs, _rig(rig_file))

@@ -19,7 +19,7 @@ from coupled.record.importing.suggest.names import read_name
 from coupled.record.importing.suggest.propose import Proposal, propose
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
-from tests.support.commands import coupled
+from tests.support.commands import coupled, files
 from tests.support.logs import FORCE_N, GOOD, DEFLECTION_m, TIME_s
 
 SHARED = Path(__file__).parents[4] / "shared" / "real" / "so101" / "raw" / "friction_gravity"
@@ -184,6 +184,14 @@ def test_rows_that_come_unevenly_are_given_a_rate(tmp_path: Path) -> None:
     assert account.clock.frame_rate_Hz == 50.0
 
 
+def test_dates_that_come_unevenly_are_counted_in_seconds(tmp_path: Path) -> None:
+    times = np.cumsum(np.random.default_rng(1).integers(18_000, 22_000, 400))
+    rows = [f"2026-03-01 12:00:{t / 1e6:09.6f},{np.sin(t):.6f}" for t in times]
+    (tmp_path / "log.csv").write_text("date,column_force_N\n" + "\n".join(rows))
+    _, table = proposed(tmp_path / "log.csv")
+    assert table["clock"] == {"from": "date", "date": "iso", "frame_rate_Hz": 50.0}
+
+
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     for content in ("", "a,b\n", "hello world of words\n" * 9, "x,y\n" + "1,2\n" * 9):
         (tmp_path / "log.csv").write_text(content)
@@ -200,5 +208,12 @@ def test_the_command_writes_a_map_and_asks(tmp_path: Path) -> None:
     neither = coupled(tmp_path, "import", "log.csv")
     assert neither.returncode == 2
     assert "--suggest" in neither.stderr
-    onto = coupled(tmp_path, "import", "log.csv", "--suggest", "log.csv")
-    assert onto.returncode == 2
+    before = files(tmp_path)
+    for wrong in (
+        ["--suggest", "log.csv"],
+        ["--suggest", "m.txt"],
+        ["--suggest", "m", "--map", "m"],
+    ):
+        done = coupled(tmp_path, "import", "log.csv", *wrong)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert files(tmp_path) == before
