@@ -85,7 +85,18 @@ class Parameter:
             return self.on
         if self.mode == "factor":
             return nominal * value
-        return nominal + value if self.mode == "added" else value
+        if self.mode == "added":
+            return max(nominal + value, 0.0) if self.low == 0.0 else nominal + value
+        return value
+
+    def bounds(self, rig: Rig, control: ControlName) -> tuple[float, float]:
+        """Return between which values it may be fitted.
+
+        Of what is added, and is never negative in the rig, all that is filed may be taken off.
+        """
+        if self.mode == "added" and self.low == 0.0:
+            return -float(self.nominal(rig, control)), self.high
+        return self.low, self.high
 
     def size(self, value: float) -> float:
         """Return how far a value is from where it does nothing."""

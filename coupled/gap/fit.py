@@ -143,8 +143,8 @@ def _fit(
     if not keys:
         left = residual(np.array([]))
         return _Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
-    low = np.array([p.low for p in frees]) / scale
-    high = np.array([p.high for p in frees]) / scale
+    ends = np.array([p.bounds(nominal, control) for p in frees]).T
+    low, high = ends / scale
     best = None
     for first in _starts(keys, frees, start):
         x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
@@ -157,13 +157,15 @@ def _fit(
     assert best is not None
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     half = _half_width(best, len(ours), np.concatenate(number)) * scale
-    values = best.x * scale
+    # Where all that is filed is taken off, nothing is left of it: that is an answer.
+    gone = np.isclose(best.x, low, atol=1e-4) & (ends[0] < [p.low for p in frees])
+    values = np.where(gone, ends[0], best.x * scale)
     sizes = [p.model_error * p.size(v) for p, v in zip(frees, values, strict=True)]
     half = np.hypot(half, sizes)
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
-    stuck &= ~np.array([p.may_end for p in frees])
+    stuck &= ~np.array([p.may_end for p in frees]) & ~gone
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),

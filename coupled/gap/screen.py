@@ -17,6 +17,7 @@ from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, touched
 from coupled.gap.thresholds import (
     SCREEN_FACTORS,
+    SCREEN_LESS,
     SCREEN_NEAR,
     SCREEN_SHOWN,
     SCREEN_SIZES,
@@ -99,4 +100,17 @@ def _sizes(case: Case, current: Fit, effect: Effect, shape: int) -> list[dict[st
             value += p.base(current.rig, case.control)
             values[effect.value_key(p)] = float(np.clip(value, p.low, p.high))
         found.append(values)
+    return found + _less(case, effect, found[0])
+
+
+def _less(case: Case, effect: Effect, first: dict[str, float]) -> list[dict[str, float]]:
+    """Return sets with less of what is filed than the rig file says, where some of it is."""
+    found = []
+    for share in SCREEN_LESS:
+        values = dict(first)
+        for p in effect.free:
+            least = p.bounds(case.nominal, case.control)[0]
+            if p.scanned and least < p.low:
+                values[effect.value_key(p)] = share * least
+        found += [values] if values != first else []
     return found
