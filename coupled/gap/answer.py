@@ -42,7 +42,8 @@ def verdict_of(
     if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
         return "unexplained"
     if not choice.steps:
-        return "no_gap"
+        # A floor that hides much of a stage lets nobody say whether it has a gap.
+        return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
     if any(step.rivals for step in choice.steps):
         return "ambiguous"
     return "mostly" if left else "effect"

@@ -25,10 +25,8 @@ from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import Effect
 from coupled.gap.healthy import Baseline
 from coupled.gap.library import EFFECTS
-from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
-from coupled.gap.result import (
-    StageResult,
-)
+from coupled.gap.output import Hides, Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.result import StageResult
 from coupled.gap.shrink import floors_of, shrink
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
@@ -112,6 +110,7 @@ def diagnose(
         outputs=tuple(outputs),
         choice=choice,
         baseline=baseline,
+        filtered={name: one for reader in readers for name, one in reader.filtered().items()},
     )
 
 
@@ -174,6 +173,10 @@ class _Judge:
             if name in before and name not in lacking:
                 wide = left[name] > explained_below(settled[name], limits[name])
                 guilty = name in self.blamed or wide
+                hidden = None if guilty else self._hidden(name)
+                if hidden is not None:
+                    found += [StageResult(name, why=hidden.words, hidden=hidden)]
+                    continue
                 numbers = (before[name], settled[name], limits[name], left[name])
                 result = self._with_where(StageResult(name, *numbers, guilty=guilty))
             elif name == "sensing":
@@ -184,6 +187,13 @@ class _Judge:
                 result = self._without_output(name)
             found += [result] if result is not None else []
         return tuple(found)
+
+    def _hidden(self, stage: str) -> Hides | None:
+        """Return what hides the least of a stage, where even that hides much; else None."""
+        outputs = [output for output in self.outputs if output.stage == stage]
+        known = [output.hides for output in outputs if output.hides is not None]
+        least = min(known, key=lambda one: one.share, default=None)
+        return least if least is not None and least.much else None
 
     def _lacking(self) -> dict[str, tuple[str, ...]]:
         """Return the channels that each stage lacks in every record."""

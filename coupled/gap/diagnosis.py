@@ -13,9 +13,10 @@ from coupled.gap.healthy import Baseline
 from coupled.gap.output import Output
 from coupled.gap.power import EffectPower, power
 from coupled.gap.proposal import ProposedTest, in_one_line, next_tests
+from coupled.gap.reading import worth_recording
 from coupled.gap.result import FORMAT, Findings
 from coupled.gap.shrink import Shrink
-from coupled.gap.summary import summary
+from coupled.gap.summary import filtered_words, summary
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -37,6 +38,8 @@ class Diagnosis(Findings):
     outputs: tuple[Output, ...] = field(repr=False, compare=False)
     choice: Choice = field(repr=False, compare=False)
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
+    # Channels whose logs were filtered, and where their floors come from.
+    filtered: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def first(self) -> Record:
@@ -63,7 +66,12 @@ class Diagnosis(Findings):
     @property
     def next_test(self) -> str:
         """What to record next, in a sentence; empty where nothing would help."""
-        return in_one_line(self.next_tests, sorted({n for s in self.stages for n in s.missing}))
+        lacking = [
+            worth_recording(self.nominal, self.control, stage.name, stage.missing)
+            for stage in self.stages
+        ]
+        wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
+        return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)
 
     @cached_property
     def power(self) -> tuple[EffectPower, ...]:
@@ -73,7 +81,7 @@ class Diagnosis(Findings):
     @cached_property
     def summary(self) -> str:
         """What is wrong, how large, how sure, how much it explains, and what to record next."""
-        said = summary(self, self.shrink, self.next_test)
+        said = summary(self, self.shrink, filtered_words(self.filtered), self.next_test)
         return said if self.baseline is None else f"{self.baseline.words} {said}"
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -89,6 +97,8 @@ class Diagnosis(Findings):
             "shrink": self.shrink.as_dict(),
             "settings": {setting.name: setting.factor for setting in self.settings},
         }
+        if self.filtered:
+            found["filtered"] = dict(self.filtered)
         if self.baseline is not None:
             found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:

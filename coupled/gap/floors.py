@@ -36,3 +36,17 @@ def with_error(signal: Floats, k: int, level: Noise) -> Floats:
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
     return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
+
+
+def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
+    """Return a signal that is taken as recorded, with as much noise again."""
+    return signal + level.sample(len(signal), np.random.default_rng([41, k]))
+
+
+def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
+    """Return where the floor of a channel comes from whose log was filtered."""
+    if heard(signal).rms > given_noise(rig, channel, signal).rms:
+        return "what is left at its highest frequencies"
+    if rig.noise.get(channel, 0.0) > 0.0:
+        return "the rig file"
+    return f"1/{1.0 / LEAST_NOISE:g} of the signal, since the rig file says nothing of it"

@@ -81,6 +81,7 @@ class ModelError:
             floor=floor,
             spread=math.hypot((1.0 - share) * output.spread, share * scatter),
             smoothed=(1.0 - share) * output.smoothed,
+            hides=None,  # what the healthy machine stayed within is a measure of its own
             _known=[],
         )
 

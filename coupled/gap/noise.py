@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 class Noise:
     """Noise of a level, rms in the channel's unit; `memory` is its correlation by frames, 0 to 1.
 
-    `filtered`: the spectrum falls on to its end, so that this is what is left of the noise.
+    `filtered`: the spectrum falls on to its end, so that this is the most that is left of it.
     """
 
     rms: float
@@ -69,11 +69,13 @@ def noise_of(signal: Floats) -> Noise:
     if not np.all(levels[high] > 0.0):
         return plain
     sure, variance = levels[high], _log_variance(rough)
-    filtered = bool(np.median(sure[-3:]) < FILTERED * np.median(sure[:3]))
-    memory = 0.0 if filtered else _memory(at, levels, int(np.argmax(high)), variance)
+    least = float(np.median(sure[-3:]))
+    if least < FILTERED * float(np.median(sure[:3])):
+        return Noise(math.sqrt(least), filtered=True)  # no more than that is left of it
+    memory = _memory(at, levels, int(np.argmax(high)), variance)
     logs = np.log(sure / _shape(at[high], memory))
     white = float(np.exp(np.mean(logs) + 0.5 * variance))
-    return Noise(math.sqrt(white / (1.0 - memory**2)), memory, filtered)
+    return Noise(math.sqrt(white / (1.0 - memory**2)), memory)
 
 
 def _bands(rough: Floats) -> tuple[Floats, Floats]:

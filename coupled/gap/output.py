@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from coupled.gap.noise import Noise, noise_of
 from coupled.gap.thresholds import (
     ECHO_FRAMES,
+    FELT_FRAMES,
+    FLOOR_SHARE,
     GUILTY_FROM,
     MISMATCH,
     NOISE_SIGMAS,
@@ -32,11 +34,40 @@ _KEPT = 4  # predictions remembered
 
 
 @dataclass(frozen=True)
+class Hides:
+    """What a floor hides of an output: its share of what the channel does, rms over rms.
+
+    `noisiest` is the channel whose noise makes most of the floor, `channel` the output's.
+    """
+
+    share: float
+    noisiest: str
+    channel: str
+
+    @property
+    def much(self) -> bool:
+        """Whether a gap that is a large share of the signal would not show."""
+        return self.share > FLOOR_SHARE
+
+    @property
+    def words(self) -> str:
+        """What hides how much."""
+        return f"noise of {self.noisiest} is {100 * self.share:.0f} % of what {self.channel} does"
+
+    @property
+    def wanted(self) -> str:
+        """What to record instead."""
+        times = math.ceil(self.share / FLOOR_SHARE)
+        return f"a motion {times} times as large, or {self.noisiest} with less noise"
+
+
+@dataclass(frozen=True)
 class Output:
     """One measured output of a stage, and how a rig predicts it from the measured input.
 
     `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
-    standard deviation from record to record, `smoothed` the share of it that a smoothed input has.
+    standard deviation from record to record, `smoothed` the share of it that a smoothed input has,
+    `hides` what it hides, where that is known.
     `record` numbers the record that it is of; `held` are the frames held out from fits, without
     which they are those of every other stretch.
     """
@@ -50,6 +81,7 @@ class Output:
     record: int = 0
     spread: float = 0.0
     smoothed: float = 0.0
+    hides: Hides | None = None
     held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
@@ -143,6 +175,21 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
     share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
     rest = float(np.sqrt(np.mean(left**2) / 70.0))
     return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
+
+
+def felt(force: Floats, answer: Floats) -> float:
+    """Return how much of a force's roughness its answer shows, 0 to 1, as a share of the power.
+
+    What is rough in a force, and no noise, is in what answers to it: fourth differences of the
+    force are regressed on those of the answer about the same frame, without a model of what lies
+    between.
+    """
+    rough, shown = np.diff(force, 4)[FELT_FRAMES:-FELT_FRAMES], np.diff(answer, 4)
+    last = len(shown) - 2 * FELT_FRAMES
+    near = np.column_stack([shown[k : k + last] for k in range(2 * FELT_FRAMES + 1)])
+    left = rough - near @ np.linalg.lstsq(near, rough, rcond=None)[0]
+    power = float(rough @ rough)
+    return 1.0 - float(left @ left) / power if power > 0.0 else 0.0
 
 
 def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:

@@ -163,14 +163,21 @@ def _pressures(
     return [*here, ("at 1.2 times the airspeed", level, nominal.changed(faster))]
 
 
-def in_one_line(tests_found: Sequence[ProposedTest], lacking: Sequence[str]) -> str:
-    """Return what to record next, in a sentence, or nothing where nothing would help."""
+def in_one_line(
+    tests_found: Sequence[ProposedTest], lacking: Sequence[str], wanted: Sequence[str] = ()
+) -> str:
+    """Return what to record next, in a sentence, or nothing where nothing would help.
+
+    `lacking` are channels, `wanted` what would lift a stage out of its floor.
+    """
     if tests_found:
         best = tests_found[0]
         one, other = (name.replace("_", " ") for name in best.rivals)
         if best.gain < SEPARATED_GAIN:
             return f"No test tried would tell {one} from {other}: they act alike on this rig."
         return f"To tell {one} from {other}, record {best.text}."
+    if wanted:
+        return f"Record {wanted[0]}."
     if lacking:
         return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
     return ""

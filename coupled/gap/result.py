@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from coupled.gap.budget import StageBudget
 from coupled.gap.credibility import Credibility
-from coupled.gap.output import explained_below
+from coupled.gap.output import Hides, explained_below
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import Remains, Where
 
@@ -26,7 +26,8 @@ class StageResult:
 
     `settled` is the gap with the settings within their tolerance, `left` that with the effects
     found; `limit` the gap up to which noise may be all there is. `shown_in` names the stages in
-    whose gaps a fault of this one would show, where it has no residual of its own.
+    whose gaps a fault of this one would show, where it has no residual of its own. `hidden`: it
+    stays within a floor that would hide a gap, and is not judged for that.
     """
 
     name: str
@@ -40,6 +41,7 @@ class StageResult:
     missing: tuple[str, ...] = ()
     why: str = ""
     shown_in: tuple[str, ...] = ()
+    hidden: Hides | None = None
 
     @property
     def judged(self) -> bool:
@@ -69,7 +71,8 @@ class StageResult:
         """Return the JSON."""
         if self.gap is None:
             found: dict[str, Any] = {"judged": False, "missing": list(self.missing)}
-            return found | ({"why": self.why} if self.why else {})
+            found |= {"why": self.why} if self.why else {}
+            return found | ({} if self.hidden is None else {"floor_share": self.hidden.share})
         found = {"gap": self.gap}
         numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}
         found |= {name: number for name, number in numbers.items() if number is not None}

@@ -20,16 +20,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.floors import given_noise, noise_in, with_error
+from coupled.gap.floors import given_noise, noise_in, unsmoothed, with_error
 from coupled.gap.noise import Noise
-from coupled.gap.output import Output, Predict, echoed, spread, white
+from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
 from coupled.gap.ratchet import passed_noise, unratcheted
+from coupled.gap.reading import Reading
 from coupled.gap.sensed import Sensed
 from coupled.gap.served import asked, left, neutral, services
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
     BROAD,
     ECHO_SHARE,
+    FELT,
+    HALF_FELT,
     NOISE_TRIES,
     PRELOAD_UNSURE,
     ROUNDING_SPAN,
@@ -37,8 +40,6 @@ from coupled.gap.thresholds import (
     RESTART_s,
     SLOW_LOADER_s,
 )
-from coupled.record.channels import SURFACES, ControlName, channel
-from coupled.record.record import Record
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -53,69 +54,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Reader:
+class Reader(Reading):
     """Builds the outputs that a record lets judge, and says which channels lack."""
-
-    rig: Rig
-    record: Record
-    control: ControlName
-    # The map of a control's commands to its surface's positions; None where others move it, too.
-    surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
-    number: int = 0  # of the record, where there are several
-
-    @property
-    def surface(self) -> str:
-        """The channel of the control's surface."""
-        return f"{SURFACES[self.control]}_rad"
-
-    def signal(self, quantity: str) -> Floats:
-        """Return a control's channel."""
-        return self.record[channel(self.control, quantity)]
-
-    def others(self) -> dict[str, Floats]:
-        """Return the forces in N on other controls of a common structure, where recorded."""
-        if self.rig.structure.stands_apart:
-            return {}
-        held = {str(n): channel(n, "force") for n in self.rig.controls if n != self.control}
-        return {name: self.record[force] for name, force in held.items() if force in self.record}
-
-    def missing(self) -> dict[str, list[str]]:
-        """Return the channels that each stage would need and the record lacks."""
-        needs = {
-            "schedule": ["dynamic_pressure_Pa", self._name("gradient")],
-            "loader": [self._name(q) for q in ("force", "computed")] + self._gradient_from(),
-            "multiplier": [self._name(q) for q in ("computed", "modifying_force")]
-            + self._gradient_from(),
-            "linkage": [self._name(q) for q in ("computed", "force", "deflection")],
-            "compensation": [self._name(q) for q in ("computed", "force", "estimate")],
-            "surface": [self._name("estimate"), "dynamic_pressure_Pa", self.surface],
-        }
-        lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
-        return {stage: names for stage, names in lacking.items() if names}
-
-    def _name(self, quantity: str) -> str:
-        return channel(self.control, quantity)
-
-    def _gradient_from(self) -> list[str]:
-        """Return the channel that G_T is taken from: its own, or q̄ where the record lacks it."""
-        own, pressure = self._name("gradient"), "dynamic_pressure_Pa"
-        return [pressure if own not in self.record and pressure in self.record else own]
-
-    def gradient(self) -> Floats:
-        """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""
-        if self._gradient_from() == [self._name("gradient")]:
-            return self.signal("gradient")
-        pressure = self.record["dynamic_pressure_Pa"]
-        return replay_schedule(self.rig, self.control, smoothed(pressure)) * left(self)
-
-    def second(self) -> Floats | None:
-        """Return G_T beyond the break, which no record holds: what the schedule makes of q̄."""
-        pressure = "dynamic_pressure_Pa"
-        two = self.rig.controls[self.control].schedule.second_gradient is not None
-        if not two or pressure not in self.record:
-            return None
-        smooth = smoothed(self.record[pressure])
-        return replay_schedule(self.rig, self.control, smooth, beyond=True) * left(self)
 
     def outputs(self) -> list[Output]:
         """Return every output that the record lets judge, in the order of the chain."""
@@ -138,8 +78,12 @@ class Reader:
         predict: Predict,
         noisy: Callable[[Rig, int], Floats],
         own: Noise,
+        driven_by: str = "",
     ) -> Output:
-        """Return an output whose floor is its own noise and its input's, carried through."""
+        """Return an output whose floor is its own noise and its input's, carried through.
+
+        Of one that is `driven_by` a quantity of the control, it is known what the floor hides.
+        """
         base = predict(self.rig)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
@@ -147,7 +91,11 @@ class Reader:
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        return replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
+        known = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
+        if not driven_by:
+            return known
+        noisiest = self.name_of(driven_by) if carried > own.rms else name
+        return replace(known, hides=Hides(floor / float(np.std(measured)), noisiest, name))
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
@@ -155,13 +103,9 @@ class Reader:
         rate = self.rig.frame_rate
         return Output(stage, name, measured, predict, floor, rate, self.number)
 
-    def _heard(self, quantity: str) -> Noise:
-        """Return the noise of a control's channel."""
-        return noise_in(self.rig, self._name(quantity), self.signal(quantity))
-
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
-        own, level = self._heard("gradient"), noise_in(self.rig, "dynamic_pressure_Pa", pressure)
+        own, level = self.heard("gradient"), noise_in(self.rig, "dynamic_pressure_Pa", pressure)
         smooth = smoothed(pressure)
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
@@ -174,19 +118,19 @@ class Reader:
                 return predict(rig, pressure)
 
             floor = max(rest, ROUNDING_SPAN * float(np.ptp(gradient)))
-            return [self._output("schedule", self._name("gradient"), gradient, as_read, floor)]
+            return [self._output("schedule", self.name_of("gradient"), gradient, as_read, floor)]
 
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, with_error(smooth, k, level))
 
-        return [self._made("schedule", self._name("gradient"), gradient, predict, noisy, own)]
+        return [self._made("schedule", self.name_of("gradient"), gradient, predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
         noisy_force, gradient = self.signal("force"), self.gradient()
-        force, level = smoothed(noisy_force), self._heard("force")
+        force, level = smoothed(noisy_force), self.heard("force")
         computed, second = self.signal("computed"), self.second()
         load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
-        smooth, own = smoothed(computed), self._heard("computed")
+        smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
         def driven(f: Floats, seen: Floats) -> Predict:
@@ -207,15 +151,18 @@ class Reader:
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + NOISE_TRIES, own)
-            return driven(with_error(force, k, level), seen)(rig)
+            return driven(wandering(force, k, level), seen)(rig)
 
+        if level.rms > BROAD * float(np.std(noisy_force)):
+            share = felt(noisy_force, computed)
+            level = replace(level, rms=level.rms * float(np.sqrt(max(1.0 - share, 0.0))))
+            if share > FELT:
+                level = given_noise(self.rig, self.name_of("force"), noisy_force)
+            if share > HALF_FELT:
+                force, wandering = noisy_force, unsmoothed
         predict = driven(force, smooth)
-        if level.rms > BROAD * float(np.std(noisy_force)):  # no noise, if the loader follows it
-            rough = driven(noisy_force, smooth)
-            if np.std(computed - rough(self.rig)) < np.std(computed - predict(self.rig)):
-                level = given_noise(self.rig, self._name("force"), noisy_force)
-                predict, force = rough, noisy_force
-        return [self._made("loader", self._name("computed"), computed, predict, noisy, own)]
+        made = (self.name_of("computed"), computed, predict, noisy, own, "force")
+        return [self._made("loader", *made)]
 
     def _drifts(self, gradient: Floats) -> bool:
         """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
@@ -231,7 +178,7 @@ class Reader:
         """
         computed, product = self.signal("computed"), self.signal("modifying_force")
         gradient, second, smooth = self.gradient(), self.second(), smoothed(computed)
-        level, own = self._heard("computed"), self._heard("modifying_force")
+        level, own = self.heard("computed"), self.heard("modifying_force")
         about = 0.0 * smooth + neutral(self)
 
         def made(rig: Rig, read: Floats) -> Floats:
@@ -250,12 +197,12 @@ class Reader:
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, with_error(smooth, k, level))
 
-        name = self._name("modifying_force")
+        name = self.name_of("modifying_force")
         return [self._made("multiplier", name, product, predict, noisy, own)]
 
     def _linkage(self) -> list[Output]:
         computed, force, measured = map(self.signal, ("computed", "force", "deflection"))
-        levels = self._heard("computed"), self._heard("force")
+        levels = self.heard("computed"), self.heard("force")
         smooth, smooth_force = map(smoothed, (computed, force))
         others = {name: smoothed(signal) for name, signal in self.others().items()}
         noise = passed_noise(self.rig, (computed, force), levels)
@@ -274,8 +221,8 @@ class Reader:
             f = with_error(smooth_force, k + NOISE_TRIES, levels[1])
             return driven(with_error(smooth, k, levels[0]), f)(rig)
 
-        made = (measured, driven(smooth, smooth_force), noisy, self._heard("deflection"))
-        return [self._made("linkage", self._name("deflection"), *made)]
+        made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
+        return [self._made("linkage", self.name_of("deflection"), *made, "computed")]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from coupled.gap.budget import StageBudget
 from coupled.gap.result import EffectResult, Findings, ParameterEstimate, StageResult
@@ -37,14 +38,29 @@ def plain(name: str) -> str:
     return name.replace("_", " ")
 
 
-def summary(found: Findings, shrink: Shrink, next_test: str) -> str:
-    """Return what is wrong, how large, how sure, how much it explains, and what to record next."""
+def filtered_words(filtered: Mapping[str, str]) -> str:
+    """Return which logs were filtered, and where their floors come from."""
+    said = []
+    for source in dict.fromkeys(filtered.values()):
+        names = " and ".join(name for name, one in filtered.items() if one == source)
+        said.append(
+            f"No noise is seen in {names}, as in a log that was filtered or resampled:"
+            f" the floor is {source}."
+        )
+    return " ".join(said)
+
+
+def summary(found: Findings, shrink: Shrink, filtered: str, next_test: str) -> str:
+    """Return what is wrong, how large, how sure, how much it explains, and what to record next.
+
+    `filtered` says which logs were filtered.
+    """
     said = [_what(found), _set(found), _settings(found)]
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
         said += [_since(found), _sure(found), _closes(shrink)]
-    said.append(next_test)
+    said += [filtered, next_test]
     return " ".join(sentence for sentence in said if sentence)
 
 
@@ -59,6 +75,10 @@ def _what(found: Findings) -> str:
     if found.verdict == "no_gap":
         within = "every stage that could be judged stays within its noise"
         return f"No gap in the {found.control}: {within}."
+    hidden = [stage for stage in found.stages if stage.hidden is not None]
+    if hidden and not found.guilty:
+        why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
+        return f"Whether the {found.control} has a gap cannot be said: {why}."
     budgets = {one.stage: one for one in found.budget}
     if found.verdict == "unexplained":
         named = "; ".join(_effect(effect) for effect in found.effects)

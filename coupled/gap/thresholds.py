@@ -30,6 +30,9 @@ FILTERED = 0.05  # chosen: of the lowest bands' level, under which the highest s
 JUMPS = 0.5  # chosen: of the rms of fourth differences, under which the usual one shows jumps
 LEAST_NOISE = 1e-3  # chosen: of a signal's rms, the noise of a channel whose own was filtered away
 BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the force itself
+FELT_FRAMES = 4  # chosen: to either side, over which an answer says what was felt of a force
+FELT = 0.9  # chosen: share of a force's roughness in its answer, from which it is no noise
+HALF_FELT = 0.5  # chosen: the same, from which to smooth it would take more than it gives
 UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
 
 # Halves of a record: fitted and held out (`output`).
@@ -40,6 +43,8 @@ STRETCH_POWER = 0.125  # of the residual's power, from which a stretch is cut; b
 # What noise alone may leave of a stage (`output`).
 GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at up to 1.1
 NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
+# Of what a channel does, rms over rms: the floors of 77 records of the rig's own stand under 0.02.
+FLOOR_SHARE = 0.1  # chosen: from which a stage within its floor is not judged
 SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps stands at 1.15
 
 # Records of the healthy machine (`healthy`).

@@ -1,0 +1,137 @@
+"""What a record holds of a control, and what each stage would need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.floors import floor_from, noise_in
+from coupled.gap.noise import Noise, noise_of
+from coupled.gap.served import left
+from coupled.gap.smooth import smoothed
+from coupled.record.channels import SURFACES, ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.replay import replay_schedule
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+PRESSURE = "dynamic_pressure_Pa"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A record of one control of a rig: its channels, and those that lack."""
+
+    rig: Rig
+    record: Record
+    control: ControlName
+    # The map of a control's commands to its surface's positions; None where others move it, too.
+    surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
+    number: int = 0  # of the record, where there are several
+
+    @property
+    def surface(self) -> str:
+        """The channel of the control's surface."""
+        return f"{SURFACES[self.control]}_rad"
+
+    def signal(self, quantity: str) -> Floats:
+        """Return a control's channel."""
+        return self.record[channel(self.control, quantity)]
+
+    def others(self) -> dict[str, Floats]:
+        """Return the forces in N on other controls of a common structure, where recorded."""
+        if self.rig.structure.stands_apart:
+            return {}
+        held = {str(n): channel(n, "force") for n in self.rig.controls if n != self.control}
+        return {name: self.record[force] for name, force in held.items() if force in self.record}
+
+    def missing(self) -> dict[str, list[str]]:
+        """Return the channels that each stage would need and the record lacks."""
+        needs = {
+            "schedule": [PRESSURE, self.name_of("gradient")],
+            "loader": [self.name_of(q) for q in ("force", "computed")] + self._gradient_from(),
+            "multiplier": [self.name_of(q) for q in ("computed", "modifying_force")]
+            + self._gradient_from(),
+            "linkage": [self.name_of(q) for q in ("computed", "force", "deflection")],
+            "compensation": [self.name_of(q) for q in ("computed", "force", "estimate")],
+            "surface": [self.name_of("estimate"), PRESSURE, self.surface],
+        }
+        lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        return {stage: names for stage, names in lacking.items() if names}
+
+    def name_of(self, quantity: str) -> str:
+        """Return the name of a quantity's channel."""
+        return channel(self.control, quantity)
+
+    def _gradient_from(self) -> list[str]:
+        """Return the channel that G_T is taken from: its own, or q̄ where the record lacks it.
+
+        None where the record has neither, and the rig has one spring at any q̄.
+        """
+        own = self.name_of("gradient")
+        if own in self.record:
+            return [own]
+        if PRESSURE in self.record:
+            return [PRESSURE]
+        return [] if one_spring(self.rig, self.control) else [own]
+
+    def gradient(self) -> Floats:
+        """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""
+        source = self._gradient_from()
+        if source == [PRESSURE]:
+            pressure = smoothed(self.record[PRESSURE])
+            return replay_schedule(self.rig, self.control, pressure) * left(self)
+        if source:
+            return self.signal("gradient")
+        table = self.rig.controls[self.control].schedule.total_gradient
+        return np.full(len(self.record), table[0]) * left(self)
+
+    def second(self) -> Floats | None:
+        """Return G_T beyond the break, which no record holds: what the schedule makes of q̄."""
+        two = self.rig.controls[self.control].schedule.second_gradient is not None
+        if not two or PRESSURE not in self.record:
+            return None
+        smooth = smoothed(self.record[PRESSURE])
+        return replay_schedule(self.rig, self.control, smooth, beyond=True) * left(self)
+
+    def heard(self, quantity: str) -> Noise:
+        """Return the noise of a control's channel."""
+        return noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
+
+    def filtered(self) -> dict[str, str]:
+        """Return {a channel of the control whose log was filtered: where its floor comes from}."""
+        names = [self.name_of(quantity) for quantity in ("force", "computed", "deflection")]
+        return {
+            name: floor_from(self.rig, name, self.record[name])
+            for name in names
+            if name in self.record and noise_of(self.record[name]).filtered
+        }
+
+
+def one_spring(rig: Rig, control: ControlName) -> bool:
+    """Tell whether a control's gradient is the same at any q̄, and there is one."""
+    schedule = rig.controls[control].schedule
+    first, *rest = schedule.total_gradient
+    return schedule.second_gradient is None and first > 0.0 and all(g == first for g in rest)
+
+
+def worth_recording(
+    rig: Rig, control: ControlName, stage: str, channels: Sequence[str]
+) -> set[str]:
+    """Return those of a stage's lacking channels that belong to what the machine has.
+
+    A bench without a host has no estimate, a slide without a spring no schedule, a rig file
+    without bend and play no second transducer.
+    """
+    data = rig.controls[control]
+    host = rig.flight is not None or data.compensation.deflection or data.compensation.gradient
+    scheduled = len(set(data.schedule.total_gradient)) > 1
+    soft = any((data.loader.bend, data.loader.play, data.loader.arc_geometry))
+    has = {"schedule": scheduled, "compensation": host, "linkage": host or soft}
+    if not has.get(stage, True):
+        return set()
+    by_schedule = set() if scheduled or host else {PRESSURE, channel(control, "gradient")}
+    return set(channels) - by_schedule

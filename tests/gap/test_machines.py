@@ -1,0 +1,70 @@
+"""Machines that nobody tuned on: stand-ins by scipy, and what must be said of each.
+
+What each answer must be was written down before it was run.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.gap.diagnose import diagnose
+from coupled.gap.floors import floor_from
+from coupled.gap.reading import worth_recording
+from tests.support.gaps import nominal_rig
+from tests.support.machines import CUBIC, DAMPING, duffing, duffing_rig
+
+
+def test_a_floor_that_hides_a_gap_lets_no_one_say_that_there_is_none() -> None:
+    """The damping is 30 % off, and the force's noise nearly half of the force: not to be seen."""
+    found = diagnose(duffing_rig(damping=0.7 * DAMPING), {"r": duffing(seconds=8.0, noise=NOISY)})
+    assert found.verdict == "ambiguous"
+    assert found.effects == ()
+    loader = found.stage("loader").as_dict()
+    assert loader["judged"] is False
+    assert loader["floor_share"] > 0.3
+    assert "noise of column_force_N is" in loader["why"]
+    assert "less noise" in found.next_test
+    assert "cannot be said" in found.summary
+
+
+NOISY = (5.0, 2e-6)
+
+
+@pytest.mark.slow
+def test_an_oscillator_of_another_program_has_no_gap_beside_its_own_numbers() -> None:
+    found = diagnose(duffing_rig(), {"r": duffing()})
+    assert found.verdict == "no_gap"
+    assert "filtered or resampled" in found.summary  # its band ends below half of the frame rate
+    assert set(found.filtered) == {"column_force_N", "column_computed_m"}
+    assert found.next_test == ""  # no advice about a schedule, a host, a grip that it has not
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to_Hz", [30.0, 49.0])
+def test_a_hardening_spring_and_a_damping_are_found_under_a_broadband_force(to_Hz: float) -> None:
+    record = duffing(to_Hz=to_Hz, seed=2)
+    spring = diagnose(duffing_rig(cubic=0.0), {"r": record})
+    assert [effect.name for effect in spring.effects] == ["cubic_stiffness"]
+    assert spring.effects[0].value == pytest.approx(CUBIC, rel=0.03)
+    damping = diagnose(duffing_rig(damping=0.7 * DAMPING), {"r": record})
+    assert [effect.name for effect in damping.effects] == ["viscous_damping"]
+    assert damping.effects[0].value == pytest.approx(1.0 / 0.7, rel=0.02)
+    assert damping.verdict == spring.verdict == "effect"
+
+
+def test_only_what_the_machine_has_is_worth_recording() -> None:
+    lacking = ["dynamic_pressure_Pa", "column_deflection_m", "column_estimate_m"]
+    rig = duffing_rig()
+    for stage in ("schedule", "linkage", "compensation"):
+        assert worth_recording(rig, "column", stage, lacking) == set()
+    assert worth_recording(rig, "column", "loader", ["column_force_N"]) == {"column_force_N"}
+    assert worth_recording(nominal_rig(False), "column", "linkage", lacking) == set(lacking)
+
+
+def test_a_filtered_log_has_the_rig_files_noise_where_it_gives_some() -> None:
+    ramp = np.linspace(0.0, 1.0, 1000)
+    rig = duffing_rig()
+    assert "1/1000" in floor_from(rig, "column_force_N", ramp)
+    known = rig.changed({"noise": {"column_force_N": 0.1}})
+    assert floor_from(known, "column_force_N", ramp) == "the rig file"

@@ -1,0 +1,87 @@
+"""Machines that are not ours: simulated by scipy, by other laws and another integrator.
+
+Stand-ins for measured machines. None of them uses a stage of the package; each is simulated far
+finer than it is recorded. Records are in the channels of a column; forces in N, deflections in m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from tests.support.rigs import BENCH, bench
+
+Floats = NDArray[np.float64]
+Signal = Callable[[Floats], Floats]
+MASS_kg, DAMPING, STIFFNESS, CUBIC = 1.0, 3.0, 4000.0, 4.0e6  # of the oscillator: 10 Hz, ζ 0.024
+
+
+def plain_rig(frame_rate_Hz: float, changes: Mapping[str, float], gradient: float = 0.0) -> Rig:
+    """Return a bench whose column is a mass with damping, and no more than `changes` say."""
+    schedule = "controls.column.schedule.total_gradient_N_per_m"
+    host = "controls.column.compensation."
+    given = {"basic_gradient_N_per_m": gradient, "bend_m_per_N": 0.0} | dict(changes)
+    still = {host + "deflection": False, host + "gradient": False, host + "bend_m_per_N": 0.0}
+    table = {**BENCH, "frame_rate_Hz": frame_rate_Hz}
+    level = {schedule: [gradient, gradient], "controls.column.travel_m": 1.0, LENGTH: 2.0}
+    return bench({**given, **still, **level}, table)
+
+
+LENGTH = "controls.column.length_m"
+
+
+def recorded(rate_Hz: float, **channels: Floats) -> Record:
+    """Return a record of channels of a column, named without `column_`."""
+    frames = len(next(iter(channels.values())))
+    names = ("time_s", *(f"column_{name}" for name in channels))
+    return Record(names, np.column_stack((np.arange(frames) / rate_Hz, *channels.values())))
+
+
+def broadband(rate_Hz: float, seconds: float, to_Hz: float, rng: np.random.Generator) -> Signal:
+    """Return a force of unit rms, as strong at every frequency up to `to_Hz`; random phases."""
+    lines_Hz = np.arange(1, int(to_Hz * seconds)) / seconds
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(lines_Hz))
+    times = np.arange(round(8 * rate_Hz * (seconds + 1.0))) / (8 * rate_Hz)
+    fine = sum(np.cos(2 * np.pi * f * times + p) for f, p in zip(lines_Hz, phases, strict=True))
+    curve = CubicSpline(times, fine / np.std(fine))
+    return lambda t: np.asarray(curve(t))
+
+
+def duffing(
+    rate_Hz: float = 100.0,
+    seconds: float = 20.0,
+    force_N: float = 12.0,
+    to_Hz: float = 30.0,
+    noise: tuple[float, float] = (0.0, 2e-6),
+    seed: int = 1,
+) -> Record:
+    """Return a record of a mass on a hardening spring under a broadband force.
+
+    m·x'' + c·x' + k·x + k₃·x³ = F; `noise` is added to F in N and to x in m.
+    """
+    rng = np.random.default_rng(seed)
+    shape = broadband(rate_Hz, seconds, to_Hz, rng)
+    times = np.arange(round(seconds * rate_Hz)) / rate_Hz
+
+    def rates(t: float, y: Floats) -> tuple[float, float]:
+        pull = force_N * float(shape(np.asarray(t))) * min(t, 1.0)
+        return y[1], (pull - DAMPING * y[1] - STIFFNESS * y[0] - CUBIC * y[0] ** 3) / MASS_kg
+
+    way = solve_ivp(rates, (0.0, times[-1]), (0.0, 0.0), "DOP853", times, rtol=1e-8, atol=1e-10)
+    pull = force_N * shape(times) * np.minimum(times, 1.0)
+    hiss = rng.normal(size=(2, len(times)))
+    return recorded(
+        rate_Hz, force_N=pull + noise[0] * hiss[0], computed_m=way.y[0] + noise[1] * hiss[1]
+    )
+
+
+def duffing_rig(rate_Hz: float = 100.0, damping: float = DAMPING, cubic: float = CUBIC) -> Rig:
+    """Return the rig of that oscillator."""
+    numbers = {"mass_kg": MASS_kg, "damping_N_s_per_m": damping, "cubic_N_per_m3": cubic}
+    return plain_rig(rate_Hz, numbers, STIFFNESS)
