@@ -101,6 +101,7 @@ class Host:
         self.happened = Happened()
         self.attached: Attached | None = None
         self.time_s = 0.0
+        self.first_place = False  # whether the system granted real-time priority
         self.aboard: Aboard | None = None
         self._saving: threading.Thread | None = None
 
@@ -265,6 +266,7 @@ class Host:
         link, attached = self.plan.link, self.attached
         found: dict[str, Any] = {
             "paced": self.plan.paced,
+            "real_time_priority": self.first_place,
             "loader": "sim" if link is None else link.name,
             "lateness": self.pacer.result().as_dict() if self.plan.paced else None,
             "switched": [asdict(change) for change in self.switches.changes],

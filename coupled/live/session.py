@@ -13,6 +13,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.live.host import STOPPED, Host, Plan
 from coupled.live.measured import as_measured
 from coupled.live.pacing import Lateness
+from coupled.live.priority import first_place
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -40,7 +41,7 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
     host = Host(plan)
     real = manoeuvre if plan.link is None else as_measured(manoeuvre)
     try:
-        with undisturbed():
+        with undisturbed(), first_place(plan.paced) as host.first_place:
             record = fly(real, progress, companion=host)
     finally:
         host.farewell()

@@ -33,6 +33,7 @@ def test_real_time_takes_as_long_as_it_says(tmp_path: Path) -> None:
     live = json.loads(done.stdout)
     assert live["lateness"]["frames"] == 60
     assert sum(live["lateness"]["histogram_frames"]) == 60
+    assert isinstance(live["real_time_priority"], bool)
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
+
 import pytest
 
 from coupled.live.pacing import EDGES_ms, Pacer
+from coupled.live.priority import first_place
 
 FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
 
@@ -73,3 +78,28 @@ def test_the_histogram_counts_every_frame() -> None:
     said = pacer.result().as_dict()
     assert sum(said["histogram_frames"]) == 50 == said["frames"]
     assert said["histogram_frames"][EDGES_ms.index(0.2)] == 49  # the first is not waited for
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the class SCHED_FIFO is Linux's")
+def test_only_the_thread_that_flies_goes_first_and_only_while_it_flies() -> None:
+    before = os.sched_getscheduler(0)
+    seen: list[int] = []
+    with first_place() as granted:
+        mine = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
+        assert mine == (os.SCHED_FIFO if granted else before)
+        other = threading.Thread(target=lambda: seen.append(os.sched_getscheduler(0)))
+        other.start()
+        other.join()
+    assert seen == [os.SCHED_OTHER] or not granted
+    assert os.sched_getscheduler(0) == before
+
+
+def test_a_flight_goes_on_where_the_system_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse, raising=False)
+    with first_place() as granted:
+        assert not granted
+    with first_place(wanted=False) as granted:
+        assert not granted
