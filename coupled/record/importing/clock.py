@@ -119,7 +119,7 @@ def stamps_of(log: Log, clock: Clock | OtherClock, map_file: Path, key: str = "c
     if isinstance(clock, Clock) and clock.rate is not None:
         rows = len(next(iter(log.columns.values())))
         return Stamps(Fraction(0), np.arange(rows) / clock.rate)
-    stamps = log.stamps(clock, map_file, key)
+    stamps = log.times(clock, map_file, key)
     if stamps.from_first_s.size < 2:
         raise InputError(log.file, clock.source, "has fewer than two rows")
     lacking = np.isnan(stamps.from_first_s)

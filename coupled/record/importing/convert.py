@@ -48,21 +48,21 @@ def import_log(
     files = [log_file] if isinstance(log_file, Path) else list(log_file)
     log_map = read_map(map_file)
     logs = read_logs(files, log_map, map_file)
-    main = logs[files[0].name]
+    main = next(iter(logs.values()))
     rate = rig.frame_rate if rig is not None else None
     asked = log_map.clock.frame_rate
     if rate is not None and asked is not None and abs(asked / rate - 1.0) > 1e-3:
         problem = f"is {asked:g}, the rig's {rate:g}; leave it out to take the rig's"
         raise InputError(map_file, "clock.frame_rate_Hz", problem)
     grids = lay_grids(logs, log_map, map_file, rate)
-    grid = grids[main.file.name]
+    grid = grids[main.name]
     warnings = _clock_warnings(grid)
     names = [name for name in CHANNELS if name in log_map.channels]
     record, logged, filled = {}, {}, {}
     for name in names:
         channel = log_map.channels[name]
         log = logs[log_of(name, log_map, logs, map_file)]
-        own = grids[log.file.name]
+        own = grids[log.name]
         values = _in_si(log, name, channel, map_file, warnings)
         if len(values) < own.kept.stop:
             problem = f"has {len(values)} rows, the clock {own.kept.stop}"
@@ -112,10 +112,10 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     values = log.values(channel, map_file, key)
     stated = log.units.get(channel.source, "")
     if not channel.unit and not stated:
-        raise InputError(map_file, f"{key}.unit", "is missing; the log's units_row gives none")
+        raise InputError(map_file, f"{key}.unit", "is missing; the log states none")
     factor = factor_of(name, channel.unit or stated, map_file)
     if channel.unit and stated and parse_unit(stated) not in (None, parse_unit(channel.unit)):
-        warnings.append(f"{name}: the map says {channel.unit}, the log's own units row {stated}")
+        warnings.append(f"{name}: the map says {channel.unit}, the log itself {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)
     huge = np.abs(si) > LARGEST
     if huge.any():
@@ -184,9 +184,10 @@ def _unmapped(logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> tuple
         (log_of(name, log_map, logs, map_file), channel.source)
         for name, channel in log_map.channels.items()
     }
-    used |= {(name, clock_of(name, log_map).source) for name in logs}
+    used |= {(name, clock_of(log, log_map).source) for name, log in logs.items()}
+    files = {log.file for log in logs.values()}
     return tuple(
-        column if len(logs) == 1 else f"{name}: {column}"
+        column if len(files) == 1 else f"{name}: {column}"
         for name, log in logs.items()
         for column in log.columns
         if (name, column) not in used

@@ -29,7 +29,7 @@ LOAD_FACTOR = "load_factor"
 class Layout(Section):
     """How the log's file is laid out; `format` is by the file's extension where not given."""
 
-    format: Literal["csv", "parquet", "mat"] | None = None
+    format: Literal["csv", "parquet", "mat", "hdf5", "mdf", "tdms", "mcap", "ulog"] | None = None
     delimiter: str = quantity("", ",", min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
     comment: str = ""
@@ -46,7 +46,7 @@ class Clock(Section):
     """Where a row's time comes from, the record's frame rate, and the cut."""
 
     source: str = named("from", "")
-    unit: str = "s"
+    unit: str = ""  # the log's own, or s where it states none
     date: str = ""
     rate: float | None = quantity("Hz", None, gt=0, le=1e6)
     frame_rate: float | None = quantity("Hz", None, ge=1, le=2000)
@@ -65,7 +65,7 @@ class OtherClock(Section):
     """Where a further log's rows have their time from, if not as the first log's."""
 
     source: str = named("from", min_length=1)
-    unit: str = "s"
+    unit: str = ""
     date: str = ""
 
 
@@ -143,7 +143,7 @@ def _check_clock(clock: Clock, path: Path) -> None:
 
 
 def _check_stamps(clock: Clock | OtherClock, path: Path, key: str) -> None:
-    unit = known_unit(clock.unit, path, f"{key}.unit")
+    unit = known_unit(clock.unit or "s", path, f"{key}.unit")
     if unit.dimension != _own("s").dimension:
         fit = ", ".join(units_like(_own("s")))
         raise InputError(path, f"{key}.unit", f"{clock.unit!r} is {unit.word}; give one of {fit}")

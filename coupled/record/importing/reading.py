@@ -1,4 +1,4 @@
-"""The columns of a log, by name, from CSV, Parquet or MATLAB; a fault names the line.
+"""The columns of a log, by name, whatever its format; a fault names the line.
 
 A log may hold columns that are no numbers: only what the map asks for is read as such.
 """
@@ -6,6 +6,7 @@ A log may hold columns that are no numbers: only what the map asks for is read a
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -19,27 +20,45 @@ from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
 from coupled.record.importing.cells import element, moments, signed
+from coupled.record.importing.formats.columns import Found
 from coupled.record.importing.mapping import Channel, Clock, Layout, OtherClock, known_unit
-from coupled.record.importing.separate import read_separately
+from coupled.record.importing.separate import read_parquet_separately, read_separately
+from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
 Lines = NDArray[np.int64]
 FORMATS = {
     **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log"), "csv"),
-    **{".parquet": "parquet", ".mat": "mat"},
+    **{".parquet": "parquet", ".mat": "mat", ".h5": "hdf5", ".hdf5": "hdf5", ".hdf": "hdf5"},
+    **{".mf4": "mdf", ".mdf": "mdf", ".tdms": "tdms", ".mcap": "mcap"},
+    **dict.fromkeys((".ulg", ".ulog"), "ulog"),
 }
 LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a record
 
 
 @dataclass(frozen=True)
 class Log:
-    """A log's columns, as they stand in it. `lines` tells the line of each row of a CSV."""
+    """A log's columns, as they stand in it. `lines` tells the line of each row of a CSV.
+
+    Where a format samples groups of columns by clocks of their own, `stamps` names the column
+    with each one's times, and `groups` the group; `refused` tells why a column is not read.
+    `part` is the group that a log is a part of another of.
+    """
 
     file: Path
     columns: Mapping[str, pl.Series]
     units: Mapping[str, str] = field(default_factory=dict)
     doubled: frozenset[str] = frozenset()
     lines: Lines | None = None
+    groups: Mapping[str, str] = field(default_factory=dict)
+    stamps: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict)
+    part: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its file's name, and which part of it."""
+        return f"{self.file.name}: {self.part}" if self.part else self.file.name
 
     def line(self, row: int) -> int:
         """Return where a row, counted from 0, stands in the file, counted from 1."""
@@ -49,6 +68,8 @@ class Log:
         """Return the column of a name that a map gives under `key`."""
         if name in self.doubled:
             raise InputError(self.file, name, "duplicate column; which is meant?")
+        if name in self.refused:
+            raise InputError(self.file, name, self.refused[name])
         if name not in self.columns:
             hint = nearest(name, self.columns)
             if len(self.columns) == 1:
@@ -65,7 +86,7 @@ class Log:
         raw = numbers(self.file, name, column, gaps=True, line=self.line)
         return signed(raw, channel, self.file, self.line)
 
-    def stamps(self, clock: Clock | OtherClock, map_file: Path, key: str) -> Stamps:
+    def times(self, clock: Clock | OtherClock, map_file: Path, key: str) -> Stamps:
         """Return when each row was taken.
 
         Counted from the first row before it becomes a double: a clock in ns since 1970 keeps
@@ -83,7 +104,7 @@ class Log:
             return _counted(column.to_physical(), {"ms": 10**3, "us": 10**6}.get(str(unit), 10**9))
         check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
-        factor = known_unit(clock.unit, map_file, f"{key}.unit").factor
+        factor = known_unit(clock.unit or self._time_unit(name), map_file, f"{key}.unit").factor
         exact = Fraction(factor).limit_denominator(10**12)  # 1/1000, not the double next to it
         if column.dtype.is_integer() and column.len() and column[0] is not None:
             wide = column.cast(pl.Int64, strict=False) - int(column[0])
@@ -91,6 +112,12 @@ class Log:
             return Stamps(Fraction(int(column[0])) * exact, steps * factor)
         first = float(values[0]) if values.size and np.isfinite(values[0]) else 0.0
         return Stamps(Fraction(first) * exact, (values - first) * factor)
+
+    def _time_unit(self, name: str) -> str:
+        """Return the unit of time that the log states for a column, or s."""
+        stated, second = parse_unit(self.units.get(name, "")), parse_unit("s")
+        alike = stated is not None and second is not None and stated.dimension == second.dimension
+        return self.units[name] if alike else "s"
 
 
 @dataclass(frozen=True)
@@ -117,7 +144,22 @@ def read_log(path: Path, layout: Layout) -> Log:
     content = read_bytes(path)
     if kind == "csv":
         return _read_csv(path, content, layout)
-    return Log(path, read_separately(path, content, kind, layout))
+    if kind == "parquet":
+        return Log(path, read_parquet_separately(path, content))
+    return _log(path, read_separately(path, content, kind, layout))
+
+
+def _log(path: Path, found: list[Found]) -> Log:
+    times = Counter(column.name for column in found)
+    return Log(
+        path,
+        {c.name: pl.Series(c.name, c.values) for c in found if not c.refused},
+        {c.name: c.unit for c in found if c.unit},
+        frozenset(name for name, count in times.items() if count > 1),
+        groups={c.name: c.group for c in found if c.group},
+        stamps={c.name: c.stamps for c in found if c.stamps},
+        refused={c.name: c.refused for c in found if c.refused},
+    )
 
 
 def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:

@@ -1,11 +1,15 @@
-"""Parquet and MATLAB files are read in a process of their own.
+"""Logs that are no text are read in a process of their own.
 
-Their readers are compiled code that a damaged file can crash, past any `except`: then only
-that process dies, and the command says in one line that the file is damaged.
+Their readers are compiled code that a damaged file can crash, past any `except`, or keep busy
+for ever, or make to ask for all memory: then only that process ends, and the command says in
+one line that the file is damaged.
 """
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import importlib.util
 import io
 import json
 import os
@@ -17,16 +21,36 @@ from pathlib import Path
 import polars as pl
 
 from coupled.errors import InputError
+from coupled.record.importing.formats.columns import Found, pack, unpack
 from coupled.record.importing.mapping import Layout
-from coupled.record.importing.matlab import read_matlab
 
 REFUSED = 3  # exit code of a process that says itself what is wrong
-_KINDS = {"parquet": "Parquet", "mat": "MATLAB"}
+LONGEST_s = 20.0  # that a reader may take, and
+LONGEST_s_per_MiB = 10.0
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_WORDS = {
+    **{
+        "parquet": "a Parquet",
+        "mat": "a MATLAB",
+        "hdf5": "an HDF5 or MATLAB v7.3",
+        "mdf": "an MDF",
+    },
+    **{"tdms": "a TDMS", "mcap": "an MCAP", "ulog": "a ULog"},
+}
+# What reads a format, and the packages of the extra `logs` that it imports.
+_READERS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "mat": ("read_matlab", ()),
+    "hdf5": ("read_hdf5", ("h5py",)),
+    "mdf": ("read_mdf", ("asammdf",)),
+    "tdms": ("read_tdms", ("nptdms",)),
+    "mcap": ("read_mcap", ("mcap", "mcap_ros2", "mcap_protobuf")),
+    "ulog": ("read_ulog", ("pyulog",)),
+}
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a separate process is to read: a `kind` of file, and of a MATLAB file which matrix."""
+    """What a separate process is to read: a `kind` of file, and which of its matrices."""
 
     kind: str
     file: str
@@ -34,40 +58,82 @@ class Task:
     names: list[str] | str
 
 
-def read_separately(path: Path, content: bytes, kind: str, layout: Layout) -> dict[str, pl.Series]:
-    """Return the columns of a Parquet or MATLAB file."""
+def read_separately(path: Path, content: bytes, kind: str, layout: Layout) -> list[Found]:
+    """Return the columns of a log that is neither text nor Parquet; raises InputError."""
+    return unpack(pl.read_ipc(_answer(path, content, kind, layout)))
+
+
+def read_parquet_separately(path: Path, content: bytes) -> dict[str, pl.Series]:
+    """Return the columns of a Parquet file, of whatever type; raises InputError."""
+    table = pl.read_ipc(_answer(path, content, "parquet", Layout()))
+    return {name: table[name] for name in table.columns}
+
+
+def _answer(path: Path, content: bytes, kind: str, layout: Layout) -> io.BytesIO:
+    if kind == "mat" and _is_hdf5(content):
+        kind = "hdf5"
+    _check_installed(path, kind)
     task = Task(kind, str(path), layout.matrix, layout.names)
     # The packages are found where this process finds them, and nowhere else.
     found = {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "coupled.record.importing.separate", json.dumps(asdict(task))],
-        check=False,
-        input=content,
-        capture_output=True,
-        env={**os.environ, **found},
-    )
+    try:
+        done = subprocess.run(
+            [
+                *(sys.executable, "-P", "-m", "coupled.record.importing.separate"),
+                json.dumps(asdict(task)),
+            ],
+            check=False,
+            input=content,
+            capture_output=True,
+            env={**os.environ, **found},
+            timeout=LONGEST_s + LONGEST_s_per_MiB * len(content) / 2**20,
+        )
+    except subprocess.TimeoutExpired as late:
+        problem = f"was not read within {late.timeout:.0f} s: it is damaged, or leads in a circle"
+        raise InputError(path, "", problem) from None
     if done.returncode == REFUSED:
         said = json.loads(done.stdout)
         raise InputError(path, said["key"], said["problem"])
     if done.returncode != 0:
-        raise InputError(path, "", f"is not a {_KINDS[kind]} file, or is damaged")
-    table = pl.read_ipc(io.BytesIO(done.stdout))
-    if kind == "parquet":
-        return {name: table[name] for name in table.columns}
-    return dict(zip(table["name"], table["values"], strict=True))
+        raise InputError(path, "", f"is not {_WORDS[kind]} file, or is damaged")
+    return io.BytesIO(done.stdout)
+
+
+def _is_hdf5(content: bytes) -> bool:
+    """Tell whether a MATLAB file is one of v7.3, which are HDF5 behind a block of MATLAB's."""
+    return _HDF5 in (content[:8], content[512:520]) or content[:19] == b"MATLAB 7.3 MAT-file"
+
+
+def _check_installed(path: Path, kind: str) -> None:
+    for package in _READERS[kind][1] if kind in _READERS else ():
+        if importlib.util.find_spec(package) is None:
+            problem = f"needs {package}, which is not installed: pip install 'coupled[logs]'"
+            raise InputError(path, "", problem)
 
 
 def _read(task: Task, content: bytes) -> pl.DataFrame:
     if task.kind == "parquet":
         return pl.read_parquet(io.BytesIO(content))
-    vectors = read_matlab(Path(task.file), content, task.matrix, task.names)
-    values = [pl.Series(vector) for vector in vectors.values()]  # each of its own length
-    return pl.DataFrame({"name": list(vectors), "values": values})
+    name = _READERS[task.kind][0]
+    module = importlib.import_module(f"coupled.record.importing.formats.{name[5:]}")
+    given = (task.matrix, task.names) if task.kind in ("mat", "hdf5") else ()
+    return pack(getattr(module, name)(Path(task.file), content, *given))
+
+
+def _limit_memory() -> None:
+    """Let this process ask for half of the machine's memory: a small file can declare any size."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource  # noqa: PLC0415 - not on Windows
+
+        half = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+        resource.setrlimit(resource.RLIMIT_DATA, (half, half))
 
 
 def _main() -> int:
+    _limit_memory()
     try:
-        table = _read(Task(**json.loads(sys.argv[1])), sys.stdin.buffer.read())
+        with contextlib.redirect_stdout(sys.stderr):  # readers print what they doubt
+            table = _read(Task(**json.loads(sys.argv[1])), sys.stdin.buffer.read())
     except InputError as error:
         sys.stdout.write(json.dumps({"key": error.key, "problem": error.problem}))
         return REFUSED

@@ -19,7 +19,7 @@ from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.importing.mapping import CHANNELS, Layout, own_unit
 from coupled.record.importing.plausible import move_oppositely
-from coupled.record.importing.reading import read_log
+from coupled.record.importing.reading import Log, read_log
 from coupled.record.importing.suggest import sizes
 from coupled.record.importing.suggest.columns import Column, columns_of
 from coupled.record.importing.suggest.dialect import guess_layout
@@ -57,10 +57,11 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     A `rig`'s travels narrow the units. Raises InputError for what is no log.
     """
     layout = guess_layout(files[0])
-    columns = [column for file in files for column in columns_of(read_log(file, layout))]
+    read = [read_log(file, layout) for file in files]
+    columns = [column for log in read for column in columns_of(log)]
     logs = [file.name for file in files]
-    clock, clocks = _clocks(columns, logs)
     chosen = _chosen([c for c in columns if c.reading.channel != "time"])
+    clock, clocks = _clocks(_stamps_first(columns, read, chosen), logs)
     sections = [("log", _layout_lines(layout)), ("clock", clock)]
     sections += [(f"clocks.{json.dumps(name)}", lines) for name, lines in clocks.items()]
     for channel in CHANNELS:
@@ -83,6 +84,16 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
         if value == "?"
     )
     return Proposal(_text(sections, logs, unmapped), questions, mapped, unmapped)
+
+
+def _stamps_first(
+    columns: Sequence[Column], logs: Sequence[Log], chosen: Mapping[str, Column]
+) -> list[Column]:
+    """Return the columns, those first that stamp the groups of what was chosen."""
+    stamps = {log.file.name: log.stamps for log in logs}
+    order = [stamps[c.log].get(c.name) for name in CHANNELS if (c := chosen.get(name))]
+    place = {name: i for i, name in reversed(list(enumerate(order)))}
+    return sorted(columns, key=lambda column: place.get(column.name, len(order)))
 
 
 def _named(column: Column, logs: Sequence[str]) -> str:
@@ -223,6 +234,8 @@ def _signs(
         force = own.get(f"{control}_force_N")
         moved = next((own[c] for c in own if "computed" in c or "deflection" in c), None)
         if force is None or moved is None or force.log != moved.log:
+            continue
+        if force.values.size != moved.values.size:  # sampled apart
             continue
         if sizes.kept_sign(force.values) or sizes.kept_sign(moved.values):
             continue  # their raw counts say nothing of a direction

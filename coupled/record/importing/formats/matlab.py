@@ -11,37 +11,33 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import io as scipy_io
 
 from coupled.errors import InputError
+from coupled.record.importing.formats.columns import Found, Numbers
+from coupled.record.importing.formats.matrix import columns_of_matrix
 
-Floats = NDArray[np.float64]
 DEEPEST = 6  # structs within structs
 MOST_FIELDS = 10_000
-HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read_matlab(
-    path: Path, content: bytes, matrix: str = "", names: list[str] | str = "signals"
-) -> dict[str, Floats]:
-    """Return {name: values, shape (rows,)} of a MATLAB file, v4 to v7.2.
+def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str) -> list[Found]:
+    """Return the vectors of a MATLAB file, v4 to v7.2.
 
     A field of a struct is `struct.field`, of an array of structs `struct(1).field`. With
     `matrix` the columns of that variable are taken too, by `names`: a list, or the variable
     that holds them.
     """
-    if content[:8] == HDF5 or content[512:520] == HDF5 or content[:19] == b"MATLAB 7.3 MAT-file":
-        raise InputError(path, "", "is a MATLAB file of v7.3; save it with -v7")
     variables = _load(path, content)
-    found: dict[str, Floats] = {}
+    found: dict[str, Numbers] = {}
     for name, value in variables.items():
         _collect(found, name, value, 0)
     if matrix:
-        found.update(_matrix(path, variables, matrix, names))
+        words = names if isinstance(names, list) else _words(variables.get(names))
+        found.update(columns_of_matrix(path, matrix, variables.get(matrix), names, words))
     if not found:
         raise InputError(path, "", "holds no vector of numbers")
-    return found
+    return [Found(name, values) for name, values in found.items()]
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:
@@ -57,7 +53,7 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
-def _collect(found: dict[str, Floats], name: str, value: Any, depth: int) -> None:
+def _collect(found: dict[str, Numbers], name: str, value: Any, depth: int) -> None:
     """Add to `found` the vectors in a variable, field by field."""
     if not isinstance(value, np.ndarray) or depth > DEEPEST or len(found) >= MOST_FIELDS:
         return
@@ -68,24 +64,6 @@ def _collect(found: dict[str, Floats], name: str, value: Any, depth: int) -> Non
                 _collect(found, f"{own}.{field}", element[field], depth + 1)
     elif value.dtype.kind in "biuf" and value.ndim == 2 and 1 in value.shape and value.size > 1:
         found[name] = value.reshape(-1).astype(np.float64)
-
-
-def _matrix(
-    path: Path, variables: dict[str, Any], matrix: str, names: list[str] | str
-) -> dict[str, Floats]:
-    table = variables.get(matrix)
-    if not isinstance(table, np.ndarray) or table.ndim != 2 or table.dtype.kind not in "biuf":
-        raise InputError(path, matrix, "is no matrix of numbers; log.matrix names one")
-    words = names if isinstance(names, list) else _words(variables.get(names))
-    if not words:
-        problem = "holds no names; log.names is a list of them or the variable that holds them"
-        raise InputError(path, str(names), problem)
-    if len(words) != table.shape[1]:
-        problem = f"has {table.shape[1]} columns, and {len(words)} names"
-        raise InputError(path, matrix, problem)
-    if len(set(words)) < len(words):
-        raise InputError(path, matrix, "two of its columns have one name")
-    return {word: table[:, i].astype(np.float64) for i, word in enumerate(words)}
 
 
 def _words(value: Any) -> list[str]:

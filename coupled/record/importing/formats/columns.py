@@ -1,0 +1,86 @@
+"""What a reader of a format gives: columns, each with its unit and the rows that it belongs to."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64] | NDArray[np.int64]
+MOST_COLUMNS = 20_000
+WORDS = ("name", "unit", "group", "stamps", "refused")
+
+
+@dataclass(frozen=True)
+class Found:
+    """A column of a log: `values`, shape (rows,), as the file has them.
+
+    `unit` is what the file states, or "". Columns of one `group` were sampled together, at the
+    times in the column `stamps`; both are "" where the file does not say. `refused` tells why a
+    column that is there is not read.
+    """
+
+    name: str
+    values: Numbers
+    unit: str = ""
+    group: str = ""
+    stamps: str = ""
+    refused: str = ""
+
+
+def as_numbers(values: object) -> Numbers | None:
+    """Return a column's values as whole numbers or doubles, or None where they are neither."""
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind not in "biuf":
+        return None
+    if array.dtype.kind == "f":
+        return array.astype(np.float64)
+    if array.dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
+        return array.astype(np.float64)
+    return array.astype(np.int64)
+
+
+def by_their_groups(columns: Sequence[Found]) -> list[Found]:
+    """Return columns named `group.name` where two groups have one of the name, else `name`."""
+    times = Counter(column.name for column in columns)
+
+    def full(group: str, name: str) -> str:
+        return f"{group}.{name}" if times[name] > 1 and group else name
+
+    return [
+        replace(
+            column,
+            name=full(column.group, column.name),
+            stamps=full(column.group, column.stamps) if column.stamps else "",
+        )
+        for column in columns
+    ]
+
+
+def pack(columns: Sequence[Found]) -> pl.DataFrame:
+    """Return columns as a table that one process hands to another, a row a column."""
+    words = {key: [getattr(c, key) for c in columns] for key in WORDS}
+    whole = [c.values.dtype.kind != "f" for c in columns]
+    floats = [pl.Series([] if w else c.values) for c, w in zip(columns, whole, strict=True)]
+    counts = [pl.Series(c.values if w else []) for c, w in zip(columns, whole, strict=True)]
+    return pl.DataFrame(
+        {
+            **words,
+            "is_whole": whole,
+            "doubles": pl.Series(floats, dtype=pl.List(pl.Float64)),
+            "whole": pl.Series(counts, dtype=pl.List(pl.Int64)),
+        }
+    )
+
+
+def unpack(table: pl.DataFrame) -> list[Found]:
+    """Return the columns of `pack`."""
+    words = table.select(WORDS).rows(named=True)
+    return [
+        Found(values=table["whole" if is_whole else "doubles"][row].to_numpy(), **words[row])
+        for row, is_whole in enumerate(table["is_whole"])
+    ]

@@ -1,0 +1,137 @@
+"""HDF5, and the MATLAB files of v7.3 that are made of it: vectors by their place, `LOG.force`.
+
+Only what the file itself holds is read: links to other files, data kept in other files and
+views of them are passed over, since a log could name any file of its reader's.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from coupled.errors import InputError
+from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, Numbers, as_numbers
+from coupled.record.importing.formats.matrix import columns_of_matrix
+
+DEEPEST = 6  # groups within groups
+MOST_VALUES = 200_000_000  # of one data set, which a small file can declare without end
+UNITS = ("unit", "units", "Unit", "Units")
+
+
+def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -> list[Found]:
+    """Return the vectors of a file, and with `matrix` its columns, named by `names`.
+
+    A field of a MATLAB struct is `struct.field`, of an array of structs `struct(1).field`; a
+    data set in groups `group.set`, a column of a compound one `group.set.column`.
+    """
+    found: dict[str, Found] = {}
+    with h5py.File(io.BytesIO(content), "r") as file:
+        _walk(found, file, file, "", 0)
+        if matrix:
+            table = _own(file, matrix.replace(".", "/"))
+            values = _array(table) if isinstance(table, h5py.Dataset) else None
+            if values is not None and "MATLAB_class" in table.attrs:
+                values = values.T  # as MATLAB shows it
+            words = names if isinstance(names, list) else _words(file, _own(file, names))
+            columns = columns_of_matrix(path, matrix, values, names, words)
+            found.update({name: Found(name, column) for name, column in columns.items()})
+    if not found:
+        raise InputError(path, "", "holds no vector of numbers")
+    return list(found.values())
+
+
+def _own(group: Any, name: str) -> Any:
+    """Return what a group itself holds under a name, or None for what lies in another file."""
+    if not name or name not in group:
+        return None
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return None
+    return group[name]
+
+
+def _walk(found: dict[str, Found], file: Any, group: Any, place: str, depth: int) -> None:
+    for name in group:
+        if depth > DEEPEST or len(found) >= MOST_COLUMNS:
+            return
+        if str(name).startswith("#"):  # where MATLAB keeps what its cells refer to
+            continue
+        _take(found, file, _own(group, name), f"{place}.{name}" if place else str(name), depth)
+
+
+def _take(found: dict[str, Found], file: Any, item: Any, name: str, depth: int) -> None:
+    if isinstance(item, h5py.Group):
+        _walk(found, file, item, name, depth + 1)
+    if not isinstance(item, h5py.Dataset):
+        return
+    if _refers(item) and item.size > 1 and "." in name:
+        array, _, field = name.rpartition(".")
+        for place, reference in enumerate(np.ravel(_array(item))):
+            if reference and depth <= DEEPEST and len(found) < MOST_COLUMNS:
+                _take(found, file, file[reference], f"{array}({place + 1}).{field}", depth + 1)
+        return
+    if _text(item) or item.dtype.kind not in "biufV":
+        return
+    values = _array(item)
+    if values is None:
+        return
+    unit = _unit(item.attrs)
+    if values.dtype.names:
+        for field in values.dtype.names:
+            _keep(found, f"{name}.{field}", values[field], "")
+    else:
+        _keep(found, name, values, unit)
+
+
+def _keep(found: dict[str, Found], name: str, values: Any, unit: str) -> None:
+    if values.ndim == 2 and 1 in values.shape:
+        values = values.reshape(-1)
+    column: Numbers | None = as_numbers(values)
+    if column is not None and column.size > 1:
+        found[name] = Found(name, column, unit)
+
+
+def _array(item: Any) -> Any:
+    """Return a data set's values, or None where they lie elsewhere or are too many."""
+    if item.shape is None or item.external or item.is_virtual or item.size > MOST_VALUES:
+        return None
+    if item.attrs.get("MATLAB_empty", 0):
+        return None
+    return item[()]
+
+
+def _refers(item: Any) -> bool:
+    return h5py.check_ref_dtype(item.dtype) is h5py.Reference
+
+
+def _text(item: Any) -> bool:
+    return _word(item.attrs.get("MATLAB_class", "")) == "char"
+
+
+def _word(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _unit(attributes: Mapping[str, Any]) -> str:
+    for key in UNITS:
+        if key in attributes and np.ndim(attributes[key]) == 0:
+            return _word(attributes[key])[:40].strip()
+    return ""
+
+
+def _words(file: Any, item: Any) -> list[str]:
+    """Return the words of a char matrix, of a cell of them, or of a data set of strings."""
+    if not isinstance(item, h5py.Dataset) or (values := _array(item)) is None:
+        return []
+    if _refers(item):
+        return [word for each in np.ravel(values) for word in _words(file, file[each])[:1]]
+    if _text(item):
+        rows = np.atleast_2d(values.T)
+        return ["".join(chr(int(code)) for code in row).strip() for row in rows]
+    if h5py.check_string_dtype(item.dtype):
+        return [_word(each).strip() for each in np.ravel(values)]
+    return []

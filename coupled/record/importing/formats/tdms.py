@@ -1,0 +1,79 @@
+"""TDMS, as LabVIEW writes it, by npTDMS: a channel's waveform properties are its clock."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nptdms import TdmsFile
+
+from coupled.errors import InputError
+from coupled.record.importing.formats.columns import (
+    MOST_COLUMNS,
+    Found,
+    Numbers,
+    as_numbers,
+    by_their_groups,
+)
+
+MASTER = "time"  # the column that a waveform's start and step make, in s
+
+
+def read_tdms(path: Path, content: bytes) -> list[Found]:
+    """Return the channels of numbers: `name`, or `group.name` where two groups have one such.
+
+    Where channels are waveforms, `time` is when their rows were taken, in s from the first start
+    in the file, or from the first's own where none is stated.
+    """
+    file = TdmsFile.read(io.BytesIO(content))
+    channels = [each for group in file.groups() for each in group.channels()]
+    starts = [each.properties["wf_start_time"] for each in channels if _starts(each)]
+    columns: list[Found] = []
+    clocks: dict[tuple[Any, ...], str] = {}
+    for channel in channels[:MOST_COLUMNS]:
+        values = _numbers(channel)
+        if values is None:
+            continue
+        label, stamps = str(channel.group_name), ""
+        time_s = _waveform(channel, len(values), min(starts, default=None))
+        if time_s is not None:
+            clock = (label, len(values), time_s[0], time_s[-1])
+            others = sum(key[0] == label for key in clocks)
+            stamps = clocks.get(clock, f"{MASTER}{others + 1}" if others else MASTER)
+            if clock not in clocks:
+                clocks[clock] = stamps
+                columns.append(Found(stamps, time_s, "s", _own(label, stamps), stamps))
+        unit = str(channel.properties.get("unit_string", "")).strip()[:40]
+        columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps))
+    if not columns:
+        raise InputError(path, "", "holds no channel of numbers")
+    return by_their_groups(columns)
+
+
+def _own(label: str, stamps: str) -> str:
+    """Return the name of a group's part that has one clock."""
+    return f"{label}{stamps.removeprefix(MASTER)}"
+
+
+def _starts(channel: Any) -> bool:
+    return isinstance(channel.properties.get("wf_start_time"), np.datetime64)
+
+
+def _waveform(channel: Any, rows: int, first: Any) -> np.ndarray[Any, Any] | None:
+    step_s = channel.properties.get("wf_increment")
+    if not isinstance(step_s, (int, float)) or step_s <= 0.0 or rows < 2:
+        return None
+    start_s = float(channel.properties.get("wf_start_offset", 0.0))
+    if _starts(channel):
+        since = channel.properties["wf_start_time"] - first
+        start_s += float(since / np.timedelta64(1, "us")) * 1e-6
+    return start_s + np.arange(rows) * float(step_s)
+
+
+def _numbers(channel: Any) -> Numbers | None:
+    values = np.asarray(channel[:])
+    if values.dtype.kind == "M":  # of a clock: in ns since 1970
+        return values.astype("datetime64[ns]").astype(np.int64)
+    return as_numbers(values)

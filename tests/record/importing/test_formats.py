@@ -1,0 +1,197 @@
+"""Logs of other programs: each format, made by its own library, gives the one record."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from coupled.errors import InputError
+from coupled.record.importing import separate
+from coupled.record.importing.convert import import_log
+from coupled.record.importing.suggest.propose import propose
+from tests.support import formats
+from tests.support.commands import coupled
+
+N_PER_LBF = 4.4482216152605
+ONE = """
+[clock]
+from = "{time}"
+{unit}
+[channels.column_force_N]
+from = "{force}"
+unit = "lbf"
+"""
+TWO = (
+    ONE
+    + """
+[channels.column_computed_m]
+from = "{place}"
+unit = "in"
+"""
+)
+SAME_TOPIC = {"force": "/force.data[0]", "place": "/position.data[0]"}
+CASES: dict[str, tuple[Callable[[Path], None], dict[str, str]]] = {
+    "a.mf4": (formats.write_mdf, {"time": "1.time", "force": "force", "place": "position"}),
+    "a.tdms": (formats.write_tdms, {"time": "time", "force": "force", "place": "position"}),
+    "json.mcap": (formats.write_mcap_json, {"time": "/force.header.stamp", **SAME_TOPIC}),
+    "ros2.mcap": (formats.write_mcap_ros2, {"time": "/force.log_time", **SAME_TOPIC}),
+    "pb.mcap": (
+        formats.write_mcap_protobuf,
+        {
+            "time": "/force.log_time",
+            "force": "/force.number_value",
+            "place": "/position.number_value",
+        },
+    ),
+    "a.ulg": (
+        formats.write_ulog,
+        {"time": "reading.timestamp", "force": "reading.data[0]", "place": "reading[1].data[0]"},
+    ),
+}  # fmt: skip
+
+
+def read(folder: Path, name: str, log_map: str) -> Any:
+    (folder / "map.toml").write_text(log_map)
+    return import_log(folder / name, folder / "map.toml")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_two_sensors_with_a_clock_each_lie_on_one_records_frames(tmp_path: Path, name: str) -> None:
+    write, columns = CASES[name]
+    write(tmp_path / name)
+    record, account = read(tmp_path, name, TWO.format(unit="", **columns))
+    assert account.clock.method == "rows as they are"
+    assert account.clock.frame_rate_Hz == 60.0
+    assert 595 <= len(record) <= 600  # as long as both last
+    time_s = account.clock.start_s + record.time_s
+    force_N = record["column_force_N"] / N_PER_LBF
+    np.testing.assert_allclose(force_N, 4.0 * np.sin(time_s), atol=1e-3)
+    place_in = record["column_computed_m"] / 0.0254
+    np.testing.assert_allclose(place_in, np.sin(time_s), atol=1e-4)  # led over from 80 Hz
+
+
+@pytest.mark.parametrize("name", ["a.mf4", "a.tdms", "json.mcap", "ros2.mcap"])
+def test_a_map_is_proposed_that_has_every_sensor_by_its_clock(tmp_path: Path, name: str) -> None:
+    CASES[name][0](tmp_path / name)
+    proposal = propose([tmp_path / name])
+    assert set(proposal.mapped) == {"column_force_N", "column_deflection_m"}
+    stamps = {"a.mf4": "1.time", "a.tdms": "time"}.get(name, "/force.log_time")
+    assert f'[clock]\nfrom = "{stamps}"\nunit = ' in proposal.text
+
+
+def test_matlab_of_version_7_3_has_the_names_of_its_earlier_ones(tmp_path: Path) -> None:
+    formats.write_matlab73(tmp_path / "a.mat")
+    maps = [
+        ONE.format(time="LOG.time", unit="", force="LOG.force"),
+        ONE.format(time="RUN(1).values", unit="", force="RUN(2).values"),
+        '[log]\nmatrix = "data"\n' + ONE.format(time="T", unit="", force="F"),
+    ]
+    for log_map in maps:
+        record, _ = read(tmp_path, "a.mat", log_map)
+        np.testing.assert_allclose(record["column_force_N"], N_PER_LBF * formats.FORCE_lbf)
+    with pytest.raises(InputError, match=r"map.toml: channels.column_force_N.from: a.mat has no"):
+        read(tmp_path, "a.mat", ONE.format(time="LOG.time", unit="", force="note"))
+
+
+def test_hdf5_gives_units_and_columns_of_compound_sets(tmp_path: Path) -> None:
+    formats.write_hdf5(tmp_path / "a.h5")
+    log_map = ONE.format(time="test.clock.T", unit="", force="test.force")
+    record, _ = read(tmp_path, "a.h5", log_map.replace('unit = "lbf"', ""))
+    np.testing.assert_allclose(record["column_force_N"], N_PER_LBF * formats.FORCE_lbf, atol=1e-5)
+
+
+@pytest.mark.parametrize("way", ["external", "virtual", "link"])
+def test_hdf5_reads_no_other_file_that_it_names(tmp_path: Path, way: str) -> None:
+    formats.write_hdf5(tmp_path / "other.h5")
+    secret = tmp_path / "secret.bin"
+    secret.write_bytes(np.arange(100.0).tobytes())
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("own", data=np.arange(100.0))
+        if way == "external":
+            file.create_dataset("T", (100,), "<f8", external=str(secret))
+        elif way == "virtual":
+            layout = h5py.VirtualLayout((600,), "<f4")
+            layout[:] = h5py.VirtualSource(tmp_path / "other.h5", "test/force", (600,))
+            file.create_virtual_dataset("T", layout)
+        else:
+            file["T"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "test/force")
+    with pytest.raises(InputError, match=r"clock.from: a\.h5 has no 'T'"):
+        read(tmp_path, "a.h5", ONE.format(time="T", unit="", force="own"))
+
+
+@pytest.mark.parametrize(
+    ("conversion", "factor"),
+    [
+        ({"P1": 0.0, "P2": 0.002, "P3": 0.0, "P4": 0.0, "P5": 0.0, "P6": 2.0}, 1.0),
+        ({"raw_0": -9e3, "raw_1": 9e3, "phys_0": -9.0, "phys_1": 9.0, "interpolation": True}, 1.0),
+    ],
+    ids=["rational", "table"],
+)  # fmt: skip
+def test_mdf_is_converted_as_it_says(
+    tmp_path: Path, conversion: dict[str, Any], factor: float
+) -> None:
+    formats.write_mdf(tmp_path / "a.mf4", conversion)
+    record, _ = read(tmp_path, "a.mf4", ONE.format(unit="", **CASES["a.mf4"][1]))
+    force_lbf = factor * formats.FORCE_lbf
+    np.testing.assert_allclose(record["column_force_N"], N_PER_LBF * force_lbf, atol=3e-3)
+
+
+def test_a_formula_that_mdf_holds_is_not_run(tmp_path: Path) -> None:
+    formats.write_mdf(tmp_path / "a.mf4", {"formula": "X * 0.001"})
+    with pytest.raises(InputError, match=r"a\.mf4: force: is converted by a formula"):
+        read(tmp_path, "a.mf4", ONE.format(unit="", **CASES["a.mf4"][1]))
+
+
+def test_a_lacking_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "pyulog" else there(name)
+    )
+    (tmp_path / "a.ulg").write_bytes(b"ULog\x01\x12\x35")
+    with pytest.raises(InputError, match=r"needs pyulog.*pip install 'coupled\[logs\]'"):
+        read(tmp_path, "a.ulg", ONE.format(time="T", unit="", force="F"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*CASES, "a.mat", "a.h5"])
+def test_a_broken_log_is_one_line(tmp_path: Path, name: str) -> None:
+    write = {"a.mat": formats.write_matlab73, "a.h5": formats.write_hdf5}.get(name)
+    (write or CASES[name][0])(tmp_path / name)
+    whole = (tmp_path / name).read_bytes()
+    noise = np.random.default_rng(1).integers(0, 256, len(whole), dtype=np.uint8).tobytes()
+    third = len(whole) // 3
+    broken = [whole[:60] + noise[60:], whole[:third], whole[:300] + noise[300:900] + whole[900:]]
+    log_map = TWO.format(unit="", **CASES.get(name, CASES["a.mf4"])[1])
+    for content in broken:
+        (tmp_path / name).write_bytes(content)
+        try:
+            read(tmp_path, name, log_map)  # what is left of it may do
+        except InputError as error:
+            assert name in str(error) and "\n" not in str(error) and len(str(error)) < 600
+
+
+def test_a_broken_log_ends_the_command_with_2_and_nothing_written(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n" + os.urandom(500))
+    (tmp_path / "map.toml").write_text(ONE.format(time="T", unit="", force="F"))
+    done = coupled(tmp_path, "import", "a.mcap", "--map", "map.toml", "-o", "r.csv")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr == "error: a.mcap: is not an MCAP file, or is damaged\n"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "map.toml"]
+
+
+def test_a_log_that_leads_in_a_circle_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    formats.write_mdf(tmp_path / "a.mf4")
+    content = bytearray((tmp_path / "a.mf4").read_bytes())
+    first = int.from_bytes(content[64 + 24 : 64 + 32], "little")  # the header's first data group
+    content[first + 24 : first + 32] = first.to_bytes(8, "little")  # … whose next is itself
+    (tmp_path / "a.mf4").write_bytes(content)
+    monkeypatch.setattr(separate, "LONGEST_s", 1.0)
+    with pytest.raises(InputError, match=r"leads in a circle|is damaged"):
+        read(tmp_path, "a.mf4", ONE.format(unit="", **CASES["a.mf4"][1]))
