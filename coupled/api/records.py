@@ -49,7 +49,7 @@ def write_record(record: Record, path: str | PathLike[str]) -> None:
 
 def import_log(
     log: str | PathLike[str] | Sequence[str | PathLike[str]],
-    log_map: str | PathLike[str],
+    log_map: str | PathLike[str] | None = None,
     rig: Rig | None = None,
 ) -> tuple[Record, ImportAccount]:
     r'''Return the record of a log of your own, and the account of how it was made.
@@ -57,7 +57,8 @@ def import_log(
     Several logs of one test, each with stamps from one clock, make one record: the first one's
     rows make the frames.
 
-    `log_map` is a TOML file that names the log's columns and their units; `rig` gives the frame
+    `log_map` is a TOML file that names the log's columns and their units; JSBSim's, FlightGear's
+    and X-Plane's own logs are known by their heads, and need none. `rig` gives the frame
     rate that the record is laid on. The account has `.clock`, `.channels`, `.unmapped` and
     `.warnings`. Raises InputError, naming file, column and row.
 
@@ -78,4 +79,5 @@ def import_log(
     ('time_s', 'column_force_N')
     '''
     logs = [log] if isinstance(log, (str, PathLike)) else log
-    return convert.import_log([Path(each) for each in logs], Path(log_map), rig)
+    map_file = None if log_map is None else Path(log_map)
+    return convert.import_log([Path(each) for each in logs], map_file, rig)

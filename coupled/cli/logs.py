@@ -23,20 +23,26 @@ if TYPE_CHECKING:
     epilog="[dim]Examples:\n\n"
     "coupled import test7.mat --suggest map.toml\n\n"
     "coupled import test7.mat --map map.toml -o out/test7.csv --rig 737\n\n"
-    "coupled import command.csv state.csv --map map.toml[/]",
+    "coupled import command.csv state.csv --map map.toml\n\n"
+    "coupled import JSBout.csv[/]",
 )
 def import_log(
     logs: Annotated[
         list[Path],
         typer.Argument(
             metavar="LOG...",
-            help="A log: CSV, Parquet or MATLAB (up to v7.2); or several of one test, each with "
-            "stamps from one clock. The first one's rows make the frames.",
+            help="A log: CSV, Parquet, MATLAB, HDF5, MDF 4, TDMS, MCAP or ULog; or several of one "
+            "test, each with stamps from one clock. The first one's rows make the frames.",
         ),
     ],
     map_file: Annotated[
         Path | None,
-        typer.Option("--map", metavar="MAP.toml", help="Its names, units, signs and clock."),
+        typer.Option(
+            "--map",
+            metavar="MAP.toml",
+            help="Its names, units, signs and clock; JSBSim's, FlightGear's and X-Plane's own "
+            "logs need none.",
+        ),
     ] = None,
     suggest: Annotated[
         Path | None,
@@ -55,13 +61,12 @@ def import_log(
     json_file: JsonOption = "",
 ) -> None:
     """Make a record of your own log, and tell whether each channel can be true."""
-    if (map_file is None) == (suggest is None):
+    if map_file is not None and suggest is not None:
         problem = "give a map, or --suggest to have one proposed: one of the two"
         raise InputError("coupled import", "--map", problem)
     rig_file = find(rig, shipped_rigs(), "rig") if rig else None
     inputs = [*logs, *([rig_file] if rig_file else [])]
-    if map_file is None:
-        assert suggest is not None
+    if suggest is not None:
         if output is not None:
             raise InputError("coupled import", "--output", "goes with --map, not with --suggest")
         _suggest(logs, suggest, rig_file, inputs, json_file)
@@ -77,7 +82,7 @@ def _rig(rig_file: Path | None) -> Rig | None:
 
 def _convert(
     logs: list[Path],
-    map_file: Path,
+    map_file: Path | None,
     output: Path | None,
     rig_file: Path | None,
     inputs: list[Path],
@@ -85,10 +90,12 @@ def _convert(
 ) -> None:
     from coupled.cli.tables.logs import print_account
     from coupled.record.importing.convert import import_log as import_file
+    from coupled.record.importing.heads import known_map
     from coupled.record.record import check_suffix, manifest_path, write_record
 
     path = output or Path("out") / f"{logs[0].stem}.csv"
-    inputs = [*inputs, map_file]
+    inputs = [*inputs, *([map_file] if map_file else [])]
+    program = known_map(logs[0])[0] if map_file is None else ""
     check_suffix(path)
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
@@ -99,6 +106,8 @@ def _convert(
         write_record(record, outputs.at(path))
         keep_json(table, json_file, outputs)
     if json_file != "-":
+        if program:
+            say(f"map: {program}'s own, by the log's head")
         print_account(out, account)
         say(f"record: {path}  ({len(record)} rows, {len(record.channels)} channels)")
         say(f"manifest: {manifest_path(path)}")

@@ -15,6 +15,7 @@ from coupled.files import sha256
 from coupled.record.channels import TIME
 from coupled.record.importing.account import ChannelAccount, ImportAccount
 from coupled.record.importing.clock import Grid, on_frames
+from coupled.record.importing.heads import known_map
 from coupled.record.importing.judging import judge
 from coupled.record.importing.mapping import (
     CHANNELS,
@@ -36,17 +37,23 @@ TURNING = ("roll_rad", "heading_rad")  # angles that jump by a turn
 
 
 def import_log(
-    log_file: Path | Sequence[Path], map_file: Path, rig: Rig | None = None
+    log_file: Path | Sequence[Path], map_file: Path | None = None, rig: Rig | None = None
 ) -> tuple[Record, ImportAccount]:
     """Return the record of a log, or of several, and the account of how it came to be.
 
     The first log's rows make the frames; a channel of a further one is interpolated to them by
     its own stamps, and the record lasts as long as all logs do. The record's manifest holds the
-    account too. A `rig` gives the frame rate, and its travels and force gradients are held
-    against the channels. Raises InputError.
+    account too. Without a map the log is one of a program whose heads are known. A `rig` gives the
+    frame rate, and its travels and force gradients are held against the channels. Raises
+    InputError.
     """
     files = [log_file] if isinstance(log_file, Path) else list(log_file)
-    log_map = read_map(map_file)
+    inputs = [*files, *([map_file] if map_file else [])]
+    if map_file is None:
+        _, log_map = known_map(files[0])
+        map_file = files[0]
+    else:
+        log_map = read_map(map_file)
     logs = read_logs(files, log_map, map_file)
     main = next(iter(logs.values()))
     rate = rig.frame_rate if rig is not None else None
@@ -91,7 +98,7 @@ def import_log(
     )
     manifest = {
         "imported_from": files[0].name if len(files) == 1 else [path.name for path in files],
-        "inputs_sha256": {path.name: sha256(path) for path in (*files, map_file)},
+        "inputs_sha256": {path.name: sha256(path) for path in inputs},
         "map": as_table(log_map),
         "channels": [TIME, *names],
         "rows": grid.frames,

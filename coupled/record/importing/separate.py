@@ -123,7 +123,7 @@ def _read(task: Task, content: bytes) -> pl.DataFrame:
 def _limit_memory() -> None:
     """Let this process ask for half of the machine's memory: a small file can declare any size."""
     with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource  # noqa: PLC0415 - not on Windows
+        import resource
 
         half = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
         resource.setrlimit(resource.RLIMIT_DATA, (half, half))

@@ -1,0 +1,149 @@
+"""Logs that JSBSim, FlightGear and X-Plane write, known by their heads: they need no map.
+
+JSBSim (`<output type="CSV">`): `Time`, then names with units, as `q bar (psf)`, and properties by
+their paths, `/fdm/jsbsim/velocities/q-rad_sec`. FlightGear (`/logging/log`, its README.logging):
+`Time`, the simulated time in s, then properties by their paths, or by titles of the user's own.
+X-Plane (`Data.txt`): names in two parts set apart by `|`, as `_totl,_time |pitch,__deg |`.
+
+What a head does not settle is left out. X-Plane's `P`, `Q` and `R`: its own pages call Q the yaw
+rate, its users' programs the pitch rate. Positions of controls: shares of an unknown travel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from coupled.errors import InputError
+from coupled.files import open_file
+from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, LogMap
+
+LOOKED_AT_bytes = 2**17  # of a file, in which its head is
+# A column's name, and the channel and unit that it is.
+_JSBSIM = {
+    "q bar (psf)": ("dynamic_pressure_Pa", "psf"),
+    "V_{Total} (ft/s)": ("true_airspeed_m_per_s", "ft/s"),
+    "Altitude ASL (ft)": ("altitude_m", "ft"),
+    "Elevator Position (deg)": ("elevator_rad", "deg"),
+    "Left Aileron Position (deg)": ("aileron_rad", "deg"),
+    "Rudder Position (deg)": ("rudder_rad", "deg"),
+    "P (deg/s)": ("roll_rate_rad_per_s", "deg/s"),
+    "Q (deg/s)": ("pitch_rate_rad_per_s", "deg/s"),
+    "R (deg/s)": ("yaw_rate_rad_per_s", "deg/s"),
+    "Alpha (deg)": ("alpha_rad", "deg"),
+    "Beta (deg)": ("sideslip_rad", "deg"),
+    "Phi (deg)": ("roll_rad", "deg"),
+    "Theta (deg)": ("pitch_rad", "deg"),
+    "Psi (deg)": ("heading_rad", "deg"),
+}
+_TREE = "/fdm/jsbsim/"
+_JSBSIM_PROPERTIES = {
+    f"{_TREE}{name}": found
+    for name, found in {
+        "aero/qbar-psf": ("dynamic_pressure_Pa", "psf"),
+        "accelerations/Nz": ("load_factor", "g"),
+        "velocities/vt-fps": ("true_airspeed_m_per_s", "ft/s"),
+        "position/h-sl-ft": ("altitude_m", "ft"),
+        "fcs/elevator-pos-rad": ("elevator_rad", "rad"),
+        "fcs/elevator-pos-deg": ("elevator_rad", "deg"),
+        "fcs/left-aileron-pos-rad": ("aileron_rad", "rad"),
+        "fcs/left-aileron-pos-deg": ("aileron_rad", "deg"),
+        "fcs/rudder-pos-rad": ("rudder_rad", "rad"),
+        "fcs/rudder-pos-deg": ("rudder_rad", "deg"),
+        "velocities/p-rad_sec": ("roll_rate_rad_per_s", "rad/s"),
+        "velocities/q-rad_sec": ("pitch_rate_rad_per_s", "rad/s"),
+        "velocities/r-rad_sec": ("yaw_rate_rad_per_s", "rad/s"),
+        "aero/alpha-rad": ("alpha_rad", "rad"),
+        "aero/alpha-deg": ("alpha_rad", "deg"),
+        "aero/beta-rad": ("sideslip_rad", "rad"),
+        "aero/beta-deg": ("sideslip_rad", "deg"),
+        "attitude/phi-rad": ("roll_rad", "rad"),
+        "attitude/theta-rad": ("pitch_rad", "rad"),
+        "attitude/psi-rad": ("heading_rad", "rad"),
+        "attitude/phi-deg": ("roll_rad", "deg"),
+        "attitude/theta-deg": ("pitch_rad", "deg"),
+        "attitude/psi-deg": ("heading_rad", "deg"),
+    }.items()
+}
+_FLIGHTGEAR = {
+    "/position/altitude-ft": ("altitude_m", "ft"),
+    "/orientation/roll-deg": ("roll_rad", "deg"),
+    "/orientation/pitch-deg": ("pitch_rad", "deg"),
+    "/orientation/heading-deg": ("heading_rad", "deg"),
+    "/orientation/alpha-deg": ("alpha_rad", "deg"),
+    "/orientation/side-slip-rad": ("sideslip_rad", "rad"),
+    "/orientation/side-slip-deg": ("sideslip_rad", "deg"),
+    "/orientation/p-body": ("roll_rate_rad_per_s", "rad/s"),
+    "/orientation/q-body": ("pitch_rate_rad_per_s", "rad/s"),
+    "/orientation/r-body": ("yaw_rate_rad_per_s", "rad/s"),
+}
+_XPLANE = {
+    "Vtrue,_ktas": ("true_airspeed_m_per_s", "kt"),
+    "__alt,ftmsl": ("altitude_m", "ft"),
+    "p-alt,ftMSL": ("altitude_m", "ft"),
+    "Gload,norml": ("load_factor", "g"),
+    "alpha,__deg": ("alpha_rad", "deg"),
+    "_beta,__deg": ("sideslip_rad", "deg"),
+    "_roll,__deg": ("roll_rad", "deg"),
+    "pitch,__deg": ("pitch_rad", "deg"),
+    "hding,_true": ("heading_rad", "deg"),
+}
+XPLANE_TIMES = ("_totl,_time", "missn,_time", "_real,_time")
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What a program's log is called, how it is laid out, and what its columns are."""
+
+    program: str
+    delimiter: str
+    time: str
+    known: Mapping[str, tuple[str, str]]
+
+
+def known_map(path: Path) -> tuple[str, LogMap]:
+    """Return the program that wrote a log, and the map of its columns.
+
+    Raises InputError where the head is none of theirs, or none of its columns is known.
+    """
+    with open_file(path) as file:
+        text = file.read(LOOKED_AT_bytes).decode("utf-8-sig", "replace")
+    line = next((line for line in text.splitlines() if line.strip()), "")
+    found = _head(line)
+    if found is None:
+        problem = "its head is not JSBSim's, FlightGear's or X-Plane's: give --map, or --suggest"
+        raise InputError(path, "", f"{problem} to have one proposed")
+    head, names = found
+    channels: dict[str, Channel] = {}
+    for name in names:
+        channel, unit = head.known.get(name, ("", ""))
+        if channel and names.count(name) == 1:
+            channels.setdefault(channel, Channel(source=name, unit=unit))
+    if not channels:
+        problem = f"{head.program} wrote it, but none of a record's motions under its own name"
+        raise InputError(path, "", f"{problem}: give --map")
+    ordered = {name: channels[name] for name in CHANNELS if name in channels}
+    layout = Layout(format="csv", delimiter=head.delimiter)
+    clock = Clock(source=head.time, unit="s")
+    return head.program, LogMap(log=layout, clock=clock, channels=ordered)
+
+
+def _head(line: str) -> tuple[_Head, list[str]] | None:
+    """Return whose head a line is, and the names of its columns."""
+    names = [name.strip() for name in line.split("|")]
+    time = next((time for time in XPLANE_TIMES if time in names), "")
+    if time:
+        return _Head("X-Plane", "|", time, _XPLANE), names
+    for delimiter in (",", "\t", ";", " "):
+        names = [name.strip() for name in line.split(delimiter)]
+        if names[0] != "Time" or len(names) < 2:
+            continue
+        paths = [name for name in names[1:] if name.startswith("/")]
+        if any(not name.startswith(_TREE) for name in paths):
+            known = {**_FLIGHTGEAR, **_JSBSIM_PROPERTIES}
+            return _Head("FlightGear", delimiter, "Time", known), names
+        if paths or any(name in _JSBSIM for name in names):
+            known = {**_JSBSIM, **_JSBSIM_PROPERTIES}
+            return _Head("JSBSim", delimiter, "Time", known), names
+    return None
