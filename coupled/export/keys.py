@@ -74,7 +74,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
         (
             *("model", "altitude", "calibrated_airspeed", "flight_path", "trim", "properties"),
             *("direct_controls", "steps_per_frame", "elevator_effectiveness", "pitch_damping"),
-            *("pitch_stiffness", "cg_aft", "fuel"),
+            *("pitch_stiffness", "lift_slope", "mass", "cg_aft", "fuel"),
         )
     ),
 }

@@ -158,8 +158,9 @@ class JSBSimAirframe:
         fdm.set_dt(frame_s)  # a model's rate limits take it as they load
         _log.text = ""
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
+        ballast = any(wrapper.ballast for wrapper in wrappers)
         try:
-            with loadable(known[name], name, scaled) as folder:
+            with loadable(known[name], name, scaled, ballast) as folder:
                 fdm.set_aircraft_path(str(folder))
                 loaded = fdm.load_model(name)
         except NothingToScaleError as error:
@@ -230,6 +231,8 @@ class JSBSimAirframe:
         problem = ""
         try:
             started = fdm.run_ic()
+            if any([wrapper.weigh(self) for wrapper in wrappers]):
+                started = fdm.run_ic()
             if started and flight.trim == "newton":
                 problem = newton_trim(fdm, flight)
             elif started:

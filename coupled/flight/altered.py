@@ -6,6 +6,7 @@ whatever function the model has for it, and nothing else comes along.
 
     pitch_damping            C_mq: the pitching moment due to the pitch rate alone
     pitch_stiffness          C_mα: the pitching moment due to the angle of attack; the trim with it
+    lift_slope               C_Lα: the lift due to the angle of attack; the trim with it
     elevator_effectiveness   all forces and moments due to the elevator, about its place in trim
 """
 
@@ -55,6 +56,14 @@ ALTERATIONS = (
             "pitching moment due to the angle of attack",
             ("aero/alpha-rad", "aero/alpha-deg"),
             axes=("PITCH",),
+        )
+    ),
+    Alteration(
+        Scaled(
+            "lift_slope",
+            "lift due to the angle of attack",
+            ("aero/alpha-rad", "aero/alpha-deg"),
+            axes=("LIFT", "NORMAL", "Z"),
         )
     ),
     Alteration(

@@ -1,9 +1,12 @@
-"""How an aircraft is loaded: its centre of gravity, and its fuel.
+"""How an aircraft is loaded: its centre of gravity, its fuel, and its mass.
 
 Every model has a point at which its aerodynamic forces act on it, and tanks; few have a mass
 that could be put elsewhere. So the centre of gravity is moved aft by bringing that point
 forward, which leaves mass and inertia as they are, and the arms of gear and engines too. The
 pitching moment changes by the force normal to the fuselage times the way.
+
+Mass that an aircraft has more or less than its model is a ballast at the centre of gravity, where
+it adds no moment of inertia.
 """
 
 from __future__ import annotations
@@ -16,6 +19,9 @@ from coupled.rig.parameters import Flight
 from coupled.units import INCH_m
 
 _POINT = "metrics/aero-rp-x-in"  # aft positive
+_BALLAST = re.compile(r"inertia/pointmass-weight-lbs(?:\[(\d+)\])?").fullmatch
+_WEIGHT = "inertia/weight-lbs"
+_CENTRE = {axis.upper(): f"inertia/cg-{axis}-in" for axis in "xyz"}
 _FUEL = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
 
 
@@ -33,6 +39,27 @@ class Loading(Wrapper):
         if self._flight.fuel != 1.0:
             self._fill(aircraft)
 
+    @property
+    def ballast(self) -> bool:
+        """A mass that is another than the model's is made up by a ballast."""
+        return self._flight.mass != 1.0
+
+    def weigh(self, aircraft: Aircraft) -> bool:
+        """Put the ballast at the centre of gravity of the aircraft as it is loaded and fuelled."""
+        if not self.ballast:
+            return False
+        found = [match for name in aircraft.names() if (match := _BALLAST(name))]
+        if not found:
+            raise aircraft.fault("mass", f"{self._flight.model} has no mass to add to")
+        last = max(int(match[1] or 0) for match in found)
+        index = f"[{last}]" if last else ""
+        for axis, centre in _CENTRE.items():
+            place = aircraft.lever(f"inertia/pointmass-location-{axis}-inches{index}")
+            place.set(_read(aircraft, centre))
+        more = (self._flight.mass - 1.0) * _read(aircraft, _WEIGHT)
+        aircraft.lever(f"inertia/pointmass-weight-lbs{index}").set(more)
+        return True
+
     def _fill(self, aircraft: Aircraft) -> None:
         flight = self._flight
         tanks = [aircraft.lever(name) for name in sorted(filter(_FUEL, aircraft.names()))]
@@ -44,3 +71,10 @@ class Loading(Wrapper):
             if not math.isclose(tank.read(), wanted, rel_tol=1e-6, abs_tol=1e-9):
                 problem = f"{flight.fuel:g} is more than the tanks of {flight.model} hold"
                 raise aircraft.fault("fuel", problem)
+
+
+def _read(aircraft: Aircraft, name: str) -> float:
+    """Return a property that every model has."""
+    read = aircraft.reader(name)
+    assert read is not None, name
+    return read()

@@ -56,6 +56,10 @@ class Scaled:
         return f"coupled/{self.name}/held-{self.properties.index(name)}"
 
 
+# A point mass of nothing, last in a model's list, which `loading` gives its weight and its place.
+BALLAST = "coupled-ballast"
+
+
 class NothingToScaleError(Exception):
     """A model has no aerodynamics that are due to a quantity."""
 
@@ -65,17 +69,20 @@ class NothingToScaleError(Exception):
 
 
 @contextmanager
-def loadable(models: Path, name: str, scaled: Sequence[Scaled]) -> Iterator[Path]:
+def loadable(
+    models: Path, name: str, scaled: Sequence[Scaled], ballast: bool = False
+) -> Iterator[Path]:
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
+    With `ballast` it has one point mass more, of no weight yet.
     Raises NothingToScaleError, or OSError where there is no temporary folder to write to.
     """
-    if not scaled:
+    if not scaled and not ballast:
         yield models
         return
     folder = models / name
     state = (folder / f"{name}.xml").stat()
-    text = _scalable(folder, tuple(scaled), state.st_mtime_ns, state.st_size)
+    text = _scalable(folder, tuple(scaled), ballast, state.st_mtime_ns, state.st_size)
     with tempfile.TemporaryDirectory(prefix="coupled-") as temporary:
         made = Path(temporary) / name
         made.mkdir()
@@ -98,19 +105,39 @@ def _stand_in(place: Path, entry: Path) -> None:
 
 
 @lru_cache(maxsize=16)
-def _scalable(folder: Path, scaled: tuple[Scaled, ...], changed_ns: int, size: int) -> bytes:
+def _scalable(
+    folder: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
+) -> bytes:
     """Return a model's text with parts of it scalable; `changed_ns` and `size` tell versions."""
     root = ElementTree.parse(folder / f"{folder.name}.xml").getroot()
-    aerodynamics = root.find("aerodynamics")
-    if aerodynamics is None:
-        raise NothingToScaleError(scaled[0])
-    if (file := aerodynamics.attrib.pop("file", None)) is not None:
-        own = folder / (file if file.endswith(".xml") else f"{file}.xml")
-        aerodynamics[:] = list(ElementTree.parse(own).getroot())
     for one in scaled:
+        aerodynamics = _section(root, folder, "aerodynamics")
+        if aerodynamics is None:
+            raise NothingToScaleError(one)
         _make_scalable(aerodynamics, one)
+    balance = _section(root, folder, "mass_balance") if ballast else None
+    if balance is not None:
+        balance.append(_point_mass())
     text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return text
+
+
+def _section(root: Element, folder: Path, name: str) -> Element | None:
+    """Return a section of a model, with what stands in a file of its own read into it."""
+    section = root.find(name)
+    if section is not None and (file := section.attrib.pop("file", None)) is not None:
+        own = folder / (file if file.endswith(".xml") else f"{file}.xml")
+        section[:] = list(ElementTree.parse(own).getroot())
+    return section
+
+
+def _point_mass() -> Element:
+    made = Element("pointmass", {"name": BALLAST})
+    ElementTree.SubElement(made, "weight", {"unit": "LBS"}).text = "0"
+    place = ElementTree.SubElement(made, "location", {"unit": "IN"})
+    for axis in "xyz":
+        ElementTree.SubElement(place, axis).text = "0"
+    return made
 
 
 def _make_scalable(aerodynamics: Element, scaled: Scaled) -> None:

@@ -37,6 +37,9 @@ class Aircraft(Protocol):
     def lever(self, name: str, file: object = None, key: str = "model") -> Lever:
         """Return a property that may be set; a fault is that of a key in a file."""
 
+    def reader(self, name: str) -> Callable[[], float] | None:
+        """Return what reads a property, in JSBSim's unit; None where the model has none such."""
+
     def fault(self, key: str, problem: str) -> InputError:
         """Return the fault of a key of the rig's `flight` section."""
 
@@ -49,8 +52,17 @@ class Wrapper:
         """What it scales of the model's aerodynamics as they are loaded."""
         return ()
 
+    @property
+    def ballast(self) -> bool:
+        """Whether it needs a point mass beside those of the model (`modelfile.BALLAST`)."""
+        return False
+
     def load(self, aircraft: Aircraft) -> None:
         """Act on the loaded aircraft before it is trimmed."""
+
+    def weigh(self, aircraft: Aircraft) -> bool:
+        """Act on the aircraft once JSBSim knows its weight; tell whether that is another then."""
+        return False
 
     def meet(self, aircraft: Aircraft) -> Hook | None:
         """Act on the aircraft in trim; return what is to be done before each frame, if anything."""

@@ -247,6 +247,8 @@ class Flight(Section):
     elevator_effectiveness: float = quantity("", 1.0, ge=0, le=10)
     pitch_damping: float = quantity("", 1.0, ge=0, le=10)
     pitch_stiffness: float = quantity("", 1.0, ge=0, le=10)
+    lift_slope: float = quantity("", 1.0, ge=0, le=10)
+    mass: float = quantity("", 1.0, gt=0, le=10)
     cg_aft: float = quantity("m", 0.0, ge=-5, le=5)
     fuel: float = quantity("", 1.0, ge=0, le=100)
     motion_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
