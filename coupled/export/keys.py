@@ -74,7 +74,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
         (
             *("model", "altitude", "calibrated_airspeed", "flight_path", "trim", "properties"),
             *("direct_controls", "steps_per_frame", "elevator_effectiveness", "pitch_damping"),
-            *("pitch_stiffness", "lift_slope", "mass", "cg_aft", "fuel"),
+            *("pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
         )
     ),
 }
@@ -115,9 +115,13 @@ REFUSED: Mapping[type[Section], Mapping[str, str]] = {
             "a skew within the host's frame is not exported",
         ),
     },
-    Flight: dict.fromkeys(
-        ("gust_rms", "gust_length"), "gusts drawn from a seed are not exported; use [turbulence]"
-    ),
+    Flight: {
+        **dict.fromkeys(
+            ("gust_rms", "gust_length"),
+            "gusts drawn from a seed are not exported; use [turbulence]",
+        ),
+        "mass": "a ballast is not exported; put its weight into the model's file",
+    },
 }
 
 # What is approximated where it is not neutral, and how far off that is.

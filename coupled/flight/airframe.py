@@ -231,7 +231,8 @@ class JSBSimAirframe:
         problem = ""
         try:
             started = fdm.run_ic()
-            if any([wrapper.weigh(self) for wrapper in wrappers]):
+            weighed = [wrapper.weigh(self) for wrapper in wrappers]  # each of them
+            if any(weighed):
                 started = fdm.run_ic()
             if started and flight.trim == "newton":
                 problem = newton_trim(fdm, flight)

@@ -76,7 +76,7 @@ ALTERATIONS = (
     ),
 )
 # The changes that make an aircraft its model as filed, in still air.
-UNALTERED = {a.part.name: 1.0 for a in ALTERATIONS} | {"gust_rms_m_per_s": 0.0}
+UNALTERED = {a.part.name: 1.0 for a in ALTERATIONS} | {"mass": 1.0, "gust_rms_m_per_s": 0.0}
 
 
 class Alterations(Wrapper):

@@ -1,25 +1,30 @@
 """The airframe's residuals: the JSBSim model, driven from trim by the measured surfaces.
 
-The surfaces' positions are taken back to commands (`surfaces`), and the model flown by those, open
-loop. The rates, angle of attack, sideslip and load factor are compared: they hold up, since
-what they owe to the surfaces fades within seconds; attitude, speed and height integrate every small
-error and are left to the kinematics. How the air moved is found by `air`.
+How far the surfaces moved from their trim is added to the model's own trim, and the model flown
+so, open loop (`openloop`). The rates, angle of attack, sideslip and load factor are compared: they
+hold up, since what they owe to the surfaces fades within seconds; attitude, speed and height
+integrate every small error and are left to the kinematics. Where the elevator stands in trim is
+compared besides (`trim`). How the air moved is found by `air`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
-from coupled.flight.gusts import Gusts
 from coupled.gap.air import Air, vertical_air
+from coupled.gap.openloop import Flown, Moved, fly_open_loop
 from coupled.gap.output import Output, spread, white
-from coupled.gap.surfaces import commands, surface_channel
-from coupled.gap.thresholds import FLIGHT_KNOWN, LOST_MOTION
+from coupled.gap.smooth import smoothed
+from coupled.gap.surfaces import moved, surface_channel
+from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
+from coupled.gap.trim import Trim, trim_of
 from coupled.record.channels import SPEED, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -38,6 +43,7 @@ COMPARED = (
     "yaw_rate_rad_per_s",
     "sideslip_rad",
 )
+TRIM = "elevator_trim_rad"  # where the elevator stands in trim
 _KEPT = 4  # flights remembered
 
 
@@ -46,50 +52,38 @@ class Model:
     """The aircraft of one record, flown by its surfaces; remembers its last flights."""
 
     rig: Rig
-    commands: Floats  # about trim, shape (frames, 3)
+    moved: Sequence[Moved]
     compared: tuple[str, ...]
     air: Air | None
-    _flown: list[tuple[Flight, Floats]] = field(default_factory=list)
+    _flown: list[tuple[Flight, Flown | None]] = field(default_factory=list)
 
-    def motion(self, rig: Rig) -> Floats:
-        """Return the compared channels as `rig` has them, shape (frames, channels)."""
-        flight = rig.flight
-        assert flight is not None
-        flight = changed(flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+    def flown(self, rig: Rig) -> Flown | None:
+        """Return the compared channels and the trim as `rig` has them; None where it has none."""
+        assert rig.flight is not None
+        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         for known, flown in self._flown:
             if known == flight:
                 return flown
-        flown = self.fly(flight, self.commands)
-        self._flown[:] = [*self._flown[1 - _KEPT :], (flight, flown)]
-        return flown
+        made: Flown | None
+        try:
+            made = self.fly(flight, self.moved)
+        except InputError:  # no trim with such a mass, lift or moment
+            made = None
+        self._flown[:] = [*self._flown[1 - _KEPT :], (flight, made)]
+        return made
 
-    def fly(self, flight: Flight, asked: Floats, with_error: bool = False) -> Floats:
-        """Return the motion that the surfaces' commands make.
+    def fly(self, flight: Flight, moved: Sequence[Moved], with_error: bool = False) -> Flown:
+        """Return the flight that the surfaces make.
 
         `with_error` adds to the air a sample of its error.
         """
-        still = changed(flight, {"gust_rms_m_per_s": 0.0}, self.rig.name, "flight")
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
             moves = moves + self.air.error if with_error else moves
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
-        frame_s, controls = 1.0 / self.rig.frame_rate, list(self.rig.controls)
-        gusts = Gusts(still, frame_s, air_m_per_s=air)
-        airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
-        every = motion_channels(controls, flown=True)
-        at = [every.index(name) for name in self.compared]
-        motion = np.full((len(asked), len(at)), np.nan)
-        rows = [(a, b, c) for a, b, c in asked.tolist()]
-        for k in range(len(rows)):
-            now = airframe.motion()
-            motion[k] = [now[i] for i in at]
-            if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > LOST_MOTION:
-                motion[k:] = motion[max(k - 1, 0)]
-                break
-            # Row k + 1 is the answer to the command of row k.
-            airframe.step(rows[min(k + 1, len(rows) - 1)])
-        return motion
+        controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
+        return fly_open_loop(flight, rate_Hz, controls, moved, self.compared, air)
 
 
 def needs(rig: Rig) -> tuple[str, ...]:
@@ -103,26 +97,53 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
         return []
     known = motion_channels(list(rig.controls), flown=True)
     compared = tuple(n for n in COMPARED if n in known and n in record and np.ptp(record[n]) > 0.0)
-    rng = np.random.default_rng(43)
-    given, wrong = commands(rig, record, rng)
-    model = Model(rig, given, compared, vertical_air(record, 1.0 / rig.frame_rate))
-    flown = model.motion(rig)
-    carried = model.fly(rig.flight, wrong, with_error=True) - flown
+    each = {control: trim_of(rig, record, control) for control in rig.controls}
+    trims = {control: trim for control, trim in each.items() if trim is not None}
+    places = {control: trim.position for control, trim in trims.items()}
+    right, wrong = moved(rig, record, places, np.random.default_rng(43))
+    model = Model(rig, right, compared, vertical_air(record, 1.0 / rig.frame_rate))
+    flown = model.flown(rig)
+    assert flown is not None  # as the rig is filed, it trims
+    carried = model.fly(rig.flight, wrong, with_error=True).motion - flown.motion
     outputs = []
     for i, name in enumerate(compared):
         own = float(np.hypot(white(record[name]), FLIGHT_KNOWN * np.ptp(record[name])))
         floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
         loose = spread([carried[:, i]], own)
 
-        def predict(other: Rig, i: int = i) -> Floats:
+        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
             assert other.flight is not None
+            made = model.flown(other)
+            if made is None:
+                return record[name] + UNTRIMMED * floor
             late = other.flight.motion_stamp * other.frame_rate
-            return stamped(np.asarray(model.motion(other)[:, i]), late)
+            return stamped(np.asarray(made.motion[:, i]), late)
 
         outputs.append(
             Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)
         )
+    if "column" in trims:
+        outputs.append(_trim_output(model, record, trims["column"], number))
     return outputs
+
+
+def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
+    """Return the elevator's place in trim as an output, with the noise of its channel.
+
+    It is known by less than all of the rows: the floor is higher than the noise by as much.
+    """
+    position, at = record[surface_channel("column")], list(model.rig.controls).index("column")
+    noise = position - smoothed(position)
+    noise *= white(position) / max(float(np.std(noise)), 1e-12)
+    floor = max(trim.error * math.sqrt(len(position)), 1e-9)
+
+    def predict(rig: Rig) -> Floats:
+        made = model.flown(rig)
+        place = trim.measured + UNTRIMMED * floor if made is None else made.trim[at]
+        return np.full(len(position), place)
+
+    rate_Hz = model.rig.frame_rate
+    return Output("airframe", TRIM, trim.measured + noise, predict, floor, rate_Hz, number)
 
 
 def trim_speed(rig: Rig) -> float:

@@ -78,6 +78,24 @@ EFFECTS: tuple[Effect, ...] = (
         factor("flight.pitch_damping", 1.2),
         *("pitch_rate", "pitch_left", "law", 4.0),
     ),
+    one(
+        "airframe",
+        "pitch_stiffness",
+        factor("flight.pitch_stiffness", 1.2),
+        *("alpha", "pitch_rate", "loop", 4.0),
+    ),
+    one(
+        "airframe",
+        "lift_slope",
+        factor("flight.lift_slope", 0.9, 0.2, 5.0),
+        *("alpha", "load_answer", "loop", 4.0),
+    ),
+    one(
+        "airframe",
+        "mass",
+        factor("flight.mass", 1.1, 0.3, 3.0),
+        *("alpha", "load_answer", "loop", 4.0),
+    ),
     replace(
         one(
             "airframe",

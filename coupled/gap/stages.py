@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 
 from coupled.gap.floors import given_noise, noise_in, unsmoothed, with_error
 from coupled.gap.noise import Noise
+from coupled.gap.openloop import about
 from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
 from coupled.gap.ratchet import passed_noise, unratcheted
 from coupled.gap.reading import Reading
 from coupled.gap.sensed import Sensed
 from coupled.gap.served import asked, left, neutral, services
 from coupled.gap.smooth import rate_of, smoothed
+from coupled.gap.surfaces import filed_trim
 from coupled.gap.thresholds import (
     BROAD,
     ECHO_SHARE,
@@ -40,6 +42,7 @@ from coupled.gap.thresholds import (
     RESTART_s,
     SLOW_LOADER_s,
 )
+from coupled.gap.trim import trim_of
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -230,11 +233,14 @@ class Reader(Reading):
             return []
         commands_at, positions = points
         estimate, measured = asked(self), self.record[self.surface]
+        trim = trim_of(self.rig, self.record, self.control)
+        filed = filed_trim(self.rig, self.control)
+        held = 0.0 if trim is None else about(trim.position, filed, points)
         pressure = self.record["dynamic_pressure_Pa"]
         command = replay_surface(self.rig, self.control, estimate, pressure)
 
         def position(wanted: Floats) -> Floats:
-            return np.interp(wanted, commands_at, positions)
+            return np.interp(held + wanted, commands_at, positions)
 
         def predict(rig: Rig) -> Floats:
             commands = replay_surface(rig, self.control, estimate, pressure)

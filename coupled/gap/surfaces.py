@@ -1,13 +1,14 @@
-"""The commands of the airframe's surfaces, taken back from their recorded positions.
+"""What the airframe's surfaces did, by their recorded positions.
 
 Each model has a map of its own from command to position, found by flying it. A surface that the
-aircraft moves itself (a yaw damper) stands where its motion wants it, too: what was commanded is
-then the host's own command, and the surface cannot be judged by it.
+aircraft moves itself (a yaw damper, the laws of an F-16) stands where its motion wants it, too:
+what was commanded is then the host's own command, which is flown through the model's laws, and the
+surface cannot be judged by it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -16,9 +17,15 @@ from numpy.typing import NDArray
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
+from coupled.gap.openloop import Moved, Points
 from coupled.gap.output import heard
 from coupled.gap.smooth import Smoother, smoothed
-from coupled.gap.thresholds import SURFACE_SHAKE, SURFACE_MOVES_rad, SURFACE_SHAKE_s
+from coupled.gap.thresholds import (
+    SURFACE_SHAKE,
+    SURFACE_GUST_m_per_s,
+    SURFACE_MOVES_rad,
+    SURFACE_SHAKE_s,
+)
 from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder
@@ -29,7 +36,6 @@ from coupled.rig.serving import service_rows
 from coupled.schema import changed
 
 Floats = NDArray[np.float64]
-Points = tuple[Floats, Floats]
 
 
 def surface_channel(control: ControlName) -> str:
@@ -64,48 +70,69 @@ def _points(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether the aircraft moves a control's surface while the others are moved."""
+    """Tell whether the aircraft moves a surface as the air rises and other controls are moved."""
     at = motion_channels(controls, flown=True).index(surface_channel(control))
     still, moved = airframe.motion()[at], 0.0
+    airframe.set_gust(SURFACE_GUST_m_per_s)
     for i, other in enumerate(controls):
-        if other == control:
-            continue
         for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
+            shaken = 0.0 if other == control else SURFACE_SHAKE
             airframe.step(
                 (
-                    SURFACE_SHAKE * (i == 0),
-                    SURFACE_SHAKE * (i == 1),
-                    SURFACE_SHAKE * (i == 2),
+                    shaken * (i == 0),
+                    shaken * (i == 1),
+                    shaken * (i == 2),
                 )
             )
             moved = max(moved, abs(airframe.motion()[at] - still))
     return moved > SURFACE_MOVES_rad
 
 
-def command_of(position: Floats, points: Points) -> Floats:
-    """Return the command about trim at which a surface stands so, same shape."""
-    commands, positions = points
-    order = np.argsort(positions)
-    return np.interp(position, positions[order], commands[order])
+def filed_trim(rig: Rig, control: ControlName) -> float:
+    """Return where a control's surface stands in the trim that `surface_points` counts from."""
+    assert rig.flight is not None
+    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
+    controls = tuple(rig.controls)
+    return _trim(plain.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
 
 
-def commands(rig: Rig, record: Record, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return the surfaces' commands, shape (frames, 3), and the same with a sample of their error.
+def own_trim(rig: Rig, control: ControlName) -> float:
+    """Return where a control's surface stands in the trim of the rig's own aircraft."""
+    assert rig.flight is not None
+    still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
+    controls = tuple(rig.controls)
+    return _trim(still.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
 
-    In the order of the rig's controls, about trim. Row k holds what row k answers to. A control
-    that the record knows nothing of is taken to have been left alone.
+
+@lru_cache(maxsize=64)
+def _trim(flight: str, controls: tuple[ControlName, ...], rate_Hz: float) -> tuple[float, ...]:
+    still = Flight.model_validate_json(flight)
+    motion = make_aircraft(still, 1.0 / rate_Hz, controls, [aircraft_folder()]).motion()
+    every = motion_channels(controls, flown=True)
+    return tuple(motion[every.index(surface_channel(control))] for control in controls)
+
+
+def moved(
+    rig: Rig, record: Record, trims: Mapping[ControlName, float], rng: np.random.Generator
+) -> tuple[list[Moved], list[Moved]]:
+    """Return what the surfaces did, and the same with a sample of the error in that.
+
+    In the order of the rig's controls. `trims` are where they stood in trim, rad. A control that
+    the record knows nothing of is taken to have been left alone.
     """
-    found = np.zeros((len(record), 3))
-    wrong = np.zeros_like(found)
-    for i, control in enumerate(rig.controls):
+    found, wrong = [], []
+    for control in rig.controls:
         name, points = surface_channel(control), surface_points(rig, control)
         if name not in record or points is None:
-            found[:, i] = wrong[:, i] = _asked(rig, record, control)
+            one = Moved(name, _asked(rig, record, control))
+            found, wrong = [*found, one], [*wrong, one]
             continue
-        position = record[name]
+        position, filed = record[name], filed_trim(rig, control)
         level, smooth = heard(position), smoothed(position)
         error = Smoother.of(position).wiener_error(level, len(smooth), rng)
-        found[:, i], wrong[:, i] = command_of(smooth, points), command_of(smooth + error, points)
+        trim = trims.get(control, filed)
+        found.append(Moved(name, smooth, points, trim, filed))
+        wrong.append(Moved(name, smooth + error, points, trim, filed))
     return found, wrong
 
 

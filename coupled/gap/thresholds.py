@@ -63,6 +63,12 @@ NOISE_TRIES = 4  # chosen: samples of the input's noise that are carried through
 SURFACE_SHAKE_s = 1.0  # chosen: for so long each of the other controls is held off neutral
 SURFACE_SHAKE = 0.1  # chosen: of its travel
 SURFACE_MOVES_rad = 1e-4  # chosen: from which the aircraft moves a surface itself
+SURFACE_GUST_m_per_s = 3.0  # chosen: the air that rises meanwhile
+SAME_TRIM_rad = 1e-9  # chosen: by which two trims of one model may differ
+TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
+TRIM_SIGMAS = 4.0  # chosen: of its noise, by which a record starts at another trim than the model's
+TRIM_FLIGHT_s = 4.0  # chosen: flown to decide whether a surface that stands off is in trim
+UNTRIMMED = 1e3  # chosen: floors by which an aircraft that does not trim is off
 LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is lost; chosen
 STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupled.gap.air import vertical_air
+from coupled.gap.openloop import command_of
 from coupled.gap.output import Floats, Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.stages import Reader
-from coupled.gap.surfaces import command_of, surface_channel, surface_points
+from coupled.gap.surfaces import surface_channel, surface_points
 from coupled.record.channels import channel, unit_of
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Loader
@@ -247,5 +248,7 @@ SIGNALS: dict[str, Signal] = {
         "°/s",
         lambda s, r: _against_base("pitch_rate_rad_per_s")(s, r) / DEGREE_rad,
     ),
+    "alpha": Signal("angle of attack", "°", lambda s, r: s.seen("alpha_rad", r) / DEGREE_rad),
+    "load_answer": Signal("load factor", "g", lambda s, r: s.seen("load_factor", r)),
     "air": Signal("rise of the air", "m/s", _air),
 }

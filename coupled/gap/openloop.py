@@ -1,0 +1,110 @@
+"""The JSBSim model flown open loop: from its own trim, by how far the measured surfaces moved.
+
+An aircraft that is heavier, or whose lift or moment differs, trims elsewhere. A record of it says
+where its surfaces stood in trim (`trim`); what they did from there on is added to the model's own
+trim, so that what is compared is the aircraft's answer, and no jolt from one trim to another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.gusts import Gusts
+from coupled.gap.thresholds import LOST_MOTION, SAME_TRIM_rad
+from coupled.record.channels import ControlName, motion_channels
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+from coupled.schema import changed
+
+Floats = NDArray[np.float64]
+Points = tuple[Floats, Floats]
+
+
+def command_of(position: Floats, points: Points) -> Floats:
+    """Return the command about trim at which a surface stands so, same shape."""
+    commands, positions = points
+    order = np.argsort(positions)
+    return np.interp(position, positions[order], commands[order])
+
+
+def about(position: float, filed: float, points: Points) -> float:
+    """Return the command that holds a surface there, from that of its trim as `filed`."""
+    if abs(position - filed) <= SAME_TRIM_rad:
+        return 0.0
+    held, before = command_of(np.array([position, filed]), points)
+    return float(held - before)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What one control's surface did over a record.
+
+    `channel` is its name. Where the model has a map from command to position (`points`), `values`
+    are its positions in rad; `trim` is where it stood in trim, and `filed` where it stands in that
+    of the model that the map is of. Else they are commands about trim. Row k holds what row k
+    answers to.
+    """
+
+    channel: str
+    values: Floats
+    points: Points | None = None
+    trim: float = 0.0
+    filed: float = 0.0
+
+    def commands(self, own: float) -> Floats:
+        """Return the commands about the trim of a model that then holds the surface at `own`."""
+        if self.points is None:
+            return self.values
+        moved = own - self.trim if abs(own - self.trim) > SAME_TRIM_rad else 0.0
+        return command_of(self.values + moved, self.points) - about(own, self.filed, self.points)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight: the channels asked for, shape (frames, channels), and where the surfaces trim."""
+
+    motion: Floats
+    trim: tuple[float, ...]  # rad, in the order of the controls
+
+
+def fly_open_loop(
+    flight: Flight,
+    frame_rate_Hz: float,
+    controls: Sequence[ControlName],
+    moved: Sequence[Moved],
+    channels: Sequence[str],
+    air_m_per_s: Sequence[float] | None = None,
+) -> Flown:
+    """Return the flight of a model from its trim, by what its surfaces did; a row a frame.
+
+    `air_m_per_s` is how fast the air rises over each frame. Raises InputError where the model does
+    not trim so.
+    """
+    still = changed(flight, {"gust_rms_m_per_s": 0.0}, "rig", "flight")
+    frame_s = 1.0 / frame_rate_Hz
+    gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
+    airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
+    every = motion_channels(controls, flown=True)
+    at = [every.index(name) for name in channels]
+    start = airframe.motion()
+    trim = tuple(start[every.index(one.channel)] for one in moved)
+    asked = np.zeros((len(moved[0].values), 3))
+    for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
+        asked[:, i] = one.commands(own)
+    motion = np.full((len(asked), len(at)), np.nan)
+    rows = [(a, b, c) for a, b, c in asked.tolist()]
+    for k in range(len(rows)):
+        now = airframe.motion()
+        motion[k] = [now[i] for i in at]
+        if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > LOST_MOTION:
+            motion[k:] = motion[max(k - 1, 0)]
+            break
+        # Row k + 1 is the answer to the command of row k.
+        airframe.step(rows[min(k + 1, len(rows) - 1)])
+    return Flown(motion, trim)

@@ -1,0 +1,103 @@
+"""Where a record's surfaces stood in trim, which need not be where the model's do.
+
+A record starts in trim. A surface that stands off the model's trim by more than noise either
+belongs to an aircraft that trims elsewhere (its mass, lift or moment differs), and then the
+first row stands there, too, and the aircraft stays in trim; or something has moved it since
+(a rigging offset), and the aircraft answers. Both are weighed: by the first row, and by which
+the model follows better, flown open loop over the first seconds.
+
+What a record says of its trim is also a measurement of its own, which the model's trim is held
+against: with the angle of attack in trim it tells lift, moment and weight apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.openloop import about, fly_open_loop
+from coupled.gap.output import memory, white
+from coupled.gap.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
+from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_FLIGHT_s, TRIM_s
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.replay import replay_surface
+from coupled.rig.rig import Rig
+from coupled.rig.serving import service_rows
+
+Floats = NDArray[np.float64]
+WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Where a surface stood in trim, rad: where its motion counts from, and what was measured.
+
+    `error` is the standard error of `measured`.
+    """
+
+    position: float
+    measured: float
+    error: float
+
+
+def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
+    """Return where a control's surface stood in trim; None where the record does not tell."""
+    name, points = surface_channel(control), surface_points(rig, control)
+    if name not in record or points is None:
+        return None
+    own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
+    off = _standing_off(rig, record, control)
+    if off is None:  # by the first row alone
+        at = own if abs(first - own) <= TRIM_SIGMAS * noise else first
+        return Trim(at, first, noise)
+    standing, error = off
+    if abs(standing) <= TRIM_SIGMAS * error:
+        return Trim(own, own + standing, error)
+    there = own + standing
+    evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
+    if control == "column":
+        evidence += _followed(rig, record, control, own, there)
+    return Trim(there, there, error) if evidence > 0.0 else Trim(own, own, noise)
+
+
+def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
+    """Return by how much a surface stands off its trim and command at first, and its error, rad.
+
+    None where the record does not hold the command.
+    """
+    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
+    points = surface_points(rig, control)
+    if name not in record or pressure not in record or points is None:
+        return None
+    rows = max(2, round(TRIM_s * rig.frame_rate))
+    served = service_rows(record, control)
+    wanted = record[name] if served is None else served.asked
+    asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
+    measured = record[surface_channel(control)]
+    held = about(own_trim(rig, control), filed_trim(rig, control), points)
+    left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
+    return float(np.mean(left)), white(measured) / np.sqrt(rows - 1)
+
+
+def _followed(rig: Rig, record: Record, control: ControlName, own: float, there: float) -> float:
+    """Return by how much twice the log-likelihood is higher with the surface in trim `there`."""
+    rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
+    short = Record(record.channels, record.data[:rows])
+    names = [name for name in WEIGHED if name in record]
+    if WEIGHED[0] not in names or rig.flight is None:
+        return 0.0
+    lefts = []
+    for trim in (own, there):
+        surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
+        flown = fly_open_loop(rig.flight, rig.frame_rate, list(rig.controls), surfaces, names)
+        lefts.append([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
+    gained = 0.0
+    for before, after in zip(*lefts, strict=True):
+        # A trim elsewhere has another angle of attack: only what changes tells.
+        powers = [float(np.var(left)) for left in (before, after)]
+        quieter = before if powers[0] < powers[1] else after
+        gained += rows / memory(quieter) * float(np.log(powers[0] / powers[1]))
+    return gained
