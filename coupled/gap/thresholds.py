@@ -67,7 +67,12 @@ SURFACE_GUST_m_per_s = 3.0  # chosen: the air that rises meanwhile
 SAME_TRIM_rad = 1e-9  # chosen: by which two trims of one model may differ
 TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
 TRIM_SIGMAS = 4.0  # chosen: of its noise, by which a record starts at another trim than the model's
-TRIM_FLIGHT_s = 4.0  # chosen: flown to decide whether a surface that stands off is in trim
+TRIM_FLIGHT_s = (
+    15.0  # flown to decide whether a surface that stands off is in trim, and TRIM_LAGS_s:
+)
+# 26 records of a T-37 with one fault or two; longer, the phugoid's own error decided
+TRIM_LAGS_s = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)  # chosen
+TRIM_SINCE = 4.0  # chosen: twice the log-likelihood by which it must have been moved since
 UNTRIMMED = 1e3  # chosen: floors by which an aircraft that does not trim is off
 LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is lost; chosen
 STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits

@@ -4,7 +4,7 @@ A record starts in trim. A surface that stands off the model's trim by more than
 belongs to an aircraft that trims elsewhere (its mass, lift or moment differs), and then the
 first row stands there, too, and the aircraft stays in trim; or something has moved it since
 (a rigging offset), and the aircraft answers. Both are weighed: by the first row, and by which
-the model follows better, flown open loop over the first seconds.
+the model follows better, flown open loop. Where neither tells, it is the aircraft's trim.
 
 What a record says of its trim is also a measurement of its own, which the model's trim is held
 against: with the angle of attack in trim it tells lift, moment and weight apart.
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from coupled.gap.openloop import about, fly_open_loop
 from coupled.gap.output import memory, white
+from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
-from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_FLIGHT_s, TRIM_s
+from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_SINCE, TRIM_FLIGHT_s, TRIM_LAGS_s, TRIM_s
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.replay import replay_surface
@@ -60,7 +61,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     if control == "column":
         evidence += _followed(rig, record, control, own, there)
-    return Trim(there, there, error) if evidence > 0.0 else Trim(own, own, noise)
+    return Trim(there, there, error) if evidence > -TRIM_SINCE else Trim(own, own, noise)
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
@@ -93,11 +94,23 @@ def _followed(rig: Rig, record: Record, control: ControlName, own: float, there:
     for trim in (own, there):
         surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
         flown = fly_open_loop(rig.flight, rig.frame_rate, list(rig.controls), surfaces, names)
-        lefts.append([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
+        left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
+        linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
+        left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]
+        lefts.append(left.T)
     gained = 0.0
     for before, after in zip(*lefts, strict=True):
-        # A trim elsewhere has another angle of attack: only what changes tells.
-        powers = [float(np.var(left)) for left in (before, after)]
+        powers = [float(np.mean(left**2)) for left in (before, after)]
         quieter = before if powers[0] < powers[1] else after
         gained += rows / memory(quieter) * float(np.log(powers[0] / powers[1]))
     return gained
+
+
+def _lagged(surface: Floats, rate_Hz: float) -> Floats:
+    """Return a constant and the surface so much before, shape (rows, 1 + lags).
+
+    What a model lacks of an aircraft's answer is linear in them; a departure from trim is not.
+    """
+    rows = np.arange(len(surface))
+    before = [np.maximum(rows - round(lag * rate_Hz), 0) for lag in TRIM_LAGS_s]
+    return np.column_stack([np.ones(len(surface)), *(surface[at] - surface[0] for at in before)])

@@ -17,7 +17,7 @@ from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.modelfile import Scaled
 from coupled.flight.wrapper import Wrapper
-from coupled.record.channels import ELEVATOR, LONGITUDINAL, PITCH_RATE
+from coupled.record.channels import ALPHA, ELEVATOR, LONGITUDINAL, PITCH, PITCH_RATE
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
 from coupled.rig.rigfile import read_rig
@@ -91,6 +91,66 @@ def test_pitch_stiffness_is_the_coefficient_of_the_angle_of_attack(
     scale = np.ptp(nominal, axis=0) + 1e-6
     assert np.max(np.abs(found - wanted) / scale) < 1e-6
     assert abs(found[0, ELEVATOR] - nominal[0, ELEVATOR]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "function"),
+    [("c172p", "/CLwbh"), ("t37", "/CLalpha"), ("737", "/CLalpha"), ("b747", "/CLalpha")],
+)
+def test_lift_slope_is_the_lift_beyond_that_at_no_angle_of_attack(
+    tmp_path: Path, name: str, function: str
+) -> None:
+    factor, flight = 0.85, shipped(name)
+
+    def edit(aerodynamics: ET.Element) -> None:
+        """Bring each value of the table nearer to the one at no angle of attack."""
+        (found,) = [
+            f for f in aerodynamics.iter("function") if f.get("name", "").endswith(function)
+        ]
+        (data,) = list(found.iter("tableData"))
+        lines = [[float(x) for x in line.split()] for line in (data.text or "").split("\n")]
+        rows = [row for row in lines if row]
+        body = [row for row in rows if len(row) == max(map(len, rows))]
+        none = [np.interp(0.0, [r[0] for r in body], c) for c in np.array(body).T[1:]]
+        for row in body:
+            row[1:] = [float(n + factor * (x - n)) for x, n in zip(row[1:], none, strict=True)]
+        data.text = "\n".join(" ".join(map(repr, row)) for row in rows)
+
+    models = edited_model(tmp_path, flight.model, edit)
+    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    found = motions(make_aircraft(shipped(name, lift_slope=factor), FRAME))
+    nominal = motions(make_aircraft(flight, FRAME))
+    scale = np.ptp(nominal, axis=0) + 1e-6
+    assert np.max(np.abs(found - wanted) / scale) < 1e-3
+    assert abs(found[0, ALPHA] - nominal[0, ALPHA]) > 2e-3
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_a_mass_is_carried_by_the_lift_at_the_centre_of_gravity(name: str) -> None:
+    """In level trim, upward force = weight; its moments of inertia are those of the model."""
+    still = "inertia/iyy-slugs_ft2", "inertia/cg-x-in", "inertia/cg-z-in"
+    forces = "forces/fbx-aero-lbs", "forces/fbz-aero-lbs", "forces/fbx-prop-lbs"
+    record = ("inertia/weight-lbs", *still, *forces, "forces/fbz-prop-lbs")
+
+    def carried(mass: float) -> Floats:
+        flight = shipped(name, mass=mass)
+        aircraft = make_aircraft(flight, FRAME, models=[aircraft_folder()], record=record)
+        weight, *rest, ax, az, px, pz = aircraft.extra()
+        pitch = aircraft.motion()[PITCH]
+        up = (ax + px) * np.sin(pitch) - (az + pz) * np.cos(pitch)
+        return np.array([weight, up, *rest])
+
+    plain, heavy = carried(1.0), carried(1.1)
+    assert heavy[0] == pytest.approx(1.1 * plain[0], rel=1e-9)
+    assert heavy[1] == pytest.approx(heavy[0], rel=5e-3)  # of a round earth that turns
+    assert heavy[2:] == pytest.approx(plain[2:], rel=1e-6)
+
+
+def test_fuel_counts_in_the_mass() -> None:
+    weight = {"record": ("inertia/weight-lbs",)}
+    dry = make_aircraft(shipped("c172p", fuel=0.5), FRAME, **weight).extra()[0]
+    light = make_aircraft(shipped("c172p", fuel=0.5, mass=0.9), FRAME, **weight).extra()[0]
+    assert light == pytest.approx(0.9 * dry, rel=1e-9)
 
 
 def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> None:

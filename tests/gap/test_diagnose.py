@@ -67,6 +67,9 @@ SINGLES: list[tuple[bool, str, dict[str, float]]] = [
     (True, "rigging_offset", {"offset_norm": 0.01}),
     (True, "elevator_effectiveness", {"factor": 0.85}),
     (True, "pitch_damping", {"factor": 1.4}),
+    (True, "pitch_stiffness", {"factor": 1.3}),
+    (True, "lift_slope", {"factor": 0.9}),
+    (True, "mass", {"factor": 1.15}),
     (True, "vertical_gust", {"rms_m_per_s": 0.5}),
     (False, "pressure_lag", {"lag_s": 0.5}),
     (False, "pressure_scale", {"factor": 1.06}),
@@ -79,6 +82,7 @@ LONG |= {"asymmetric_friction", "load_friction", "relaxation", "friction_ripple"
 LONG |= {"force_scale", "force_zero", "scale_drift", "force_skew", "motion_skew"}
 LONG |= {"soft_backlash", "bend_hysteresis", "structural_mode", "force_limit"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
+LONG |= {"pitch_stiffness", "lift_slope"}
 
 # Forty seconds meet few gusts. The noise of F walks a contact that yields, smoothed as it is.
 ROUGHLY = {

@@ -114,14 +114,15 @@ def _surface_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"rate_norm_per_s": limit}
 
 
-def _effectiveness(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.air.effectiveness = math.exp(draw.side * size)
-    return {"factor": twin.air.effectiveness}
+def in_air(field: str) -> Install:
+    """Return an installer of a factor exp(±size) on what the airframe does."""
 
+    def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+        factor = math.exp(draw.side * size)
+        setattr(twin.air, field, factor)
+        return {"factor": factor}
 
-def _damping(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    twin.air.damping = math.exp(draw.side * size)
-    return {"factor": twin.air.damping}
+    return install
 
 
 def _gust(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -195,8 +196,8 @@ EFFECTS = (
         _added("surface_offset", "offset_norm", signed=True),
         flown=True,
     ),
-    Kind("elevator_effectiveness", "airframe", 0.005, 0.5, _effectiveness, flown=True),
-    Kind("pitch_damping", "airframe", 0.01, 1.0, _damping, flown=True),
+    Kind("elevator_effectiveness", "airframe", 0.005, 0.5, in_air("effectiveness"), flown=True),
+    Kind("pitch_damping", "airframe", 0.01, 1.0, in_air("damping"), flown=True),
     Kind("vertical_gust", "airframe", 0.01, 3.0, _gust, flown=True),
     Kind("pressure_lag", "schedule", 0.01, 3.0, _pressure_lag),
     Kind("pressure_scale", "schedule", 0.0005, 0.25, _scaled("pressure_scale")),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from coupled.blind.twin.effects import in_air
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
@@ -153,5 +154,8 @@ REVISION_2 = (
     Kind("force_skew", "sensing", 0.001, 0.15, _force_skew),
     Kind("motion_skew", "sensing", 0.001, 0.3, _motion_skew, flown=True, shows="airframe"),
     Kind("mains_hum", "sensing", 1e-5, 3e-3, _hum),
+    Kind("pitch_stiffness", "airframe", 0.005, 0.7, in_air("stiffness"), flown=True),
+    Kind("lift_slope", "airframe", 0.002, 0.4, in_air("lift"), flown=True),
+    Kind("mass", "airframe", 0.001, 0.3, in_air("mass"), flown=True),
     Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped, shows="schedule"),
 )

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from coupled.blind.twin.kernel import twin_frame
 from coupled.blind.twin.numbers import KNOTS, TWIN_PARAMETERS, TWIN_STATE
+from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.record.channels import (
@@ -73,6 +74,9 @@ class Air:
 
     effectiveness: float = 1.0
     damping: float = 1.0
+    stiffness: float = 1.0
+    lift: float = 1.0
+    mass: float = 1.0
     gust: Floats | None = None
     moment: Callable[[float, Sequence[float]], float] | None = None
     late_s: float = 0.0
@@ -230,10 +234,16 @@ def _fly(
     factors = {
         "flight.elevator_effectiveness": rig.flight.elevator_effectiveness * twin.air.effectiveness,
         "flight.pitch_damping": rig.flight.pitch_damping * twin.air.damping,
+        "flight.pitch_stiffness": rig.flight.pitch_stiffness * twin.air.stiffness,
+        "flight.lift_slope": rig.flight.lift_slope * twin.air.lift,
+        "flight.mass": rig.flight.mass * twin.air.mass,
     }
     real = rig.changed(factors).flight
     assert real is not None
-    craft = airframe(real, frame_s)
+    try:
+        craft = airframe(real, frame_s)
+    except InputError as error:  # it does not trim with such factors
+        raise LostError from error
     moment, gust = twin.air.moment, twin.air.gust
     motions, commands = [], np.zeros(len(rows))
     start = craft.motion()
