@@ -1,0 +1,106 @@
+"""Where a record's aircraft was trimmed, and what is held against the model's own trim."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.flight.aircraft import make_aircraft
+from coupled.gap.airframe import TRIM, airframe_outputs
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME
+from coupled.gap.openloop import Moved, about, command_of, fly_open_loop
+from coupled.gap.surfaces import own_trim, surface_points
+from coupled.gap.trim import trim_of
+from coupled.record.channels import ELEVATOR
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
+
+POINTS = (np.array([-1.0, -0.25, 1.0]), np.array([-0.25, 0.05, 0.3]))  # a kink off trim
+FILED = 0.1  # where the surface stands at no command
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    return nominal_rig(True)
+
+
+def real(rig: Rig, name: str, factor: float) -> Rig:
+    return apply(rig, "column", [BY_NAME[name]], {f"{name}.factor": factor})
+
+
+@pytest.mark.parametrize(("trim", "own"), [(0.1, 0.1), (0.1, -0.1), (-0.15, 0.12)])
+def test_a_surface_moves_by_as_much_about_another_trim(trim: float, own: float) -> None:
+    """Whatever the map between: position = own trim + (measured − its trim)."""
+    change = np.array([0.0, 0.03, -0.06, 0.02])
+    commands = Moved("elevator_rad", trim + change, POINTS, trim, FILED).commands(own)
+    held = command_of(np.array([own]), POINTS)[0]  # by the trim, which the aircraft adds
+    assert np.interp(held + commands, *POINTS) == pytest.approx(own + change, abs=1e-12)
+    assert commands[0] == pytest.approx(0.0, abs=1e-12)
+    assert about(own, FILED, POINTS) == pytest.approx(held, abs=1e-12)
+
+
+def test_a_model_in_its_own_trim_stays_there_by_surfaces_that_do_not_move(rig: Rig) -> None:
+    """Heavier by 10 %, held where a lighter one's elevator stood."""
+    heavy = real(rig, "mass", 1.1)
+    assert heavy.flight is not None
+    at = own_trim(rig, "column")
+    still = Moved("elevator_rad", np.full(600, at), surface_points(rig, "column"), at, at)
+    flown = fly_open_loop(heavy.flight, 120.0, ["column"], [still], ["pitch_rate_rad_per_s"])
+    assert flown.trim[0] == own_trim(heavy, "column")
+    assert np.max(np.abs(flown.motion)) < 1e-3
+    assert abs(flown.trim[0] - at) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("values", "elsewhere"),
+    [
+        ({}, False),
+        ({"mass": {"factor": 1.1}}, True),
+        ({"pitch_stiffness": {"factor": 0.8}}, True),
+        ({"rigging_offset": {"offset_norm": 0.001}}, False),
+        ({"rigging_offset": {"offset_norm": 0.02}}, False),
+    ],
+    ids=["as filed", "mass", "stiffness", "small offset", "offset"],
+)
+def test_a_trim_is_distinguished_from_an_offset(
+    tmp_path: Path, rig: Rig, values: dict[str, dict[str, float]], elsewhere: bool
+) -> None:
+    record = made(tmp_path, rig, values, 4)
+    found = trim_of(rig, record, "column")
+    assert found is not None
+    place = own_trim(rig, "column")
+    if elsewhere:
+        ((name, numbers),) = values.items()
+        place = own_trim(real(rig, name, numbers["factor"]), "column")
+    assert found.position == pytest.approx(place, abs=1e-9 if not elsewhere else 4 * found.error)
+
+
+def test_the_trim_is_an_output_that_the_right_model_meets(tmp_path: Path, rig: Rig) -> None:
+    record = made(tmp_path, rig, {"mass": {"factor": 1.1}}, 4)
+    (output,) = [out for out in airframe_outputs(rig, record) if out.channel == TRIM]
+    heavy = real(rig, "mass", 1.1)
+    assert output.gap(rig) > 1.5
+    assert output.gap(heavy) < 0.3
+    assert heavy.flight is not None
+    aircraft = make_aircraft(heavy.flight, 1.0 / rig.frame_rate)
+    assert np.all(output.predict(heavy) == aircraft.motion()[ELEVATOR])
+
+
+def test_without_the_command_the_first_row_tells(tmp_path: Path, rig: Rig) -> None:
+    whole = made(tmp_path, rig, {"mass": {"factor": 1.1}}, 4)
+    kept = [i for i, name in enumerate(whole.channels) if name != "column_estimate_m"]
+    record = Record(tuple(whole.channels[i] for i in kept), whole.data[:, kept])
+    found = trim_of(rig, record, "column")
+    assert found is not None
+    assert found.position == record["elevator_rad"][0]
+
+
+def test_an_aircraft_that_does_not_trim_is_far_off_and_no_fault(tmp_path: Path, rig: Rig) -> None:
+    record = made(tmp_path, rig, {}, 4)
+    outputs = airframe_outputs(rig, record)
+    far = real(rig, "mass", 3.0)
+    assert all(output.gap(far) > 100.0 for output in outputs)
