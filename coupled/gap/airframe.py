@@ -5,6 +5,9 @@ so, open loop (`openloop`). The rates, angle of attack, sideslip and load factor
 hold up, since what they owe to the surfaces fades within seconds; attitude, speed and height
 integrate every small error and are left to the kinematics. Where the elevator stands in trim is
 compared besides (`trim`). How the air moved is found by `air`.
+
+A surface that the aircraft's own laws move is no input: the host's command is flown through the
+laws, as JSBSim has them, and the surface is compared with the motion.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from coupled.gap.air import Air, vertical_air
 from coupled.gap.openloop import Flown, Moved, fly_open_loop
 from coupled.gap.output import Output, spread, white
 from coupled.gap.smooth import smoothed
-from coupled.gap.surfaces import moved, surface_channel
+from coupled.gap.surfaces import moved, surface_channel, surface_points
 from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
 from coupled.gap.trim import Trim, trim_of
 from coupled.record.channels import SPEED, motion_channels
@@ -96,7 +99,9 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
     if rig.flight is None or any(name not in record for name in needs(rig)):
         return []
     known = motion_channels(list(rig.controls), flown=True)
-    compared = tuple(n for n in COMPARED if n in known and n in record and np.ptp(record[n]) > 0.0)
+    by_laws = [surface_channel(c) for c in rig.controls if surface_points(rig, c) is None]
+    wanted = [name for name in (*COMPARED, *by_laws) if name in known and name in record]
+    compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
     each = {control: trim_of(rig, record, control) for control in rig.controls}
     trims = {control: trim for control, trim in each.items() if trim is not None}
     places = {control: trim.position for control, trim in trims.items()}

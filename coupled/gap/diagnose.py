@@ -232,7 +232,9 @@ class _Judge:
             guilty = left > GUILTY_FROM
             return StageResult(name, gap, limit=GUILTY_FROM, left=left, guilty=guilty)
         if name == "surface" and flown:
-            return StageResult(name, why="the aircraft moves it, too")
+            return StageResult(
+                name, why="the aircraft's laws move it, too; judged with the airframe"
+            )
         if name == "airframe" and flown:
             lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
             return StageResult(name, missing=tuple(lacking))

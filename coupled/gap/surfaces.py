@@ -120,7 +120,8 @@ def moved(
     In the order of the rig's controls. `trims` are where they stood in trim, rad. A control that
     the record knows nothing of is taken to have been left alone.
     """
-    found, wrong = [], []
+    found = list[Moved]()
+    wrong = list[Moved]()
     for control in rig.controls:
         name, points = surface_channel(control), surface_points(rig, control)
         if name not in record or points is None:

@@ -147,9 +147,9 @@ def test_a_mass_is_carried_by_the_lift_at_the_centre_of_gravity(name: str) -> No
 
 
 def test_fuel_counts_in_the_mass() -> None:
-    weight = {"record": ("inertia/weight-lbs",)}
-    dry = make_aircraft(shipped("c172p", fuel=0.5), FRAME, **weight).extra()[0]
-    light = make_aircraft(shipped("c172p", fuel=0.5, mass=0.9), FRAME, **weight).extra()[0]
+    weight = ("inertia/weight-lbs",)
+    dry = make_aircraft(shipped("c172p", fuel=0.5), FRAME, record=weight).extra()[0]
+    light = make_aircraft(shipped("c172p", fuel=0.5, mass=0.9), FRAME, record=weight).extra()[0]
     assert light == pytest.approx(0.9 * dry, rel=1e-9)
 
 
