@@ -38,6 +38,8 @@ from coupled.rig.rig import Rig
 
 __all__ = ["Diagnosis", "diagnose"]
 
+BY_LAWS = "the aircraft's laws move it, too; judged with the airframe"
+
 
 def diagnose(
     rig: Rig,
@@ -232,9 +234,7 @@ class _Judge:
             guilty = left > GUILTY_FROM
             return StageResult(name, gap, limit=GUILTY_FROM, left=left, guilty=guilty)
         if name == "surface" and flown:
-            return StageResult(
-                name, why="the aircraft's laws move it, too; judged with the airframe"
-            )
+            return StageResult(name, why=BY_LAWS)
         if name == "airframe" and flown:
             lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
             return StageResult(name, missing=tuple(lacking))
