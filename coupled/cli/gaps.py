@@ -143,7 +143,7 @@ def _diagnose(
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance, well)
         advance("flying again, and looking for the next test", 0, 1)
-        _ = whole.closed_loop, whole.next_tests  # here, where progress is shown
+        _ = whole.closed_loop, whole.in_flight, whole.next_tests  # here, where progress is shown
     return whole, read
 
 
@@ -151,6 +151,7 @@ def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path
     from coupled.cli.tables.gaps import (
         print_closed_loop,
         print_effects,
+        print_in_flight,
         print_power,
         print_stages,
     )
@@ -160,6 +161,8 @@ def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path
     print_stages(out, whole.stages)
     if whole.closed_loop is not None:
         print_closed_loop(out, whole.closed_loop)
+    if whole.in_flight is not None:
+        print_in_flight(out, whole.in_flight)
     if power:
         print_power(out, whole.power)
     if improve is not None:

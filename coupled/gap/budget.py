@@ -13,8 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from math import factorial
 from typing import Any
 
 import numpy as np
@@ -25,6 +23,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effect import Effect
 from coupled.gap.fit import Fit, touched
 from coupled.gap.output import Output
+from coupled.gap.shapley import shapley_weights
 from coupled.gap.thresholds import BOOTSTRAPS
 
 Floats = NDArray[np.float64]
@@ -146,16 +145,7 @@ class _Weights:
     """Shapley's weights of each subset's power in each effect's share."""
 
     def __init__(self, players: Sequence[Effect]) -> None:
-        n = len(players)
-        self._of = np.zeros((n, 2**n))
-        for i in range(n):
-            others = [j for j in range(n) if j != i]
-            for size in range(n):
-                weight = factorial(size) * factorial(n - size - 1) / factorial(n)
-                for some in combinations(others, size):
-                    without = sum(1 << j for j in some)
-                    self._of[i, without] += weight
-                    self._of[i, without | 1 << i] -= weight
+        self._of = shapley_weights(len(players))
 
     def shares(self, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
         """Return the shares of the effects, of what is not explained, and of noise; they sum to 1.

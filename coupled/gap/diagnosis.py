@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from coupled.gap.case import Case
 from coupled.gap.choose import Choice
-from coupled.gap.flown import ChannelAgain, closed_loop, nearer
+from coupled.gap.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.healthy import Baseline
+from coupled.gap.inflight import EffectInFlight, in_flight, in_words
 from coupled.gap.output import Output
 from coupled.gap.power import EffectPower, power
 from coupled.gap.proposal import ProposedTest, in_one_line, next_tests
@@ -51,7 +53,20 @@ class Diagnosis(Findings):
         """How far both rigs, flown with the record's force, stay from it; None without effects."""
         if not self.choice.steps:
             return None
-        return closed_loop(self.nominal, self.improved, self.control, self.first)
+        return closed_loop(self.nominal, self.improved, self.control, self.first, self._again)
+
+    @cached_property
+    def _again(self) -> Again | None:
+        """The pilot of the first record."""
+        return Again.of(self.nominal, self.control, self.first)
+
+    @cached_property
+    def in_flight(self) -> tuple[EffectInFlight, ...] | None:
+        """What each effect does to the flight, the largest first; None without flight or effect."""
+        if not self.choice.steps or self._again is None:
+            return None
+        case = Case(self.nominal, self.control, self.outputs)
+        return in_flight(case, self.choice.fit, self.control, self._again)
 
     @property
     def improves(self) -> bool:
@@ -81,7 +96,9 @@ class Diagnosis(Findings):
     @cached_property
     def summary(self) -> str:
         """What is wrong, how large, how sure, how much it explains, and what to record next."""
-        said = summary(self, self.shrink, filtered_words(self.filtered), self.next_test)
+        flight = "" if self.in_flight is None else in_words(self.in_flight)
+        filtered = filtered_words(self.filtered)
+        said = summary(self, self.shrink, flight, filtered, self.next_test)
         return said if self.baseline is None else f"{self.baseline.words} {said}"
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -103,6 +120,8 @@ class Diagnosis(Findings):
             found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
+        if self.in_flight is not None:
+            found["in_flight"] = [one.as_dict() for one in self.in_flight]
         if self.next_tests:
             found["next_tests"] = [test.as_dict() for test in self.next_tests]
         found["next_test"] = self.next_test

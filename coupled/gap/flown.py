@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -98,27 +98,62 @@ def fly_force(
     return fly(again, air_m_per_s=air)
 
 
+@dataclass
+class Again:
+    """The pilot of a record, who flies any rig; what was flown is remembered.
+
+    `pulled` are the forces on each control, N, and `pressure` a bench's q̄, Pa, at each frame.
+    """
+
+    record: Record
+    pulled: Mapping[ControlName, Floats]
+    pressure: Floats | None
+    _flown: list[tuple[Rig, Record | None]] = field(default_factory=list, repr=False)
+
+    @classmethod
+    def of(cls, nominal: Rig, control: ControlName, record: Record) -> Again | None:
+        """Return the pilot; None where the record lacks the control's force, or a bench's q̄."""
+        pressure = "dynamic_pressure_Pa"
+        forces = {name: channel(name, "force") for name in nominal.controls}
+        pulled = {n: smoothed(record[force]) for n, force in forces.items() if force in record}
+        if control not in pulled or (nominal.flight is None and pressure not in record):
+            return None
+        return cls(record, pulled, smoothed(record[pressure]) if pressure in record else None)
+
+    def fly(self, rig: Rig) -> Record | None:
+        """Return a rig's flight without noise; None where it cannot be flown so."""
+        quiet = rig.changed({"noise": {}})
+        for known, flown in self._flown:
+            if known == quiet:
+                return flown
+        gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
+        air = vertical_air(self.record, 1.0 / rig.frame_rate) if gusts else None
+        made: Record | None
+        try:
+            made = fly_force(quiet, self.pulled, self.pressure, None if air is None else air.speed)
+        except InputError:
+            made = None
+        self._flown.append((quiet, made))
+        return made
+
+
 def closed_loop(
-    nominal: Rig, improved: Rig, control: ControlName, record: Record
+    nominal: Rig, improved: Rig, control: ControlName, record: Record, again: Again | None = None
 ) -> tuple[ChannelAgain, ...] | None:
     """Return how far the flights of both rigs, with the record's pilot, stay from the record.
 
-    None where the
-    record lacks the force, or a bench's q̄, or where the rig cannot be flown so.
+    `again` is that pilot, where there is one. None where the record lacks the force, or a bench's
+    q̄, or where the rig cannot be flown so.
     """
-    pressure = "dynamic_pressure_Pa"
-    forces = {name: channel(name, "force") for name in nominal.controls}
-    pulled = {name: smoothed(record[force]) for name, force in forces.items() if force in record}
-    if control not in pulled or (nominal.flight is None and pressure not in record):
+    again = Again.of(nominal, control, record) if again is None else again
+    if again is None:
         return None
     names = [channel(control, quantity) for quantity in COMPARED]
     surface = surface_channel(control)
     motion = [surface, *MOTION, *(() if control == "column" else LATERAL)]
     motion = motion if nominal.flight is not None else []
     names = [name for name in (*names, *motion) if name in record]
-    q = smoothed(record[pressure]) if pressure in record else None
-    before = _differences(nominal, pulled, q, record, names)
-    after = _differences(improved, pulled, q, record, names)
+    before, after = (_differences(again, rig, names) for rig in (nominal, improved))
     if before is None or after is None:
         return None
     seconds = (before.seconds, after.seconds) if before.seconds != after.seconds else (None, None)
@@ -138,20 +173,10 @@ class _Differences:
     seconds: float
 
 
-def _differences(
-    rig: Rig,
-    pulled: Mapping[ControlName, Floats],
-    pressure_Pa: Floats | None,
-    record: Record,
-    names: Sequence[str],
-) -> _Differences | None:
+def _differences(again: Again, rig: Rig, names: Sequence[str]) -> _Differences | None:
     """Return how far a rig's flight stays from a record; None where it cannot be flown so."""
-    gusts = rig.flight is not None and rig.flight.gust_rms > 0.0
-    air = vertical_air(record, 1.0 / rig.frame_rate) if gusts else None
-    quiet = rig.changed({"noise": {}})
-    try:
-        flown = fly_force(quiet, pulled, pressure_Pa, None if air is None else air.speed)
-    except InputError:
+    flown, record = again.fly(rig), again.record
+    if flown is None:
         return None
     rows = min(len(flown), len(record))
     rms = {n: float(np.sqrt(np.mean((flown[n][:rows] - record[n][:rows]) ** 2))) for n in names}

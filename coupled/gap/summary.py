@@ -50,16 +50,16 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
     return " ".join(said)
 
 
-def summary(found: Findings, shrink: Shrink, filtered: str, next_test: str) -> str:
+def summary(found: Findings, shrink: Shrink, in_flight: str, filtered: str, next_test: str) -> str:
     """Return what is wrong, how large, how sure, how much it explains, and what to record next.
 
-    `filtered` says which logs were filtered.
+    `in_flight` says what it does to the flight, `filtered` which logs were filtered.
     """
     said = [_what(found), _set(found), _settings(found)]
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
-        said += [_since(found), _sure(found), _closes(shrink)]
+        said += [_since(found), _sure(found), _closes(shrink), in_flight]
     said += [filtered, next_test]
     return " ".join(sentence for sentence in said if sentence)
 

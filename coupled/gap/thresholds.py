@@ -161,6 +161,8 @@ SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
 SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 
+IN_FLIGHT_LEAST = 0.01  # chosen: of a channel's motion, from which an effect shows in flight
+
 # What the summary says (`summary`).
 ONSET_s = 5.0  # chosen: a gap that begins later has a beginning
 FREE_LEAST = 5  # chosen: %, under which a model free in form explains nothing

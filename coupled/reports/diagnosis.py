@@ -26,7 +26,8 @@ _SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 
 def diagnosis_report(whole: Diagnosis, title: str, made: Made, with_power: bool = False) -> Report:
     """Return the report; with the least sizes that would have shown, where they are asked for."""
-    tables = [_effects(whole), _stages(whole), _shrink(whole), _again(whole), _next(whole)]
+    tables = [_effects(whole), _stages(whole), _shrink(whole), _again(whole), _in_flight(whole)]
+    tables.append(_next(whole))
     if with_power:
         tables.append(_power(whole))
     sections = [Section(head, (table,)) for head, table in filter(None, tables)]
@@ -123,6 +124,22 @@ def _again(whole: Diagnosis) -> tuple[str, Table] | None:
         rows.append((channel_label(one.channel), unit, *numbers))
     heads = ("rms distance from the record", "unit", "rig as filed", "improved rig")
     return "Flown again with the record's pilot", Table(heads, tuple(rows), words=2)
+
+
+def _in_flight(whole: Diagnosis) -> tuple[str, Table] | None:
+    if whole.in_flight is None:
+        return None
+    rows = []
+    for one in whole.in_flight:
+        share = f"{100 * one.share:.0f} %"
+        for i, (name, value) in enumerate(one.changes.items()):
+            factor, unit = unit_shown(name)
+            own = f"{100 * one.of_motion[name]:.3g} %"
+            first = ("", "") if i else (plain(one.name), share)
+            rows.append((*first, channel_label(name), unit, f"{factor * value:.3g}", own))
+    heads = ("effect", "share", "changes, rms", "unit", "without it", "of the motion")
+    caption = "The improved rig flown with the record's pilot, with and without each effect"
+    return "What it does to the flight", Table(heads, tuple(rows), caption, words=3)
 
 
 def _next(whole: Diagnosis) -> tuple[str, Table] | None:

@@ -10,6 +10,7 @@ from rich.table import Table
 from coupled.gap.batch import Row
 from coupled.gap.budget import StageBudget
 from coupled.gap.flown import ChannelAgain
+from coupled.gap.inflight import EffectInFlight
 from coupled.gap.power import EffectPower
 from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.summary import change, figure, in_figures, plain
@@ -75,6 +76,20 @@ def print_closed_loop(console: Console, channels: Sequence[ChannelAgain]) -> Non
         table.add_column(head, justify="right")
     for one in channels:
         table.add_row(one.channel, f"{one.before:.3g}", f"{one.after:.3g}")
+    console.print()
+    console.print(table)
+
+
+def print_in_flight(console: Console, effects: Sequence[EffectInFlight]) -> None:
+    """Print what leaving each effect out does to the flight, and its share of what all do."""
+    channels = list(effects[0].changes)
+    table = Table("what it does to the flight", box=None)
+    table.add_column("share", justify="right")
+    for name in channels:
+        table.add_column(name, justify="right")
+    for one in effects:
+        changes = [f"{one.changes[n]:.3g} ({100 * one.of_motion[n]:.3g} %)" for n in channels]
+        table.add_row(plain(one.name), f"{100 * one.share:.0f} %", *changes)
     console.print()
     console.print(table)
 
