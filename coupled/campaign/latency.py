@@ -43,6 +43,7 @@ AT_ONCE: dict[str, Any] = {
     "loader.multiplier": "hybrid",
     "loader.bend_frequency_Hz": 0.0,
     "schedule.pressure_lag_s": 0.0,
+    "compensation.missed_share": 0.0,
     "compensation.inertia_gradient_N_per_{d}": None,
     "compensation.mass_factor": None,
     "compensation.damping_factor": None,

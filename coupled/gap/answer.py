@@ -109,7 +109,7 @@ def _estimate(
     key, fit = effect.value_key(p), choice.fit
     value, low, high = fit.values[key], fit.low[key], fit.high[key]
     if scatter > 0.0:  # the records meet a sample of it
-        low = value - math.hypot(value - low, 1.96 * scatter * value)
+        low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
         high = value + math.hypot(high - value, 1.96 * scatter * value)
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
@@ -127,6 +127,7 @@ def _estimate(
         found_low=bounds[0],
         found_high=bounds[1],
         host=p.host if host.deflection or host.gradient else "",
+        relative=p.mode == "factor",
     )
 
 

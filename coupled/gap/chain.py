@@ -33,7 +33,7 @@ CHAIN: tuple[Stage, ...] = (
     Stage("loader", ("loader", "multiplier"), "#0072b2", ("loader",), drive=("F", "force")),
     Stage("sensing", (), "#56b4e9", ("loader", "multiplier", "linkage")),
     Stage("linkage", ("linkage",), "#d55e00", ("linkage",)),
-    Stage("compensation", (), "#e69f00", ("compensation",)),
+    Stage("compensation", ("compensation",), "#e69f00", ("compensation",)),
     Stage("surface", ("surface",), "#009e73", ("surface",)),
     Stage(
         "airframe",

@@ -20,7 +20,6 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice, search
-from coupled.gap.compensation import compensation_gap
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import Effect
 from coupled.gap.healthy import Baseline
@@ -30,7 +29,7 @@ from coupled.gap.result import StageResult
 from coupled.gap.shrink import floors_of, shrink
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
-from coupled.gap.thresholds import GUILTY_FROM, MOST
+from coupled.gap.thresholds import MOST
 from coupled.gap.where import remains, where
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -73,7 +72,7 @@ def diagnose(
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
         raise InputError(file, "", "lets no stage be judged; it lacks " + ", ".join(lacking))
-    library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()))]
+    library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()), control)]
 
     known: list[tuple[Rig, Sequence[Output]]] = []  # the last one asked for: it takes as long again
 
@@ -225,14 +224,6 @@ class _Judge:
         flown = self.rig.flight is not None
         if name == "schedule":
             return StageResult(name, why="constant gradient")
-        if name == "compensation":
-            able = [r for r in self.readers if "compensation" not in r.missing()]
-            improved = self.choice.fit.rig
-            gap, left = (
-                max(compensation_gap(r, rig) for r in able) for rig in (self.rig, improved)
-            )
-            guilty = left > GUILTY_FROM
-            return StageResult(name, gap, limit=GUILTY_FROM, left=left, guilty=guilty)
         if name == "surface" and flown:
             return StageResult(name, why=BY_LAWS)
         if name == "airframe" and flown:

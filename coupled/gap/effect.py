@@ -15,8 +15,9 @@ from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.output import Output
 from coupled.gap.thresholds import MODEL_ERROR
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
+from coupled.rig.crossing import leaking
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST, Section, file_keys
 
@@ -140,6 +141,7 @@ class Effect:
 
     `outputs`      those in which it shows, if not those of its stage
     `needs`        channels that every record must have for it to be tried
+    `other`        whether every record must have another control's force
     `tolerance`    relative; its number is a setting, off by so much without being an effect
     `alike`        the effect for which it passes in a faint gap
     `even`         two effects, friction and a force, that together are the same law
@@ -153,6 +155,7 @@ class Effect:
     signature: Signature
     outputs: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    other: bool = False
     tolerance: float = 0.0
     alike: Likeness | None = None
     even: tuple[str, str] | None = None
@@ -173,9 +176,12 @@ class Effect:
         """Return the key of a parameter among fitted values."""
         return f"{self.name}.{parameter.name}"
 
-    def can_be_tried(self, records: Sequence[Record]) -> bool:
-        """Tell whether all records have the channels that it needs."""
-        return all(name in record for record in records for name in self.needs)
+    def can_be_tried(self, records: Sequence[Record], control: ControlName) -> bool:
+        """Tell whether all records of a control have the channels that it needs."""
+        if not all(name in record for record in records for name in self.needs):
+            return False
+        others = [channel(name, "force") for name in leaking(control)]
+        return not self.other or all(any(n in record for n in others) for record in records)
 
 
 def setting_of(effect: Effect, low: float, high: float, neutral: float = 1.0) -> Effect:

@@ -15,7 +15,7 @@ from coupled.gap.effect import Effect, setting_of
 from coupled.gap.entries import added, factor, limit, one, value
 from coupled.gap.library_linkage import LINKAGE
 from coupled.gap.library_loader import LOADER
-from coupled.gap.library_sensing import SENSING
+from coupled.gap.library_sensing import COMPENSATION, SENSING
 
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
@@ -42,6 +42,7 @@ EFFECTS: tuple[Effect, ...] = (
     *LOADER,
     *SENSING,
     *LINKAGE,
+    *COMPENSATION,
     one(
         "surface",
         "cable_stretch",

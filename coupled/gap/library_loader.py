@@ -104,6 +104,15 @@ LOADER: tuple[Effect, ...] = (
         limit("limit_N", "loader.force_limit_N", 0.05, 2000, 10.0, 60.0),
         *("computed", "missing"),
     ),
+    replace(
+        one(
+            "loader",
+            "crosstalk",
+            added("factor", "loader.crosstalk", -0.9, 0.9, 0.05),
+            *("other_force", "missing"),
+        ),
+        other=True,
+    ),
     one(
         "loader",
         "modifying_lag",

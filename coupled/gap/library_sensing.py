@@ -1,11 +1,13 @@
-"""The effects of what is read, in the library."""
+"""The effects of what is read, and of the host's own work on it, in the library."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effect import Effect, Parameter
-from coupled.gap.entries import added, factor, one
+from coupled.gap.effect import Effect, Parameter, Signature
+from coupled.gap.entries import added, exact, factor, one, value
+from coupled.gap.hums import hums
+from coupled.gap.missed import shares_missed, spread_of_missed
 
 
 def _force(name: str, parameter: Parameter, x: str, y: str) -> Effect:
@@ -13,6 +15,19 @@ def _force(name: str, parameter: Parameter, x: str, y: str) -> Effect:
     return replace(one("sensing", name, parameter, x, y), outputs=("loader", "linkage"))
 
 
+COMPENSATION: tuple[Effect, ...] = (
+    replace(
+        one(
+            "compensation",
+            "dropped_frames",
+            replace(added("share", "compensation.missed_share", 0, 0.9, 0.3), model_error=0.0),
+            *("", "estimate_left", "time", 0.5),
+        ),
+        outputs=("schedule", "multiplier", "compensation"),
+        sample_error=spread_of_missed,
+        seen=shares_missed,
+    ),
+)
 SENSING: tuple[Effect, ...] = (
     one(
         "sensing",
@@ -44,6 +59,18 @@ SENSING: tuple[Effect, ...] = (
         "scale_drift",
         added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
         *("computed", "computed_left", "loop", 1e4),
+    ),
+    Effect(
+        "mains_hum",
+        "sensing",
+        (
+            added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
+            # Its starts are its scale: so fine is a frequency known.
+            exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)),
+            exact(value("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0)),
+        ),
+        Signature("", "computed_left", "time", 0.2),
+        seen=hums,
     ),
     _force(
         "force_skew",

@@ -69,7 +69,7 @@ class Output:
     standard deviation from record to record, `smoothed` the share of it that a smoothed input has,
     `hides` what it hides, where that is known.
     `record` numbers the record that it is of; `held` are the frames held out from fits, without
-    which they are those of every other stretch.
+    which they are those of every other stretch; `missed` are those that the host missed (`missed`).
     """
 
     stage: str
@@ -83,6 +83,7 @@ class Output:
     smoothed: float = 0.0
     hides: Hides | None = None
     held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def residual(self, rig: Rig, part: Part = "all") -> Floats:

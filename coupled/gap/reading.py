@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.floors import floor_from, noise_in
+from coupled.gap.missed import Missed, missed_in
 from coupled.gap.noise import Noise, noise_of
+from coupled.gap.sensed import Sensed
 from coupled.gap.served import left
 from coupled.gap.smooth import smoothed
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
+from coupled.rig.crossing import leaking
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
 
@@ -32,6 +36,11 @@ class Reading:
     surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
     number: int = 0  # of the record, where there are several
 
+    @cached_property
+    def missed(self) -> Missed:
+        """The frames that the host missed."""
+        return missed_in(self.record)
+
     @property
     def surface(self) -> str:
         """The channel of the control's surface."""
@@ -40,6 +49,15 @@ class Reading:
     def signal(self, quantity: str) -> Floats:
         """Return a control's channel."""
         return self.record[channel(self.control, quantity)]
+
+    def partner(self) -> list[Floats]:
+        """Return the force in N on the control whose force leaks into this one, if recorded."""
+        names = [channel(name, "force") for name in leaking(self.control)]
+        return [self.record[name] for name in names if name in self.record][:1]
+
+    def sensed(self, rig: Rig) -> Sensed:
+        """Return what a rig's channels have to do with what they measure."""
+        return Sensed(rig, self.control, self.number)
 
     def others(self) -> dict[str, Floats]:
         """Return the forces in N on other controls of a common structure, where recorded."""

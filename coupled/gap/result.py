@@ -91,7 +91,8 @@ class ParameterEstimate:
     `key` is the rig file's, in `unit`; it is `filed` there, and `found` is what it should be. The
     parameter's own value is that number, a factor on it, or what is added to it. `filed` is None
     where the rig has none of it; `found_low` and `found_high` are the interval's ends; `host` is
-    what the host calls the number that it assumes for it, where it has one.
+    what the host calls the number that it assumes for it, where it has one. The change of a
+    `relative` one is given as a share of what is filed.
     """
 
     name: str
@@ -105,11 +106,7 @@ class ParameterEstimate:
     found_low: float | None = None
     found_high: float | None = None
     host: str = ""
-
-    @property
-    def relative(self) -> bool:
-        """Whether its change is given as a share of what is filed."""
-        return self.name == "factor"
+    relative: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""

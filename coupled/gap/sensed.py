@@ -1,15 +1,18 @@
 """What a rig's sensing and recording made of a signal, undone: the signal as it was.
 
 The stages are driven by what was, and a record holds what was read: by a scale that is off or
-drifts, with a zero, stamped late.
+drifts, with the mains' hum, with a zero, stamped late. The phase of a hum is a record's own, where
+there are several: a rig has that of the first.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from coupled.gap.lines import projected
 from coupled.gap.output import Floats
 from coupled.record.channels import ControlName
 from coupled.rig.parameters import Sensing
@@ -24,6 +27,7 @@ class Sensed:
 
     rig: Rig
     control: ControlName
+    number: int = 0  # of the record, where there are several
 
     @property
     def _of(self) -> Sensing:
@@ -33,6 +37,22 @@ class Sensed:
     def zero(self) -> float:
         """What the transducer at the grip reads at neutral, d."""
         return self._of.deflection_zero
+
+    def hum(self, read: Floats) -> Floats | float:
+        """Return the mains' hum at each frame in δc as read, d."""
+        of = self._of
+        if of.hum == 0.0:
+            return 0.0
+        turn = 2.0 * math.pi * of.hum_frequency / self.rig.frame_rate
+        at = turn * np.arange(len(read))
+        if self.number == 0:
+            return np.asarray(of.hum * np.sin(at + of.hum_phase))
+        phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # four differences lead by 2
+        return np.asarray(of.hum * np.sin(at + phase))
+
+    def hum_on_nodes(self, read: Floats) -> Floats | float:
+        """Return the same on the loader's nodes, along the spline that a record is taken along."""
+        return on_nodes(self.rig, hum) if isinstance(hum := self.hum(read), np.ndarray) else hum
 
     def scale(self, frames: int) -> Floats | float:
         """Return δc as read over what it is, at each frame."""
@@ -59,9 +79,13 @@ class Sensed:
             nodes = on_nodes(self.rig, self.as_the_host_had_it(recorded))
         return self._unread(nodes)
 
-    def both(self, computed: Floats, recorded: Floats) -> tuple[Floats, Floats]:
-        """Return δc on the nodes and F at the frames from what was read of them there."""
-        return computed / self.scale_on_nodes(len(computed)), self.force(recorded)
+    def both(self, computed: Floats, recorded: Floats, read: Floats) -> tuple[Floats, Floats]:
+        """Return δc on the nodes and F at the frames from what was read of them there.
+
+        `read` is δc as recorded, by which a hum goes.
+        """
+        still = computed - self.hum_on_nodes(read)
+        return still / self.scale_on_nodes(len(computed)), self.force(recorded)
 
     def as_the_host_had_it(self, recorded: Floats) -> Floats:
         """Return F as the host read it, N: without the recorder's late stamps."""

@@ -7,7 +7,8 @@ smooth on the scale of a frame, so the Whittaker smoother with n-th differences,
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
 takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979),
-which leaves sharp inputs sharp.
+which leaves sharp inputs sharp. A line (`lines`), as the mains' hum, is no noise: it is taken off
+before, and put back.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from coupled.gap.lines import Line, lines_in
 from coupled.gap.noise import Noise
 
 Floats = NDArray[np.float64]
@@ -37,10 +39,13 @@ class Smoother:
 
     gain: Floats  # H at each frequency of the lengthened signal
     reach: int  # frames by which a signal is lengthened at either end
+    lines: tuple[Line, ...] = ()
 
     @classmethod
     def of(cls, signal: Floats, orders: Sequence[int] = (3, 2, 1)) -> Smoother:
         """Return the one that suits a signal best, with differences of one of these orders."""
+        lines = tuple(lines_in(signal))
+        signal = signal - sum(line.over(len(signal)) for line in lines)
         reach = min(len(signal) - 1, 200)
         long = _lengthened(signal, reach)
         rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
@@ -51,14 +56,18 @@ class Smoother:
             score = np.mean((1.0 - passed) ** 2 * power) / np.mean(1.0 - passed) ** 2
             if score < best:
                 best, gain = score, passed
-        return cls(gain, reach)
+        return cls(gain, reach, lines)
 
     def smooth(self, signal: Floats) -> Floats:
-        """Return a signal of the same length without its white noise; zero phase."""
-        long = _lengthened(signal, self.reach)
+        """Return a signal of the same length without its white noise; zero phase.
+
+        It is the one whose smoother this is, or one with the same lines.
+        """
+        lines = sum(line.over(len(signal)) for line in self.lines)
+        long = _lengthened(signal - lines, self.reach)
         drift = np.linspace(long[0], long[-1], len(long))
         out = drift + np.fft.irfft(np.fft.rfft(long - drift) * self.gain, len(long))
-        return np.asarray(out[self.reach : self.reach + len(signal)])
+        return np.asarray(out[self.reach : self.reach + len(signal)]) + lines
 
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.

@@ -26,7 +26,6 @@ from coupled.gap.openloop import about
 from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
 from coupled.gap.ratchet import passed_noise, unratcheted
 from coupled.gap.reading import Reading
-from coupled.gap.sensed import Sensed
 from coupled.gap.served import asked, left, neutral, services
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.surfaces import filed_trim
@@ -43,10 +42,12 @@ from coupled.gap.thresholds import (
     SLOW_LOADER_s,
 )
 from coupled.gap.trim import trim_of
+from coupled.rig.hosted import Hosted
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
     on_nodes,
+    replay_compensation,
     replay_product,
     replay_schedule,
     replay_surface,
@@ -68,6 +69,7 @@ class Reader(Reading):
             "loader": self._loader,
             "multiplier": self._multiplier,
             "linkage": self._linkage,
+            "compensation": self._compensation,
             "surface": self._surface,
         }
         found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
@@ -103,18 +105,20 @@ class Reader(Reading):
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
     ) -> Output:
-        rate = self.rig.frame_rate
-        return Output(stage, name, measured, predict, floor, rate, self.number)
+        rate, missed = self.rig.frame_rate, self.missed.seen
+        return Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
-        own, level = self.heard("gradient"), noise_in(self.rig, "dynamic_pressure_Pa", pressure)
+        level, ran = noise_in(self.rig, "dynamic_pressure_Pa", pressure), ~self.missed.seen
+        own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
         smooth = smoothed(pressure)
 
         def predict(rig: Rig, q: Floats = smooth) -> Floats:
-            return replay_schedule(rig, self.control, q) * left(self)
+            missed = self.missed.under(rig, self.control)
+            return replay_schedule(rig, self.control, q, missed=missed) * left(self)
 
-        share, rest = echoed(gradient, predict(self.rig, pressure))
+        share, rest = echoed(gradient[ran], predict(self.rig, pressure)[ran])
         if share > ECHO_SHARE:
             # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
             def as_read(rig: Rig) -> Floats:
@@ -134,6 +138,7 @@ class Reader(Reading):
         computed, second = self.signal("computed"), self.second()
         load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
         smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
+        leaks = [on_nodes(self.rig, smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
         def driven(f: Floats, seen: Floats) -> Predict:
@@ -143,12 +148,18 @@ class Reader(Reading):
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
             def predict(rig: Rig) -> Floats:
-                sensed = Sensed(rig, self.control)
-                scale = sensed.scale(len(seen))
-                restart = (every, seen / scale, rate / scale)
+                sensed = self.sensed(rig)
+                scale, hum = sensed.scale(len(seen)), sensed.hum(computed)
+                still = rate
+                if every and isinstance(hum, np.ndarray):
+                    still = rate - rate_of(hum, self.rig.frame_rate)
+                restart = (every, (seen - hum) / scale, still / scale)
                 pull = sensed.force_on_nodes(nodes, f)
-                driven_by = (pull, gradient, misread, load, second, restart, services(self))
-                return scale * drive_loader(rig, self.control, *driven_by)[0]
+                if leaks and (share := rig.controls[self.control].loader.crosstalk):
+                    pull = pull + share * leaks[0]
+                host = Hosted(services(self), self.missed.under(rig, self.control))
+                driven_by = (pull, gradient, misread + hum, load, second, restart, host)
+                return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
             return predict
 
@@ -185,7 +196,8 @@ class Reader(Reading):
         about = 0.0 * smooth + neutral(self)
 
         def made(rig: Rig, read: Floats) -> Floats:
-            return replay_product(rig, self.control, read - about, gradient, second)
+            missed = self.missed.under(rig, self.control)
+            return replay_product(rig, self.control, read - about, gradient, second, missed)
 
         # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
         jump = made(self.rig, about + level.rms) - made(self.rig, about - level.rms)
@@ -194,7 +206,8 @@ class Reader(Reading):
 
         def predict(rig: Rig, seen: Floats = smooth) -> Floats:
             digital = rig.controls[self.control].loader.multiplier == "digital"
-            read = computed if digital else seen / Sensed(rig, self.control).scale(len(seen))
+            sensed = self.sensed(rig)
+            read = computed if digital else (seen - sensed.hum(computed)) / sensed.scale(len(seen))
             return np.where(unsure, product, made(rig, read))
 
         def noisy(rig: Rig, k: int) -> Floats:
@@ -214,8 +227,8 @@ class Reader(Reading):
             nodes = on_nodes(self.rig, c)
 
             def at(rig: Rig, times: float) -> Floats:
-                sensed = Sensed(rig, self.control)
-                driven_by = sensed.both(nodes + times * noise[0], f + times * noise[1])
+                sensed = self.sensed(rig)
+                driven_by = sensed.both(nodes + times * noise[0], f + times * noise[1], computed)
                 return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
             return lambda rig: unratcheted(rig, self.control, at)
@@ -226,6 +239,22 @@ class Reader(Reading):
 
         made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
         return [self._made("linkage", self.name_of("deflection"), *made, "computed")]
+
+    def _compensation(self) -> list[Output]:
+        """Return δ̂ against the host's arithmetic on what the record says that it read.
+
+        Its floor is δc's noise, though both hold the same: F may be stamped a little late.
+        """
+        computed, recorded, others = self.signal("computed"), self.signal("force"), self.others()
+
+        def predict(rig: Rig) -> Floats:
+            force = self.sensed(rig).as_the_host_had_it(recorded)
+            missed = self.missed.under(rig, self.control)
+            return replay_compensation(rig, self.control, computed, force, others, missed)
+
+        floor = max(self.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+        name = self.name_of("estimate")
+        return [self._output("compensation", name, self.signal("estimate"), predict, floor)]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

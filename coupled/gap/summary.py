@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from coupled.display import unit_in
 from coupled.gap.budget import StageBudget
+from coupled.gap.lines import SeenLine
 from coupled.gap.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.shrink import Shrink
 from coupled.gap.thresholds import FREE_LEAST, ONSET_s
@@ -133,7 +135,7 @@ def _settings(found: Findings) -> str:
     """Return what widens a stage that nothing else does: a number off within its setting."""
     said = []
     for stage in found.stages:
-        if stage.guilty or stage.gap is None or stage.gap <= (stage.limit or 0.0):
+        if not stage.within_settings:
             continue
         off = [
             f"{plain(setting.name)} {100 * (setting.factor - 1):+.1f} %"
@@ -156,9 +158,20 @@ def _since(found: Findings) -> str:
             continue
         if stage.where.onset_s is not None and stage.where.onset_s > ONSET_s:
             said.append(f"In the {stage.name} it is first seen at {stage.where.onset_s:.1f} s.")
+        if stage.where.line is not None:
+            said.append(_line(stage.where.channel, stage.where.line))
         if stage.remains is not None:
             said.append(_remains(stage.name, stage.remains))
     return " ".join(said)
+
+
+def _line(channel: str, line: SeenLine) -> str:
+    """Return the line of a tone in a channel: where it stands, how high, and what it is."""
+    unit = unit_in(channel)
+    said = f"A line of {figure(line.amplitude)} {unit} stands at {line.seen_Hz:.4g} Hz in {channel}"
+    if line.folded:
+        return f"{said}: aliased, from a tone of {line.tone_Hz:.4g} Hz."
+    return f"{said}."
 
 
 def _remains(stage: str, left: Remains) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import bilinear, welch
 
 from coupled.gap.flexible import free_share
+from coupled.gap.lines import SeenLine, widest_line
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
@@ -70,7 +71,7 @@ class Where:
     """Where in a stage its gap lies, by the channel where it is widest.
 
     `loud` is the share of time that shows it; `onset_s` None where no half second does;
-    `by_pressure` is empty where q̄ stays.
+    `by_pressure` is empty where q̄ stays; `line` None where no tone stands out of the spectrum.
     """
 
     channel: str
@@ -79,6 +80,7 @@ class Where:
     loud: float
     onset_s: float | None = None
     by_pressure: tuple[PressureBand, ...] = ()
+    line: SeenLine | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON; what is not known is left out."""
@@ -89,6 +91,8 @@ class Where:
             found["onset_s"] = self.onset_s
         if self.by_pressure:
             found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
+        if self.line is not None:
+            found["line"] = self.line.as_dict()
         return found
 
 
@@ -144,6 +148,7 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
         loud=loud,
         onset_s=onset_s,
         by_pressure=_by(left, smoothed(record[pressure])) if varies else (),
+        line=widest_line(left, output.floor, rate_Hz),
     )
 
 
@@ -205,6 +210,7 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
         "loader": (("force", "N"), ("computed", d)),
         "multiplier": (("computed", d), ("gradient", f"N_per_{d}")),
         "linkage": (("force", "N"), ("computed", d)),
+        "compensation": (("force", "N"), ("computed", d)),
         "surface": (("estimate", d),),
     }
     found: dict[str, Floats] = {}

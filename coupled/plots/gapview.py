@@ -12,15 +12,14 @@ from coupled.gap.chain import stage_of
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import Effect, apply
 from coupled.gap.library import SETTINGS
-from coupled.gap.output import Floats, Output, white
+from coupled.gap.output import Floats, Output
 from coupled.gap.result import StageResult
 from coupled.gap.stages import Reader
 from coupled.gap.summary import plain
 from coupled.gap.surfaces import surface_points
 from coupled.gap.thresholds import GUILTY_FROM
-from coupled.record.channels import CONTROL_NAMES, channel
+from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record
-from coupled.rig.replay import replay_compensation
 from coupled.rig.rig import Rig
 from coupled.units import DEGREE_rad
 
@@ -146,8 +145,8 @@ class View:
         guilty = set(self.diagnosis.guilty)
         for effect in self.effects:
             guilty |= {stage_of(output) for output in effect.shows_in}
-        every = [*self.diagnosis.outputs, *self._host()]
-        ours = [output for output in every if stage_of(output.stage) in guilty] or every
+        every = self.diagnosis.outputs
+        ours = [output for output in every if stage_of(output.stage) in guilty] or [*every]
         known = [(max(o.gap(self.diagnosis.nominal), self._left(o)), o) for o in ours]
         known.sort(key=lambda pair: -pair[0])
         wide = [output for gap, output in known if gap > GUILTY_FROM]
@@ -155,12 +154,6 @@ class View:
 
     def _left(self, output: Output) -> float:
         return output.gap(self.diagnosis.improved)
-
-    def _host(self) -> list[Output]:
-        """Return the host's own arithmetic as an output, where it is guilty: nothing fits it."""
-        if "compensation" not in self.diagnosis.guilty:
-            return []
-        return [_arithmetic(reader) for reader in self.readers(self.diagnosis.nominal)]
 
     def readers(self, rig: Rig) -> list[Reader]:
         """Return what reads the stages' inputs off each record."""
@@ -176,14 +169,3 @@ class View:
         """Return the file that an output is of, where there are several."""
         files = tuple(self.diagnosis.records)
         return "" if len(files) < 2 else f" ({files[output.record]})"
-
-
-def _arithmetic(reader: Reader) -> Output:
-    computed, force = reader.signal("computed"), reader.signal("force")
-    estimate = reader.signal("estimate")
-
-    def predict(rig: Rig) -> Floats:
-        return replay_compensation(rig, reader.control, computed, force, reader.others())
-
-    name, rate = channel(reader.control, "estimate"), reader.rig.frame_rate
-    return Output("compensation", name, estimate, predict, white(computed), rate, reader.number)

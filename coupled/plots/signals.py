@@ -193,6 +193,13 @@ class Signal:
         return f"{self.label}, {self.unit.format(d=small, D=large, u=tiny)}"
 
 
+def _other_force(scene: Scene) -> Floats:
+    """Return the force on the control that leaks into this one; KeyError where there is none."""
+    for force in scene.reader.partner():
+        return smoothed(force)
+    raise KeyError("force on another control")
+
+
 def _noise(scene: Scene, rig: Rig | None) -> Floats:
     read = scene.recorded("computed")
     return 1000.0 * scene.fine * (read - smoothed(read))
@@ -206,6 +213,7 @@ SIGNALS: dict[str, Signal] = {
     "computed": Signal("computed deflection δc", "{d}", lambda s, r: s.fine * _computed(s, r)),
     "missing": Signal("missing force\nF − m·δc″ − c·δc′ − G_B·δc − F_mod", "N", _missing),
     "force": Signal("pilot's force F", "N", lambda s, r: s.smooth("force")),
+    "other_force": Signal("force on the other control", "N", lambda s, r: _other_force(s)),
     "load": Signal("load factor beyond 1", "g", lambda s, r: s.smooth("load_factor") - 1.0),
     "pressure": Signal(
         "dynamic pressure q̄", "kPa", lambda s, r: 1e-3 * s.smooth("dynamic_pressure_Pa")
@@ -223,6 +231,11 @@ SIGNALS: dict[str, Signal] = {
         "rest of the grip δ − x − K·F",
         "{d}",
         lambda s, r: s.fine * _against_base("deflection")(s, r),
+    ),
+    "estimate_left": Signal(
+        "δ̂ beyond the host's arithmetic",
+        "{d}",
+        lambda s, r: s.fine * _against_base("estimate")(s, r),
     ),
     "deflection": Signal("grip δ", "{d}", lambda s, r: s.fine * s.seen("deflection", r)),
     "servo_speed": Signal("rate of the servo (δ − K·F)′", "{d}/s", _servo_speed),

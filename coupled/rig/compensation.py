@@ -1,6 +1,9 @@
 """Compensation: the host's estimate of the true deflection, for the surface.
 
 δ̂ = δc + K̂·F      eq. (1) solved for δ, with the host's own K̂
+
+A host may miss frames, each with the same chance. In one that it misses it reads nothing and sets
+nothing: G_T, and so ΔG, a digital product, and δ̂ stay those of the frame before.
 """
 
 from __future__ import annotations
@@ -18,12 +21,41 @@ class CompensationParameters(Protocol):
     """What the host assumes of the bend."""
 
     bend: float  # K̂, d/N; 0 where the deflection correction is off
+    missed_share: float  # of the host's frames
+
+
+class CompensationState(Protocol):
+    """What the host had and made in the last frame that it did not miss."""
+
+    first: float  # G_T, N/d, and that beyond the break
+    second: float
+    computed: float  # δc as read, d
+    estimated: float  # δ̂, d
+    drawn: int  # the last number drawn; 0 before the first frame
 
 
 COMPENSATION = Declaration(
     layout(CompensationParameters),
+    section="control.compensation",
     derived={"bend": lambda g: g.control.compensation.bend * g.control.compensation.deflection},
+    state=layout(CompensationState),
+    fixed=("first", "second"),
 )
+LEHMER, MODULUS = 48271, 2**31 - 1  # Park and Miller's generator, its later multiplier
+SEED = 20011
+
+
+@stage
+def misses(p: CompensationParameters, s: CompensationState) -> bool:
+    """Tell whether the host misses the frame that begins, by the next number of its generator.
+
+    Each flight draws the same; the first frame is never missed.
+    """
+    if p.missed_share == 0.0:
+        return False
+    first = s.drawn == 0
+    s.drawn = LEHMER * (SEED if first else s.drawn) % MODULUS
+    return not first and s.drawn < p.missed_share * MODULUS
 
 
 @stage

@@ -78,6 +78,7 @@ class ControlState(Protocol):
     services: services.ServicesState
     linkage: linkage.LinkageState
     sensing: sensing.SensingState
+    compensation: compensation.CompensationState
     crossing: crossing.CrossingState
     surface: surface.SurfaceState
 

@@ -3,17 +3,23 @@
     δ_i = x_i + K_ii·F_i + Σ_j K_ij·F_j        the structure's part, in `linkage`
     δ̂_i = δc_i + K̂_ii·F_i + Σ_j K̂_ij·F_j       the host's, in its estimate
 
+A share of another control's force may reach this loader, too (crosstalk): of the wheel's, which
+sits on the column and pulls at the pedals; on the wheel, of the column's. Where the rig has not
+that one, it is the third's; the gauge reads none of it.
+
 At every node of the loaders, one control after the other, each with the others' latest forces
 (Gauss and Seidel's order: it settles between stiff hands for every structure that takes work).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.record.channels import ControlName
 from coupled.rig.compiled import layout
 from coupled.rig.declaration import Declaration
 
@@ -26,6 +32,7 @@ class CrossingParameters(Protocol):
     joined: int  # whether any control of the rig has such a term
     bends: NDArray[np.float64]  # K_ij, d/N
     assumed: NDArray[np.float64]  # K̂_ij, d/N; 0 where the deflection correction is off
+    leaks: NDArray[np.float64]  # the shares of their forces that reach this loader
 
 
 class CrossingState(Protocol):
@@ -36,14 +43,31 @@ class CrossingState(Protocol):
 
 
 CROSSING = Declaration(
-    layout(CrossingParameters, bends=(MOST,), assumed=(MOST,)),
+    layout(CrossingParameters, **dict.fromkeys(("bends", "assumed", "leaks"), (MOST,))),
     derived={
         "joined": lambda g: g.joined,
         "bends": lambda g: _filled(g.bends),
         "assumed": lambda g: _filled(g.assumed),
+        "leaks": lambda g: _filled(g.leaks),
     },
     state=layout(CrossingState),
 )
+
+
+def leaking(control: str) -> tuple[ControlName, ControlName]:
+    """Return the controls whose force may leak into a control's loader, the likeliest first."""
+    first: dict[str, tuple[ControlName, ControlName]] = {
+        "column": ("wheel", "pedals"),
+        "wheel": ("column", "pedals"),
+        "pedals": ("wheel", "column"),
+    }
+    return first[control]
+
+
+def leaks(control: str, share: float, names: Sequence[str]) -> tuple[float, ...]:
+    """Return the share of each named control's force that reaches a control's loader."""
+    source = next((one for one in leaking(control) if one in names), None)
+    return tuple(share if name == source else 0.0 for name in names)
 
 
 def _filled(row: tuple[float, ...]) -> tuple[float, ...]:

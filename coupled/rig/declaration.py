@@ -51,9 +51,10 @@ class Given:
     frame_s: float
     substep_s: float
     substeps: int
-    joined: bool = False  # controls of the rig share a structure, or its host thinks so
+    joined: bool = False  # a control's force acts at another, or its host thinks so
     bends: tuple[float, ...] = ()  # d/N that each control's force bends here, its own left out
     assumed: tuple[float, ...] = ()  # and what the host takes them for
+    leaks: tuple[float, ...] = ()  # the shares of their forces that reach this loader
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.record.channels import ALPHA
-from coupled.rig.compensation import estimate
+from coupled.rig.compensation import estimate, misses
 from coupled.rig.compiled import carray, entry, pointer, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import start_gauge
 from coupled.rig.hand import only_scripted
 from coupled.rig.inertia import set_inertia
+from coupled.rig.joining import bend_by_others, leak_from_others
 from coupled.rig.linkage import deflection, start_bend, transducer
 from coupled.rig.loader import start_loader
 from coupled.rig.mechanism import begin_frame, run_frame, run_node, set_hand
@@ -89,14 +90,23 @@ def host_frame(
     computed_read = read_computed(p.sensing, sampled, m.frames, out[1])
     if p.modification.late > 0:
         keep_last(m)
-    first, second = gradients(p.schedule, read_pressure(p.schedule, s.schedule, pressure_read))
+    host = s.compensation
+    missed = misses(p.compensation, host)
+    if not missed:
+        read = read_pressure(p.schedule, s.schedule, pressure_read)
+        host.first, host.second = gradients(p.schedule, read)
+        host.computed = computed_read
+    first, second = host.first, host.second
     if s.services.on:
         first *= 1.0 - s.services.feel_lost
         second *= 1.0 - s.services.feel_lost
     set_gradients(p.modification, m, first, second)
     set_inertia(p.inertia, s.inertia, p.loader, s.loader, first)
-    product = set_product(p, m, computed - neutral, computed_read - neutral)
-    estimated = estimate(p.compensation, computed_read, force_read) + s.crossing.estimated
+    product = set_product(p, m, computed - neutral, host.computed - neutral)
+    if not missed:
+        bent = estimate(p.compensation, computed_read, force_read)
+        host.estimated = bent + s.crossing.estimated
+    estimated = host.estimated
     asked = asked_of_surface(p.services, s.services, estimated) if s.services.on else estimated
     command = command_surface(p.surface, s.surface, asked, pressure)
 
@@ -136,15 +146,6 @@ def serve_frame(controls: ControlArray, motion: tuple[float, ...], load_factor: 
 
 
 @stage
-def bend_by_others(controls: ControlArray, i: int) -> None:
-    """Set what the others' forces bend at control i: Σ_j K_ij·F_j."""
-    row, bent = controls[i].parameters.crossing.bends, 0.0
-    for j in range(len(controls)):
-        bent += row[j] * controls[j].state.hand.force
-    controls[i].state.linkage.others = bent
-
-
-@stage
 def read_others(controls: ControlArray, row: Floats) -> None:
     """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row holds the noise."""
     for j in range(len(controls)):
@@ -169,6 +170,7 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
         for i in range(len(controls)):
             p, s = controls[i].parameters, controls[i].state
             bend_by_others(controls, i)
+            leak_from_others(controls, i, script, node)
             scripted = only_scripted(p.hand) and p.reach.reach == 0.0
             run_node(p, s, script[i, 0], script[i, 1], begun, node, scripted)
     for i in range(len(controls)):
@@ -182,6 +184,9 @@ def start_controls(controls: ControlArray, script: Floats) -> None:
         p, s = controls[i].parameters, controls[i].state
         free(s.reach)
         set_hand(p, s, script[i, 0, 0], script[i, 1, 0], 0.0)
+    for i in range(len(controls)):
+        p, s = controls[i].parameters, controls[i].state
+        leak_from_others(controls, i, script, 0)
         start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
         s.sensing.force = s.gauge.force if p.gauge.present else s.hand.force
         start_bend(p.linkage, s.linkage, s.hand.force)

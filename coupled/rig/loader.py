@@ -3,6 +3,8 @@
     m·δc'' + c·δc' + friction·sgn(δc') + breakout·sgn(δc) + springs(δc) + F_mod
         = F(t − delay) + F_offset − b·(n_z − 1),      |δc| ≤ travel, inelastic stops
 
+F is the pilot's force, and with crosstalk a share of that on another control (`crossing`).
+
 The springs, G_B·δc + k₃·δc³ and others, are in `springs`, the laws of friction in `friction`.
 A trim moves the neutral about which springs, breakout and F_mod act (`services`).
 
@@ -66,6 +68,7 @@ class LoaderState(SpringState, DelayState, Protocol):
     damping: float  # c as it now is, N·s/d
     load: float  # the force that it carries, N; of use to friction that grows with it
     bent: float  # by how much a friction's contact has yielded, d
+    leaked: float  # of another control's force, N, at the next node
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     neutral: float  # x₀, about which the springs act, d (`services`)
     loose: int  # the springs follow the control, and no breakout holds it
@@ -95,7 +98,7 @@ def set_external(p: LoaderParameters, s: LoaderState, load_factor: float) -> Non
 def start_loader(p: LoaderParameters, s: LoaderState, force: float) -> None:
     """Begin at rest with the pilot's force at the first node, N, and none before it."""
     s.mass, s.damping = p.mass, p.damping
-    start_delay(p, s, force)
+    start_delay(p, s, force + s.leaked)
 
 
 @stage
@@ -288,6 +291,6 @@ def move_loader(
     """Advance δc, between its `ends`, over h seconds to where the pilot's force is `force` N."""
     if p.held:
         feel(p, m, s, s.computed - s.neutral)
-    _move(p, friction, m, s, force, ends, h)
+    _move(p, friction, m, s, force + s.leaked, ends, h)
     if p.lag_gain > 0.0:
         feel(p, m, s, s.computed - s.neutral)

@@ -9,6 +9,7 @@ import numpy as np
 
 from coupled.record.channels import ControlName
 from coupled.rig.control import CONTROL, STAGES, ControlArray
+from coupled.rig.crossing import leaks
 from coupled.rig.declaration import Given, Hand, first_order_gain
 from coupled.rig.rig import Rig
 from coupled.rig.surface import COMMAND_SIGN
@@ -39,12 +40,15 @@ def pack(
         found = {only: found[only]}
     packed = np.zeros(len(found), CONTROL)
     frame_s = 1.0 / rig.frame_rate
+    joined = len(found) > 1 and (
+        not rig.structure.stands_apart or any(c.loader.crosstalk for c in found.values())
+    )
     for p, (name, control) in zip(packed["parameters"], found.items(), strict=True):
         hand = (hands or {}).get(name, Hand())
         bends, assumed = crossed_bends(rig, name, list(found))
         given = Given(
             *(control, hand, frame_s, frame_s / rig.substeps, rig.substeps),
-            *(not rig.structure.stands_apart and len(found) > 1, bends, assumed),
+            *(joined, bends, assumed, leaks(name, control.loader.crosstalk, list(found))),
         )
         for stage, declared in STAGES.items():
             for parameter in declared.parameters.names or ():

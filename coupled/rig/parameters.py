@@ -43,6 +43,7 @@ class Loader(Section):
     relaxing_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     relaxing_time: float = quantity("s", 1.0, gt=0)
     force_limit: float = quantity("N", 0.0, ge=0)
+    crosstalk: float = quantity("", 0.0, ge=-1, le=1)
     delay: float = quantity("s", 0.0, ge=0, le=0.2)
     multiplier: Literal["hybrid", "digital"] = "hybrid"
     multiplier_offset: float = quantity("N", 0.0)
@@ -89,6 +90,7 @@ class Compensation(Section):
     damping_factor: list[float] | None = quantity("", None)
     force_lead: list[float] | None = quantity("s", None)
     force_lead_lag: float = quantity("s", 0.002, gt=0)
+    missed_share: float = quantity("", 0.0, ge=0, le=0.95)
 
 
 class Sensing(Section):
@@ -118,6 +120,9 @@ class Sensing(Section):
     force_zero: float = quantity("N", 0.0)
     deflection_zero: float = quantity("{d}", 0.0)
     scale_drift: float = quantity("per_s", 0.0, ge=-0.1, le=0.1)
+    hum: float = quantity("{d}", 0.0)
+    hum_frequency: float = quantity("Hz", 50.0, gt=0, le=1000)
+    hum_phase: float = quantity("rad", 0.0)
     force_stamp: float = quantity("s", 0.0, ge=-0.5, le=0.5)
     gradient_skew: float = quantity("s", 0.0, ge=0)
 

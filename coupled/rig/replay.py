@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
+from coupled.rig.hosted import HOSTED, Hosted, Mask, held_over
 from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import carry, deflection, move_linkage, start_bend, transducer
 from coupled.rig.loader import move_loader, set_external, start_loader
@@ -25,7 +26,6 @@ from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import scale_at
-from coupled.rig.serving import ServiceRows
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
@@ -33,14 +33,22 @@ Floats = NDArray[np.float64]
 Restart = tuple[int, Floats, Floats]
 
 
-def replay_schedule(rig: Rig, control: str, pressure_Pa: Floats, beyond: bool = False) -> Floats:
+def replay_schedule(
+    rig: Rig,
+    control: str,
+    pressure_Pa: Floats,
+    beyond: bool = False,
+    missed: Mask | None = None,
+) -> Floats:
     """Return G_T in N/d for the dynamic pressure that the host had at each frame.
 
-    `beyond` asks for that beyond the break, on a rig of two segments.
+    `beyond` asks for that beyond the break, on a rig of two segments; `missed` are the frames that
+    the host missed, never the first.
     """
     p, s = _one(rig, control)
-    both = _schedule(p, s, pressure_Pa, np.empty((2, len(pressure_Pa))))
-    return np.asarray(both[int(beyond)])
+    ran = pressure_Pa if missed is None else pressure_Pa[~missed]
+    made = np.asarray(_schedule(p, s, ran, np.empty((2, len(ran))))[int(beyond)])
+    return made if missed is None else made[np.cumsum(~missed) - 1]
 
 
 def replay_loader(
@@ -73,12 +81,12 @@ def drive_loader(
     load_factor: Floats | None = None,
     second: Floats | None = None,
     restart: Restart | None = None,
-    services: ServiceRows | None = None,
+    host: Hosted = HOSTED,
 ) -> tuple[Floats, Floats]:
     """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
 
-    `nodes_N` has `rig.substeps` values a frame and one more. `services` are what the record holds
-    of the loader's services; their force is straight between frames.
+    `nodes_N` has `rig.substeps` values a frame and one more. Services' force is straight between
+    frames; a digital product stays as it was in frames that the host missed. G_T is as given.
     """
     p, s = _one(rig, control)
     level = np.ones_like(misread) if load_factor is None else load_factor
@@ -86,20 +94,27 @@ def drive_loader(
     h = 1.0 / (rig.frame_rate * rig.substeps)
     every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
-    none = np.zeros_like(misread)
-    served = (none, none, none) if services is None else services[:3]
-    given = np.stack((*both, misread, level, position, rate, *served))
+    given = np.stack((*both, misread, level, position, rate, *host.rows(len(misread))))
     _loader(p, s, nodes_N, given, every, rig.substeps, h, out)
     return out[0], out[1]
 
 
 def replay_product(
-    rig: Rig, control: str, computed: Floats, gradient: Floats, second: Floats | None = None
+    rig: Rig,
+    control: str,
+    computed: Floats,
+    gradient: Floats,
+    second: Floats | None = None,
+    missed: Mask | None = None,
 ) -> Floats:
-    """Return F_mod in N for δc in d at each frame and G_T in N/d."""
+    """Return F_mod in N for δc in d at each frame and G_T in N/d.
+
+    A digital product stays as it was in the frames `missed` by the host.
+    """
     p, s = _one(rig, control)
     both = np.stack((gradient, gradient if second is None else second))
-    return _product(p, s, computed, both, np.empty_like(computed))
+    made = _product(p, s, computed, both, np.empty_like(computed))
+    return held_over(made, missed) if p[0]["modification"]["digital"] else made
 
 
 def replay_linkage(
@@ -137,11 +152,15 @@ def replay_compensation(
     computed: Floats,
     force_N: Floats,
     others_N: Mapping[str, Floats] | None = None,
+    missed: Mask | None = None,
 ) -> Floats:
-    """Return δ̂ in d for δc in d and F in N as the host read them, and the others' forces."""
+    """Return δ̂ in d for δc in d and F in N as the host read them, and the others' forces.
+
+    It stays as it was in the frames `missed` by the host.
+    """
     p, _ = _one(rig, control)
     made = _compensation(p, computed, force_N, np.empty_like(force_N))
-    return made + _by_others(rig, control, others_N or {}, 1, force_N)
+    return held_over(made + _by_others(rig, control, others_N or {}, 1, force_N), missed)
 
 
 def _by_others(
@@ -195,23 +214,25 @@ def _loader(
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader on what is `given`, shape (9, frames).
+    """Run the loader on what is `given`, shape (10, frames).
 
-    G_T twice, misread δc, load factor, restarts' δc and its rate; x₀, force and jams of services.
+    G_T twice, misread δc, load factor, restarts' δc and its rate; x₀, force and jams of services;
+    whether the host missed the frame.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
-    neutral, added, jammed = given[6], given[7], given[8]
+    neutral, added, jammed, missed = given[6], given[7], given[8], given[9]
     start_loader(p.loader, s.loader, force[0])
     ends = (-p.loader.travel, p.loader.travel)
-    frames = len(misread)
+    frames, read = len(misread), 0.0
     for k in range(frames):
         m = s.modification
         if every > 0 and k % every == 0:
             s.loader.computed, s.loader.rate = position[k], rate[k]
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
-        read = scale_at(p.sensing, k) * s.loader.computed + misread[k]
+        if missed[k] < 0.5:
+            read = scale_at(p.sensing, k) * s.loader.computed + misread[k]
         s.loader.neutral = neutral[k]
         out[1, k] = set_product(p, m, s.loader.computed - neutral[k], read - neutral[k])
         out[0, k] = s.loader.computed

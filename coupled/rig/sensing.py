@@ -14,8 +14,9 @@ that of t_k − skew, straight between the loader's nodes; what it puts out may 
 (`modification`).
 
 A gauge or a transducer may have a zero that is off, and S₁ may drift: δc read at t_k is then
-S₁·(1 + rate·t_k)·δc over what is assumed. Channels that are stamped late against the others are
-the recorder's doing (`recorder`).
+S₁·(1 + rate·t_k)·δc over what is assumed. The mains may hum in it, hum·sin(2π·f·t_k + phase): the
+host has that, too, and a converter sampled below 2·f folds it. Channels that are stamped late
+against the others are the recorder's doing (`recorder`).
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ class SensingParameters(Protocol):
 
     read_scale: float  # S₁ real over assumed, as the host reads v₁
     scale_drift: float  # by what share that grows in a frame
+    hum: float  # of the mains in δc as read, d
+    hum_turn: float  # rad a frame
+    hum_phase: float  # at t = 0, rad
     force_scale: float  # S₃ real over assumed
     force_zero: float  # what is read without a force, N
     deflection_zero: float  # what the transducer at the grip reads at neutral, d
@@ -81,6 +85,7 @@ SENSING = Declaration(
     derived={
         "read_scale": lambda g: g.control.sensing.read_scale,
         "scale_drift": lambda g: g.control.sensing.scale_drift * g.frame_s,
+        "hum_turn": lambda g: 2.0 * math.pi * g.control.sensing.hum_frequency * g.frame_s,
     }
     | {f"{of}_range": _range(of) for of in _SCALES}
     | {f"{of}_step": _step(of) for of in _SCALES}
@@ -123,9 +128,18 @@ def scale_at(p: SensingParameters, frame: int) -> float:
 
 
 @stage
+def hum_at(p: SensingParameters, frame: int) -> float:
+    """Return the mains' hum in δc as read at a frame, d."""
+    return p.hum * math.sin(p.hum_turn * frame + p.hum_phase)
+
+
+@stage
 def read_computed(p: SensingParameters, computed: float, frame: int, noise: float) -> float:
     """Return δc as the host reads it, d: v₁ of eq. (2), by the scale that it assumes."""
-    return converted(scale_at(p, frame) * computed + noise, p.computed_step, p.computed_range)
+    read = scale_at(p, frame) * computed + noise
+    if p.hum != 0.0:
+        read += hum_at(p, frame)
+    return converted(read, p.computed_step, p.computed_range)
 
 
 @stage

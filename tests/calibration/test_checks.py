@@ -456,6 +456,9 @@ UNSEEN = {
     "vertical_gust": "the air's",
     "force_skew": "the recorder's",
     "motion_skew": "the recorder's",
+    "mains_hum": "readings are means",
+    "dropped_frames": "a frame late at most; `coupled diagnose`",
+    "crosstalk": "the other control is let go",
 }
 FULL_rad = math.radians(25.0)
 TABLE = Path(__file__).parents[2] / "docs" / "calibration.md"

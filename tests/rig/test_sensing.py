@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from coupled.rig import sensing
 from coupled.rig.packing import pack
 from coupled.rig.standalone import run_control
-from tests.support.rigs import bench
+from tests.support.rigs import BENCH, bench
 
 SCHEDULE = "controls.column.schedule"
 
@@ -64,6 +64,33 @@ def test_zeros_and_a_scale_that_drifts_are_in_what_is_read_and_recorded() -> Non
     np.testing.assert_allclose(amiss.deflection - level.deflection, 2e-3, rtol=1e-9)
     grown = amiss.computed[1:] / steady.computed[1:]
     np.testing.assert_allclose(grown, 1.0 + 2e-3 * steady.time_s[1:], rtol=1e-9)
+
+
+def test_a_hum_is_a_tone_in_what_host_and_recorder_read_and_nowhere_else() -> None:
+    prefix = "controls.column.sensing"
+    hum = {f"{prefix}.hum_m": 3e-4, f"{prefix}.hum_frequency_Hz": 50.0}
+    rig = bench(hum | {f"{prefix}.hum_phase_rad": 0.7})
+    flat = np.full(600, 1000.0)
+    pull = np.full(len(flat) * rig.substeps + 1, 30.0)
+    amiss = run_control(rig, "column", pull, flat)
+    still = run_control(bench(), "column", pull, flat)
+    tone = 3e-4 * np.sin(2.0 * np.pi * 50.0 * still.time_s + 0.7)
+    np.testing.assert_allclose(amiss.computed - still.computed, tone, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(amiss.estimate - still.estimate, tone, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(amiss.deflection, still.deflection)
+    # Sampled at 100 Hz, 60 Hz is the same record as 40 Hz run backwards.
+    at = {f"{prefix}.hum_m": 3e-4}
+    two = [
+        run_control(
+            bench(
+                at | {f"{prefix}.hum_frequency_Hz": f, f"{prefix}.hum_phase_rad": phase},
+                {**BENCH, "frame_rate_Hz": 100.0},
+            ),
+            *("column", pull, flat),
+        ).computed
+        for f, phase in ((60.0, 0.4), (40.0, np.pi - 0.4))
+    ]
+    np.testing.assert_allclose(two[0], two[1], rtol=0, atol=1e-14)
 
 
 def test_scales_and_word_length_set_the_steps() -> None:

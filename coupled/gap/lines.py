@@ -1,0 +1,172 @@
+"""Lines in a spectrum: tones, as of the mains, that stand out of a channel's noise.
+
+A line is a bin of the tapered spectrum far above what is about it, which a sine of one frequency
+takes away whole: what is broad (a resonance, a sweep) is none. Looked for where a channel holds
+noise alone, above four tenths of the highest frequency (`noise`).
+
+Sampling folds: a tone of f stands at |f − n·rate|, so that 60 Hz logged at 100 Hz is seen at 40.
+The mains are near 50 or 60 Hz, on aircraft 400: a line where one of these is folded to is said to
+be it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.thresholds import (
+    LINE_BANDS,
+    LINE_HEIGHT,
+    LINE_LEFT,
+    LINES_FROM,
+    MAINS_OFF,
+    MOST_LINES,
+    WHERE_SHARE,
+    WHITE_FRAMES,
+    MAINS_Hz,
+)
+
+Floats = NDArray[np.float64]
+TAPER_BINS = 3  # to either side of a bin that a tone fills
+ROUNDS = 6  # of Newton's steps to the frequency
+
+
+@dataclass(frozen=True)
+class Line:
+    """A sine: amplitude in the signal's unit, phase at its first frame, and rad a frame, 0 to π."""
+
+    turn: float
+    amplitude: float
+    phase: float
+
+    def over(self, frames: int) -> Floats:
+        """Return it over so many frames."""
+        return np.asarray(self.amplitude * np.sin(self.turn * np.arange(frames) + self.phase))
+
+
+@dataclass(frozen=True)
+class SeenLine:
+    """A line as a record shows it: its frequency there, and that of the tone which makes it.
+
+    `folded`: the tone lies above half of the frame rate, and sampling folds it to where it is seen.
+    """
+
+    seen_Hz: float
+    tone_Hz: float
+    amplitude: float
+
+    @property
+    def folded(self) -> bool:
+        """Whether sampling has folded it."""
+        return abs(self.tone_Hz - self.seen_Hz) > 1e-9 * self.tone_Hz
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "frequency_Hz": self.seen_Hz,
+            "amplitude": self.amplitude,
+            "aliased": self.folded,
+            "tone_Hz": self.tone_Hz,
+        }
+
+
+def lines_in(signal: Floats) -> list[Line]:
+    """Return the lines of a signal, the highest over its noise first; shape (frames,)."""
+    found: list[Line] = []
+    left = signal
+    while len(signal) >= WHITE_FRAMES and len(found) < MOST_LINES:
+        turn = _highest(left)
+        if turn is None:
+            return found
+        line = _sharpened(left, turn)
+        rest = left - line.over(len(left))
+        if _power_at(rest, line.turn) > LINE_LEFT * _power_at(left, line.turn):
+            return found
+        found.append(line)
+        left = rest
+    return found
+
+
+def seen_as(line: Line, rate_Hz: float) -> SeenLine:
+    """Return a line of a signal that is sampled at `rate_Hz`, with the tone which makes it."""
+    seen = line.turn * rate_Hz / (2.0 * math.pi)
+    return SeenLine(seen, tone_of(seen, rate_Hz), line.amplitude)
+
+
+def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
+    """Return the tone that holds most of a residual, if it holds enough to be worth saying.
+
+    The residual is in floors, `floor` in the signal's unit.
+    """
+    lines = sorted(lines_in(left), key=lambda line: -line.amplitude)
+    if not lines or 0.5 * lines[0].amplitude ** 2 < WHERE_SHARE * float(np.mean(left**2)):
+        return None
+    seen = seen_as(lines[0], rate_Hz)
+    return replace(seen, amplitude=seen.amplitude * floor)
+
+
+def tone_of(seen_Hz: float, rate_Hz: float) -> float:
+    """Return the frequency of the mains that is folded to a line's, else the line's own."""
+    for mains in (seen_Hz, *MAINS_Hz):
+        for tone in (seen_Hz, *_unfolded(seen_Hz, mains, rate_Hz)):
+            if any(abs(tone - known) <= MAINS_OFF * known for known in MAINS_Hz):
+                return tone
+    return seen_Hz
+
+
+def _unfolded(seen_Hz: float, near_Hz: float, rate_Hz: float) -> tuple[float, float]:
+    """Return the two tones nearest to a frequency that are seen where this line is."""
+    around = round((near_Hz - seen_Hz) / rate_Hz), round((near_Hz + seen_Hz) / rate_Hz)
+    return abs(around[0] * rate_Hz + seen_Hz), abs(around[1] * rate_Hz - seen_Hz)
+
+
+def projected(signal: Floats, turn: float) -> Line:
+    """Return the sine of a frequency, rad a frame, that takes most of a signal."""
+    at = turn * np.arange(len(signal))
+    waves = np.column_stack((np.sin(at), np.cos(at)))
+    taper = np.hanning(len(signal))
+    sine, cosine = np.linalg.lstsq(waves * taper[:, None], signal * taper, rcond=1e-6)[0]
+    return Line(turn, float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine)))
+
+
+def _highest(signal: Floats) -> float | None:
+    """Return the frequency of the bin that is highest over its surroundings, None if none is."""
+    rough = np.diff(signal, 4)
+    power = np.abs(np.fft.rfft(rough * np.hanning(len(rough)))) ** 2
+    omega = np.linspace(0.0, math.pi, len(power))
+    first = int(np.searchsorted(omega, LINES_FROM * math.pi))
+    power = power[first:] / (2.0 * np.sin(0.5 * omega[first:])) ** 8
+    parts = np.array_split(power, LINE_BANDS)
+    level = np.concatenate([np.full(len(p), np.median(p) / math.log(2.0)) for p in parts])
+    if not np.all(level > 0.0):
+        return None
+    best = int(np.argmax(power / level))
+    if power[best] < LINE_HEIGHT * level[best]:
+        return None
+    return float(omega[first + best])
+
+
+def _sharpened(signal: Floats, turn: float) -> Line:
+    """Return the sine near a bin's frequency that takes most: its phase, half against half."""
+    half = len(signal) // 2
+    rough = np.diff(signal, 4)  # what a rig does is not to lean on the phase
+    for _ in range(ROUNDS):
+        early, late = projected(rough[:half], turn), projected(rough[half:], turn)
+        slip = late.phase - early.phase - turn * half
+        turn += math.remainder(slip, 2.0 * math.pi) / half
+    rougher = projected(rough, turn)
+    gain, lead = (2.0 * math.sin(0.5 * turn)) ** 4, 2.0 * turn  # of four differences
+    phase = math.remainder(rougher.phase - lead, 2.0 * math.pi)
+    return Line(turn, rougher.amplitude / gain, phase)
+
+
+def _power_at(signal: Floats, turn: float) -> float:
+    """Return the power of a signal's roughness within a tapered bin of a frequency."""
+    rough = np.diff(signal, 4) * np.hanning(len(signal) - 4)
+    power = np.abs(np.fft.rfft(rough)) ** 2
+    at = round(turn / math.pi * (len(power) - 1))
+    return float(np.sum(power[max(0, at - TAPER_BINS) : at + TAPER_BINS + 1]))
