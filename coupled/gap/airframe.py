@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.gap.air import Air, vertical_air
+from coupled.gap.floors import left_noise
 from coupled.gap.openloop import Flown, Moved, fly_open_loop
-from coupled.gap.output import Output, spread, white
+from coupled.gap.output import Output, heard, spread, white
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import moved, surface_channel, surface_points
 from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
@@ -112,9 +113,10 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
     carried = model.fly(rig.flight, wrong, with_error=True).motion - flown.motion
     outputs = []
     for i, name in enumerate(compared):
-        own = float(np.hypot(white(record[name]), FLIGHT_KNOWN * np.ptp(record[name])))
+        noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
+        own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
         floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
-        loose = spread([carried[:, i]], own)
+        loose = spread([carried[:, i]], own, noise.memory)
 
         def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
             assert other.flight is not None

@@ -59,7 +59,8 @@ def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[Setting
     found = []
     for setting in settings(rig, control).values():
         for p in setting.free:
-            value, filed = choice.fit.values.get(setting.value_key(p)), p.nominal(rig, control)
+            value = choice.fit.values.get(setting.value_key(p))
+            filed = p.nominal(rig, control) if value is not None else 0.0
             if value is not None and filed:
                 factor = float(p.entered(filed, value) / filed)
                 name = field_of(rig, control, p.key)

@@ -9,7 +9,7 @@ from functools import cached_property
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, fit
 from coupled.gap.output import Output, Part, stage_gaps
-from coupled.gap.settings import settings
+from coupled.gap.settings import contact, is_dry, settings
 from coupled.gap.thresholds import SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -38,15 +38,25 @@ class Case:
         return settings(self.nominal, self.control)
 
     @cached_property
-    def settings(self) -> tuple[Effect, ...]:
-        """The nominal rig's settings that the outputs depend on: nuisances of every fit."""
-        stages = {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
-        return tuple(s for s in self.known.values() if s.stage in stages)
+    def settings(self) -> dict[str, Effect]:
+        """The settings that the outputs depend on, by name: nuisances of every fit."""
+        return {name: one for name, one in self.known.items() if self._unsettled & {*one.shows_in}}
+
+    @cached_property
+    def contact(self) -> tuple[Effect, ...]:
+        """How far dry friction yields: nuisances beside any."""
+        return contact(self.nominal, self.control)
+
+    @cached_property
+    def _unsettled(self) -> set[str]:
+        """The outputs whose residual is large enough to settle anything by."""
+        return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
 
     @cached_property
     def neutral(self) -> dict[str, float]:
         """The settings as the rig file has them."""
-        return {s.value_key(p): p.starts[0] for s in self.known.values() for p in s.free}
+        every = (*self.known.values(), *self.contact)
+        return {one.value_key(p): p.starts[0] for one in every for p in one.free}
 
     def ends(self, effect: Effect) -> tuple[float, float] | None:
         """Return between which values an effect's number is a setting; None where it is none."""
@@ -62,9 +72,16 @@ class Case:
         return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the settings whose number none of these effects frees."""
+        """Return the settings whose number none of these effects frees, nor is the same law as.
+
+        Where friction is filed, or among the effects, how far its contact yields is one.
+        """
         freed = {p.key for effect in effects for p in effect.parameters}
-        return [one for one in self.settings if freed.isdisjoint(p.key for p in one.free)]
+        same = {name for effect in effects for name in effect.swallows}
+        free = [one for name, one in self.settings.items() if name not in same]
+        if any(effect.dry for effect in effects) or is_dry(self.nominal, self.control):
+            free += [one for one in self.contact if self._unsettled & {*one.shows_in}]
+        return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
 
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
         """Return the rig with some of the effects that a fit found, and its settings."""

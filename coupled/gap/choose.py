@@ -13,15 +13,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from coupled.gap.candidates import fitted_candidates, imitating
 from coupled.gap.case import Case, Tell
-from coupled.gap.effect import Effect, apply, value_of
+from coupled.gap.effect import Effect, apply
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
-from coupled.gap.information import informative, says_nothing
+from coupled.gap.information import says_nothing
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
-from coupled.gap.screen import screen
-from coupled.gap.settings import YIELDING
 from coupled.gap.thresholds import (
     FAINT_GAP,
     LAW_GAIN,
@@ -32,7 +31,7 @@ from coupled.gap.thresholds import (
     SIMPLER_GAIN,
     SIMPLER_SHARE,
 )
-from coupled.gap.twolaws import even_reading
+from coupled.gap.twolaws import even_reading, yielding_reading
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -75,14 +74,16 @@ def search(
     settled = current = case.fit(())
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
+    idle: set[str] = set()  # guilty outputs for which nothing was found
     while len(steps) < MOST_EFFECTS:
-        ranked = _round(case, settled, current, library)
+        ranked = _round(case, settled, current, library, idle)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
         steps.append(_step(case, settled, best, ranked))
         current = case.fit((*current.effects, best.effect), start=best.fit.values)
+        idle -= set(best.effect.shows_in)
         even = even_reading(current.effects, current.values)
         if even is not None:
             current = case.fit(even[0], start=even[1])
@@ -96,6 +97,11 @@ def search(
             current = case.fit(rest, start=current.values)
             if needless is best.effect:
                 break
+    yields = yielding_reading(case, current)
+    if yields is not None:
+        plain, law, start = yields
+        steps = [replace(one, effect=law) if one.effect is plain else one for one in steps]
+        current = case.fit([one.effect for one in steps], start=start)
     empty = [step for step in steps if says_nothing(case, step.effect, current)]
     if empty:
         steps = [step for step in steps if step not in empty]
@@ -182,11 +188,7 @@ def _other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> lis
     for richer in _family(best.effect):
         if richer.alike is None:
             continue
-        known = {p.name: best.fit.values[best.effect.value_key(p)] for p in best.effect.free}
-        base = float(value_of(case.nominal, case.control, richer.alike.base))
-        imitating = richer.alike.values(known, base)
-        values = dict(best.fit.values)
-        values |= {richer.value_key(p): imitating[p.name] for p in richer.free}
+        values = {**best.fit.values, **imitating(case, richer, best.effect, best.fit)}
         effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
         rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
         fitted = replace(best.fit, effects=effects, values=values, rig=rig)
@@ -219,46 +221,29 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
     return best
 
 
-def _round(case: Case, settled: Fit, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
-    """Return the candidates by their held-out gain over the current effects, best first."""
+def _round(
+    case: Case, settled: Fit, current: Fit, library: Sequence[Effect], idle: set[str]
+) -> list[Candidate]:
+    """Return the candidates of one guilty output by their held-out gain, best first.
+
+    Outputs are taken by their gap, each for itself: what explains one has no say in what is tried
+    for another. One where nothing gains is `idle`, and not tried again until it changes.
+    """
     first = stage_gaps(case.outputs, settled.rig)
     now = case.gaps(current.rig) if current.effects else first
     limits = stage_limits(case.outputs)
-    guilty = {
-        stage for stage, gap in now.items() if gap > explained_below(first[stage], limits[stage])
-    }
-    among = guilty or _strained(case, current)
-    candidates = [
-        effect
-        for effect in library
-        if effect not in current.effects and among & set(effect.shows_in)
-    ]
-    found = []
-    screened = screen(case, current, candidates)
-    for i, (effect, starts) in enumerate(screened):
-        if case.tell is not None:
-            case.tell(f"fitting {effect.name}", i, len(screened))
-        chosen = (*current.effects, effect)
-        tries = [
-            case.fit(chosen, "fitted", {**current.values, **start}, effect) for start in starts
-        ]
-        fitted = min(tries, key=lambda one: one.cost)
-        bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
-        if bound:
-            continue
-        if not _within_tolerance(case, effect, fitted):
-            found.append((effect, fitted))
-    ranked = informative(case, current, found)
-    return ranked if guilty or _surely_beyond(case, ranked) else []
-
-
-def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:
-    """Tell whether a nominal number moved by no more than its setting can be trusted to."""
-    ends = case.ends(effect)
-    if ends is None:
-        return False
-    (number,) = effect.free
-    return ends[0] < fitted.values[effect.value_key(number)] < ends[1]
+    wide = {at for at, gap in now.items() if gap > explained_below(first[at], limits[at])}
+    tried: list[Candidate] = []
+    for output in sorted(wide - idle, key=lambda at: -now[at]):
+        ranked = fitted_candidates(case, current, library, {output})
+        tried = tried or ranked
+        if ranked and ranked[0].gain >= LEAST_GAIN:
+            return ranked
+        idle.add(output)
+    if wide:
+        return tried
+    ranked = fitted_candidates(case, current, library, _strained(case, current))
+    return ranked if _surely_beyond(case, ranked) else []
 
 
 def _strained(case: Case, current: Fit) -> set[str]:
@@ -267,8 +252,8 @@ def _strained(case: Case, current: Fit) -> set[str]:
     It may then keep a stage within its limit that is off by more.
     """
     known = {} if case.only_wide else case.known
-    settings = [one for name, one in known.items() if name != YIELDING]
-    return {one.stage for one in settings for p in one.free if one.value_key(p) in current.at_bound}
+    ends = [one for one in known.values() for p in one.free if one.value_key(p) in current.at_bound]
+    return {stage for one in ends for stage in one.shows_in}
 
 
 def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:

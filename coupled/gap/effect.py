@@ -21,7 +21,7 @@ from coupled.rig.crossing import leaking
 from coupled.rig.rig import Rig
 from coupled.schema import SMALLEST, Section, file_keys
 
-Mode = Literal["value", "factor", "added", "switch"]
+Mode = Literal["value", "factor", "added", "switch", "yields"]
 Drawing = Literal["law", "loop", "time"]
 
 
@@ -31,14 +31,16 @@ class Parameter:
 
     The key is one of a control's, or of the flight's; `{d}` in it and in the name is m, or rad on
     a wheel. `value` replaces the nominal one, `factor` multiplies it, `added` is added to it; a
-    `switch` has no number, and sets the key to `on`. `above` is a key from whose nominal value
-    the starts count.
+    `switch` has no number, and sets the key to `on`; `yields` is the length over which the rig's
+    dry friction yields before it slips, and sets the stiffness of its contact. `above` is a key
+    from whose nominal value the starts count.
 
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
     its own number for it, which is then to be set. `model_error` is how
-    well, relative, the physics of a right effect gives it.
+    well, relative, the physics of a right effect gives it, `unsure` by how much it is off at most
+    for what a record does not say.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Parameter:
     inverse: bool = False
     may_end: bool = False
     model_error: float = MODEL_ERROR
+    unsure: float = 0.0
     host: str = ""
 
     def named(self, control: str) -> str:
@@ -144,6 +147,9 @@ class Effect:
     `other`        whether every record must have another control's force
     `tolerance`    relative; its number is a setting, off by so much without being an effect
     `alike`        the effect for which it passes in a faint gap
+    `dry`          it is dry friction: how far its contact yields is a setting beside it
+    `yielding`     the effect that it is where its contact is seen to yield
+    `swallows`     settings, by the effects that free the same numbers, that are the same law
     `even`         two effects, friction and a force, that together are the same law
     `sample_error` relative standard error of its number, from what little of it a record meets
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
@@ -158,6 +164,9 @@ class Effect:
     other: bool = False
     tolerance: float = 0.0
     alike: Likeness | None = None
+    dry: bool = False
+    yielding: str = ""
+    swallows: tuple[str, ...] = ()
     even: tuple[str, str] | None = None
     sample_error: Callable[[Record, float], float] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
@@ -188,7 +197,8 @@ def setting_of(effect: Effect, low: float, high: float, neutral: float = 1.0) ->
     """Return the number that an effect frees as a setting, free between two values."""
     (number,) = effect.parameters
     within = replace(number, low=low, high=high, starts=(neutral,))
-    return replace(effect, name=f"setting of {effect.name}", parameters=(within,), tolerance=0.0)
+    name, shown = f"setting of {effect.name}", effect.shows_in[:1]
+    return replace(effect, name=name, parameters=(within,), outputs=shown, tolerance=0.0)
 
 
 @cache
@@ -221,13 +231,19 @@ def apply(
     where the physics cannot give such a rig.
     """
     changes: dict[str, Any] = {}
+    lengths: dict[str, float] = {}
     for effect in effects:
         for p in effect.parameters:
-            if p.key in changes:  # of an effect before it, which it shares
+            if p.key in changes or p.key in lengths:  # of an effect before it, which it shares
                 continue
             value = values.get(effect.value_key(p), 0.0)
             value = value if abs(value) >= SMALLEST else 0.0
+            if p.mode == "yields":
+                lengths[p.key] = value
+                continue
             changes[p.key] = p.entered(p.nominal(rig, control), value)
+    for key, length in lengths.items():
+        changes[key] = _level(rig, control, changes) / length if length > 0.0 else 0.0
     changes |= _no_less_than_running(rig, control, changes)
     data = rig.controls[control]
     changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
@@ -251,6 +267,23 @@ def _dotted(key: str, control: ControlName) -> str:
 
 
 FRICTION, BREAKAWAY = "loader.friction_N", "loader.breakaway_N"
+
+
+DIRECTIONS = ("loader.friction_pull_N", "loader.friction_push_N")
+BY_LOAD, USUAL_LOAD_N = "loader.friction_by_load", 50.0
+
+
+def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
+    """Return the dry friction of a rig with changes, N, that its contact carries.
+
+    Of what goes with the direction the mean, of what goes with the load that at a usual one.
+    """
+
+    def of(key: str) -> float:
+        return float(changes.get(key, value_of(rig, control, key)))
+
+    running = max(of(FRICTION), of(BREAKAWAY))
+    return running + 0.5 * sum(map(of, DIRECTIONS)) + USUAL_LOAD_N * of(BY_LOAD)
 
 
 def _no_less_than_running(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,8 @@ def fit(
     cost, information = 0.0, dict[tuple[str, ...], Floats]()
     for group in _groups(every):
         if only is None or only in group:
-            found = _fit(nominal, control, touched(outputs, group), group, part, start or {})
+            ours = touched(outputs, group)
+            found = _fit(nominal, control, ours, group, part, start or {}, nuisances)
             low, high, bound = low | found.low, high | found.high, bound + found.at_bound
             values, cost = values | found.values, cost + found.cost
             information[tuple(found.values)] = found.information
@@ -125,6 +127,7 @@ def _fit(
     effects: Sequence[Effect],
     part: Part,
     start: Mapping[str, float],
+    nuisances: Sequence[Effect] = (),
 ) -> _Group:
     keys, frees = _free(effects)
     scale = np.array([_scale(p) for p in frees])
@@ -156,11 +159,13 @@ def _fit(
             best = found
     assert best is not None
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
-    half = _half_width(best, len(ours), np.concatenate(number)) * scale
+    within = {one.value_key(p) for one in nuisances for p in one.free}
+    known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
+    half = _half_width(best, len(ours), np.concatenate(number), known) * scale
     # Where all that is filed is taken off, nothing is left of it: that is an answer.
     gone = np.isclose(best.x, low, atol=1e-4) & (ends[0] < [p.low for p in frees])
     values = np.where(gone, ends[0], best.x * scale)
-    sizes = [p.model_error * p.size(v) for p, v in zip(frees, values, strict=True)]
+    sizes = [hypot(p.model_error * p.size(v), p.unsure) for p, v in zip(frees, values, strict=True)]
     half = np.hypot(half, sizes)
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
@@ -208,25 +213,29 @@ class _Slopes:
         return np.column_stack(columns)
 
 
-def _half_width(found: Any, outputs: int, groups: NDArray[np.intp]) -> Floats:
+def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
 
     The larger of two: white residuals widened by their memory, and the scatter of the score from
-    stretch to stretch (the sandwich), which counts misfit wherever it sits.
+    stretch to stretch (the sandwich), which counts misfit wherever it sits. `known` is what is
+    known beforehand, 1/variance: of a setting, that it is anywhere within its tolerance.
     """
     jacobian, left = found.jac, found.fun
     rows = len(left) // outputs
     widen = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
-    bread = np.linalg.pinv(jacobian.T @ jacobian)
-    plain = np.diag(bread) * float(np.mean(left**2)) * widen
+    variance = max(float(np.mean(left**2)), 1e-12)
+    before = np.diag(known)
+    plain = np.linalg.pinv(jacobian.T @ jacobian / (variance * widen) + before)
+    bread = np.linalg.pinv(jacobian.T @ jacobian / variance + before)
     names, number = np.unique(groups, return_inverse=True)
     scores = np.zeros((len(names), jacobian.shape[1]))
     np.add.at(scores, number, jacobian * left[:, None])
     freedom = max(1, len(names) - jacobian.shape[1])
-    filled = bread @ (scores.T @ scores) @ bread * (len(names) / freedom)
-    variance = np.maximum(np.maximum(plain, np.diag(filled)), 0.0)
-    half = student.ppf(0.975, freedom) * np.sqrt(variance)
-    half[np.linalg.norm(jacobian, axis=0) < 1e-9] = np.inf
+    scatter = scores.T @ scores * (len(names) / freedom) / variance**2
+    filled = bread @ (scatter + before) @ bread
+    square = np.maximum(np.maximum(np.diag(plain), np.diag(filled)), 0.0)
+    half = student.ppf(0.975, freedom) * np.sqrt(square)
+    half[(np.linalg.norm(jacobian, axis=0) < 1e-9) & (known == 0.0)] = np.inf
     return np.asarray(half)
 
 

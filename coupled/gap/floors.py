@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise import Noise
 from coupled.gap.output import heard, rounding
+from coupled.gap.quiet import quiet_noise
 from coupled.gap.smooth import Smoother
 from coupled.gap.thresholds import LEAST_NOISE
 from coupled.rig.rig import Rig
@@ -29,6 +30,18 @@ def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     known = rig.noise.get(channel, 0.0)
     least = LEAST_NOISE * float(np.sqrt(np.mean(signal**2)))
     return Noise(known or max(least, rounding(signal, np.inf)))
+
+
+def left_noise(heard_: Noise, signal: Floats, left: Floats) -> Noise:
+    """Return a channel's noise by what its stage leaves of it; no less than its rounding.
+
+    `heard_` is what the signal alone says: it stays for a filtered log, and for a short one.
+    """
+    found = None if heard_.filtered else quiet_noise(left)
+    if found is None:
+        return heard_
+    rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    return replace(found, rms=max(found.rms, rounding(signal, rough)))
 
 
 def with_error(signal: Floats, k: int, level: Noise) -> Floats:

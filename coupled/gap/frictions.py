@@ -55,7 +55,11 @@ def _one_way(name: str, *starts_N: float) -> Parameter:
 
 
 FRICTIONS: tuple[Effect, ...] = (
-    Effect("coulomb_friction", "loader", (_level(1.5),), _DRAWN),
+    Effect(
+        *("coulomb_friction", "loader", (_level(1.5),), _DRAWN),
+        dry=True,
+        yielding="presliding_friction",
+    ),
     Effect(
         "stribeck_friction",
         "loader",
@@ -65,6 +69,7 @@ FRICTIONS: tuple[Effect, ...] = (
             replace(_FADING, scanned=False, shape=True),
         ),
         _DRAWN,
+        dry=True,
         alike=Likeness("coulomb_friction", "loader.friction_N", _breaks_away),
     ),
     Effect(
@@ -72,6 +77,7 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (_level(1.5), replace(_CONTACT, scanned=False, shape=True, inverse=True), _ELASTIC),
         _DRAWN,
+        dry=True,
     ),
     # By itself it is the same law as plain friction of the mean with a constant force of half the
     # difference, however the control is moved.
@@ -80,6 +86,7 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (_one_way("pull_N", 1.5, 0.5), _one_way("push_N", 0.5, 1.5)),
         _DRAWN,
+        dry=True,
         even=("coulomb_friction", "force_offset"),
     ),
     Effect(
@@ -87,5 +94,6 @@ FRICTIONS: tuple[Effect, ...] = (
         "loader",
         (Parameter("factor", "loader.friction_by_load", "added", 0, 0.8, (0.03,)),),
         Signature("force", "missing"),
+        dry=True,
     ),
 )

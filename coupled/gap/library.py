@@ -117,9 +117,13 @@ EFFECTS: tuple[Effect, ...] = (
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 
+def _ends(effect: Effect) -> tuple[float, float, float]:
+    """Return between which values an effect's number is a setting, and its neutral one."""
+    neutral = 1.0 if effect.free[0].mode == "factor" else 0.0
+    return neutral - effect.tolerance, neutral + effect.tolerance, neutral
+
+
 # {the effect that frees the same number: the setting}, where the rig file gives no tolerance
 SETTINGS: dict[str, Effect] = {
-    effect.name: setting_of(effect, 1.0 - effect.tolerance, 1.0 + effect.tolerance)
-    for effect in EFFECTS
-    if effect.tolerance > 0.0
+    effect.name: setting_of(effect, *_ends(effect)) for effect in EFFECTS if effect.tolerance > 0.0
 }

@@ -8,6 +8,7 @@ from coupled.gap.effect import Effect, Signature
 from coupled.gap.entries import SETTING, added, factor, limit, one, switch, value
 from coupled.gap.frictions import FRICTIONS
 from coupled.gap.ripples import ripples
+from coupled.gap.thresholds import CLOCK_s
 
 LOADER: tuple[Effect, ...] = (
     *FRICTIONS,
@@ -68,11 +69,15 @@ LOADER: tuple[Effect, ...] = (
         ),
         outputs=("loader", "multiplier"),
     ),
-    one(
-        "loader",
-        "transport_delay",
-        added("delay_s", "loader.delay_s", 0, 0.19, 0.01),
-        *("speed", "computed_left", "law", 1.0),
+    # Where nothing bends, a force that comes late is one that is stamped late.
+    replace(
+        one(
+            "loader",
+            "transport_delay",
+            replace(added("delay_s", "loader.delay_s", 0, 0.19, 0.01), unsure=CLOCK_s),
+            *("speed", "computed_left", "law", 1.0),
+        ),
+        swallows=("force_skew",),
     ),
     Effect(
         "friction_ripple",

@@ -8,6 +8,7 @@ from coupled.gap.effect import Effect, Parameter, Signature
 from coupled.gap.entries import added, exact, factor, one, value
 from coupled.gap.hums import hums
 from coupled.gap.missed import shares_missed, spread_of_missed
+from coupled.gap.thresholds import CLOCK_s
 
 
 def _force(name: str, parameter: Parameter, x: str, y: str) -> Effect:
@@ -72,10 +73,13 @@ SENSING: tuple[Effect, ...] = (
         Signature("", "computed_left", "time", 0.2),
         seen=hums,
     ),
-    _force(
-        "force_skew",
-        added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01),
-        *("speed", "missing"),
+    replace(
+        _force(
+            "force_skew",
+            added("delay_s", "sensing.force_stamp_s", -0.3, 0.3, 0.01),
+            *("speed", "missing"),
+        ),
+        tolerance=CLOCK_s,
     ),
     replace(
         one(
@@ -85,5 +89,6 @@ SENSING: tuple[Effect, ...] = (
             *("elevator", "pitch_rate", "loop", 4.0),
         ),
         outputs=("airframe",),
+        tolerance=CLOCK_s,
     ),
 )

@@ -20,7 +20,7 @@ from coupled.gap.effect import Effect, Parameter, apply, possible, value_of
 from coupled.gap.fit import touched
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Output
-from coupled.gap.settings import settings
+from coupled.gap.settings import contact, settings
 from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -124,8 +124,10 @@ def _signature(
 def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
     """Return the signatures of a stage's settings, a column each."""
     columns = []
-    for name, setting in settings(nominal, control).items():
-        if setting.stage == output.stage and name != effect.name:
+    known = settings(nominal, control)
+    beside = [one for name, one in known.items() if name not in (effect.name, *effect.swallows)]
+    for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
+        if output.stage in setting.shows_in:
             (number,) = setting.free
             nudge = SETTING_NUDGE * (number.high - number.starts[0])
             values = {setting.value_key(number): number.starts[0] + nudge}

@@ -12,28 +12,39 @@ from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
-CONTACT = "loader.friction_stiffness_N_per_{d}"
-YIELDING = "friction_stiffness"
+CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
+MOST_ELASTIC = 0.95
 
 
 def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
     """Return {the effect that frees the same number: the setting, free within its tolerance}."""
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
-    found = {effect.name: setting_of(effect, *ends) for effect, ends in known if ends is not None}
-    return found | _yielding(rig, control)
+    return {effect.name: setting_of(effect, *ends) for effect, ends in known if ends is not None}
 
 
-def _yielding(rig: Rig, control: ControlName) -> dict[str, Effect]:
-    """Return the stiffness of the contact of a filed friction, where the file does not say it.
+def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
+    """Return how far dry friction yields and how, as settings; none where the file says it.
 
     All dry friction yields before it slips, by up to half a millimetre: how far is no effect.
     """
     loader = rig.controls[control].loader
-    if loader.friction == 0.0 or loader.friction_stiffness > 0.0:
-        return {}
-    least = loader.friction / (YIELDS_rad if unit_of(control) == "rad" else YIELDS_m)
-    number = Parameter("", CONTACT, "value", least, 1e4 * least, (10.0 * least,))
-    return {YIELDING: Effect(f"setting of {YIELDING}", "loader", (number,), Signature("", ""))}
+    if loader.friction_stiffness > 0.0:
+        return ()
+    most = YIELDS_rad if unit_of(control) == "rad" else YIELDS_m
+    length = Parameter("", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most,), may_end=True)
+    share = Parameter(
+        "", CONTACT[1], "value", 0.0, MOST_ELASTIC, (loader.friction_elastic_share,), may_end=True
+    )
+    names = ("setting of the contact", "setting of the contact's share")
+    numbers = zip(names, (length, share), strict=True)
+    return tuple(Effect(name, "loader", (one,), Signature("", "")) for name, one in numbers)
+
+
+def is_dry(rig: Rig, control: ControlName) -> bool:
+    """Tell whether a rig file has dry friction."""
+    loader = rig.controls[control].loader
+    levels = (loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
+    return max(*levels, loader.friction_by_load) > 0.0
 
 
 def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float, float] | None:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.floors import given_noise, noise_in, unsmoothed, with_error
+from coupled.gap.floors import given_noise, left_noise, noise_in, unsmoothed, with_error
 from coupled.gap.noise import Noise
 from coupled.gap.openloop import about
 from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
@@ -90,6 +90,7 @@ class Reader(Reading):
         Of one that is `driven_by` a quantity of the control, it is known what the floor hides.
         """
         base = predict(self.rig)
+        own = left_noise(own, measured, measured - base)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
         floor = float(np.hypot(own.rms, carried))

@@ -26,6 +26,11 @@ COLOURS = tuple(0.02 * k for k in range(43))  # correlations by frames that are 
 COLOURED_BY = 12.0  # chosen: by which a colour must lessen χ² of the bands' levels,
 COLOUR_FITS = 2.5  # chosen: and what it may leave of that for each degree of freedom
 FOLLOWS_ON = 3.5  # chosen: standard deviations by which the next band below may be off a colour
+PIECE = 64  # chosen: frames of a piece of a residual whose spectrum is taken (`quiet`)
+QUIET_FROM = 5  # chosen: the first of its frequencies that may be noise alone, 9 Hz of 120
+QUIET_SHARE = 0.3  # of the pieces, quieter; 0.5 let a sticking loader through, seed 101
+QUIET_FOLLOWS_ON = 3.0  # chosen: standard deviations by which the next frequency may stand out
+OUTLYING = 3.0  # chosen: standard deviations from which a frequency is a line
 FILTERED = 0.05  # chosen: of the lowest bands' level, under which the highest show a filter
 LINES_FROM = 0.4  # chosen: of the highest frequency, from which a line is looked for
 LINE_BANDS = 8  # chosen: bands there, each with its own level of noise
@@ -91,6 +96,8 @@ STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations los
 # Settings of the nominal rig (`case`).
 YIELDS_m = 5e-4  # the contract's: by how much friction may yield before it slips
 YIELDS_rad = 5e-3  # chosen: the same on a wheel of a tenth of a metre
+YIELDED = 0.04  # chosen: of that, from which friction is read as yielding: 20 μm on a column
+CLOCK_s = 5e-4  # chosen: by which a recorder may stamp one channel late, or early, unnoticed
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
 
 # Fitting (`fit`).

@@ -1,18 +1,24 @@
-"""Two readings of one law: friction by direction, and even friction with an offset.
+"""Two readings of one law: friction by direction or by how it yields, and plain friction.
 
 Dry friction of a with the pull and b with the push is friction of (a + b)/2 with a constant
 force of (b − a)/2 beside it, moving and at rest alike: no record of force and deflection
 separates them, and one reading is given. Where one direction has less than twice the friction of
 the other it is the even one with an offset, which a bearing with an amplifier's zero has; where it
 has more, friction by direction.
+
+How far a contact yields before it slips is a setting beside any dry friction (`settings`). Where
+the records show that it does, plain friction is read as friction that yields, with those numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from coupled.gap.effect import Effect
+from coupled.gap.case import Case
+from coupled.gap.effect import Effect, value_of
+from coupled.gap.fit import Fit
 from coupled.gap.library import BY_NAME
+from coupled.gap.thresholds import YIELDED
 
 UNEVEN = 2.0  # times the other direction's friction
 
@@ -37,3 +43,25 @@ def even_reading(
     read[even.value_key(even.free[0])] = 0.5 * (pull + push)
     read[offset.value_key(offset.free[0])] = 0.5 * (push - pull)
     return (*others, even, offset), read
+
+
+def yielding_reading(case: Case, found: Fit) -> tuple[Effect, Effect, dict[str, float]] | None:
+    """Return the plain friction found, the law that it is where it yields, and where to start.
+
+    None where no friction was found that surely yields by more than `YIELDED` of what may be.
+    """
+    if not case.contact:
+        return None
+    length, share = (one.value_key(one.free[0]) for one in case.contact)
+    most = case.contact[0].free[0].high
+    plain = next((effect for effect in found.effects if effect.yielding), None)
+    if plain is None or found.low.get(length, 0.0) < YIELDED * most:
+        return None
+    law = BY_NAME[plain.yielding]
+    if law in found.effects:
+        return None
+    contact = value_of(found.rig, case.control, case.contact[0].free[0].key)
+    numbers = (found.values[plain.value_key(plain.free[0])], float(contact), found.values[share])
+    start = dict(found.values)
+    start |= {law.value_key(p): v for p, v in zip(law.free, numbers, strict=True)}
+    return plain, law, start

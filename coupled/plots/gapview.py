@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from coupled.gap.case import Case
 from coupled.gap.chain import stage_of
 from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.effect import Effect, apply
-from coupled.gap.library import SETTINGS
+from coupled.gap.effect import Effect
 from coupled.gap.output import Floats, Output
 from coupled.gap.result import StageResult
 from coupled.gap.stages import Reader
@@ -121,9 +121,9 @@ class View:
             return whole.nominal
         if set(effects) == set(self.effects):
             return whole.improved
-        values = whole.choice.fit.values
-        settings = [s for s in SETTINGS.values() if s.value_key(s.free[0]) in values]
-        return apply(whole.nominal, whole.control, (*effects, *settings), values)
+        return Case(whole.nominal, whole.control, whole.outputs).with_only(
+            whole.choice.fit, effects
+        )
 
     def rungs(self) -> list[tuple[str, Rig]]:
         """Return the rigs from the nominal one to the improved, an effect more at a time."""

@@ -1,0 +1,87 @@
+"""The noise of a residual, by its quieter stretches of half a second.
+
+What a signal does hides its noise: where a control sticks, slips or meets its play, its spectrum
+falls as slowly as that of coloured noise. A stage's residual has no more of that than the gap
+leaves. Its spectrum is taken in short pieces, and of each frequency the third quietest counts,
+so that what happens now and then is left out; a line of the mains falls out among the others.
+The noise is white, or that of a first-order lag, as in `noise`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise import Noise
+from coupled.gap.thresholds import (
+    COLOURED_BY,
+    COLOURS,
+    NOISE_FROM,
+    OUTLYING,
+    PIECE,
+    QUIET_FOLLOWS_ON,
+    QUIET_FROM,
+    QUIET_SHARE,
+    WHITE_FRAMES,
+)
+
+Floats = NDArray[np.float64]
+_SHAPES = np.array(COLOURS)[:, None]
+
+
+def quiet_noise(residual: Floats) -> Noise | None:
+    """Return the noise of a residual, shape (frames,); None where it is short or without any."""
+    if len(residual) < WHITE_FRAMES:
+        return None
+    omega, logs, variance = _levels(residual)
+    if not np.all(np.isfinite(logs)):
+        return None
+    first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
+    while True:
+        memory, level = _fitted(omega[first:], logs[first:], variance)
+        if first == 0:
+            break
+        next_one = level + float(_shape(omega[first - 1], np.array(memory)))
+        if logs[first - 1] - next_one > QUIET_FOLLOWS_ON * math.sqrt(variance):
+            break
+        first -= 1
+    return Noise(math.sqrt(math.exp(level) / (1.0 - memory**2)), memory)
+
+
+def _levels(residual: Floats) -> tuple[Floats, Floats, float]:
+    """Return frequencies, rad a frame, the logarithm of the noise's power there, and its variance.
+
+    The residual is differenced once, which keeps its slow parts from leaking.
+    """
+    taper = np.hanning(PIECE)
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(residual), PIECE)[:: PIECE // 2]
+    power = np.abs(np.fft.rfft(steps * taper, axis=1)) ** 2 / float(taper @ taper)
+    omega = np.linspace(0.0, math.pi, power.shape[1])[QUIET_FROM:-1]
+    power = power[:, QUIET_FROM:-1] / (2.0 * np.sin(0.5 * omega)) ** 2
+    # Of exponentially distributed values the share q lies under −ln(1 − q) of the mean.
+    middle = -math.log(1.0 - QUIET_SHARE)
+    with np.errstate(divide="ignore"):
+        logs = np.log(np.quantile(power, QUIET_SHARE, axis=0) / middle)
+    # Pieces overlap by half and neighbours in frequency by the taper: so many count.
+    counted = 0.5 * len(power)
+    return omega, logs, QUIET_SHARE / ((1.0 - QUIET_SHARE) * middle**2) / counted
+
+
+def _shape(omega: Floats | float, memory: Floats) -> Floats:
+    """Return the logarithm of a first-order lag's noise over that of what drives it."""
+    return np.asarray(-np.log(1.0 + memory**2 - 2.0 * memory * np.cos(omega)))
+
+
+def _fitted(omega: Floats, logs: Floats, variance: float) -> tuple[float, float]:
+    """Return the correlation by frames, 0 where white noise explains it as well, and the level."""
+    left = logs - _shape(omega, _SHAPES)
+    middle = np.median(left, axis=1, keepdims=True)
+    near = np.abs(left - middle) < OUTLYING * math.sqrt(variance)
+    misfit = np.sum(np.minimum((left - middle) ** 2 / variance, OUTLYING**2), axis=1)
+    best = int(np.argmin(misfit))
+    if misfit[0] - misfit[best] < COLOURED_BY:
+        best = 0
+    level = float(np.mean(left[best][near[best]])) if near[best].any() else float(middle[best, 0])
+    return COLOURS[best], level
