@@ -10,8 +10,11 @@ makes mutants of your own.
 
 The tests run once without a mutant. Each run is a fork of this process, which has imported all;
 it imports the changed module, and what depends on it, anew. No file is changed, so a test that
-starts another process does not see the mutant. Kernels are compiled for each mutant of a stage;
-`--plain` runs the rig's as plain Python instead, a hundred times slower and without that minute.
+starts another process does not see the mutant. A mutant that ends the process is killed, too.
+
+For a module of the rig all stages are compiled once; each fork compiles the changed one and what
+calls it, which takes two to eight seconds. `--plain` runs them as plain Python instead: nothing is
+compiled, and a test takes a hundred times as long, which is quicker where it runs few substeps.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 
 from coupled.rig import compiled
@@ -42,6 +46,7 @@ from tests.support.interpreted import interpret
 
 ROOT = Path(__file__).parents[1]
 ALWAYS = ("-x", "-q", "-n", "0", "-p", "no:cacheprovider")
+PASSED = "passed"  # what a fork answers whose tests notice nothing
 OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -228,6 +233,20 @@ def forget(names: set[str]) -> None:
         vars(sys.modules.get(package, sys)).pop(inner, None)
 
 
+def uncached() -> None:
+    """Let no kernel come from disk, where it was compiled from the file as it is."""
+    vars(compiled)["entry"] = compiled.stage
+
+
+def compile_stages() -> None:
+    """Compile the stages of the rig, so that a fork has to compile only what is changed."""
+    rigs: Any = importlib.import_module("tests.support.rigs")
+    standalone: Any = importlib.import_module("coupled.rig.standalone")
+    rig = rigs.bench()
+    rigs.push(rig, 1.0, 0.001)
+    standalone.run_control(rig, "column", np.zeros(rig.substeps + 1), np.zeros(1))
+
+
 def _tried(
     name: str, source: bytes, stale: set[str], tests: list[str], limit_s: float, answer: int
 ) -> NoReturn:
@@ -238,8 +257,7 @@ def _tried(
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
     if name.startswith("coupled.rig."):
-        # What is kept on disk was compiled from the file as it is.
-        vars(compiled)["entry"] = compiled.stage
+        uncached()
     failure = _Watch()
     status = 1
     try:
@@ -247,8 +265,8 @@ def _tried(
         sys.meta_path.insert(0, _Finder(_Changed(name, source)))
         status = int(pytest.main([*ALWAYS, *tests], plugins=[failure]))
     finally:
-        said = failure.name if status else ""
-        os.write(answer, (said or "*" * bool(status)).encode())
+        said = (failure.name or "*") if status else PASSED
+        os.write(answer, said.encode())
         os._exit(0)
 
 
@@ -263,7 +281,9 @@ def killer(name: str, source: bytes, stale: set[str], tests: list[str], limit_s:
         if not select.select([reading], [], [], limit_s)[0]:
             os.killpg(child, signal.SIGKILL)
             return f"no end within {limit_s:.0f} s"
-        return os.read(reading, 4096).decode()
+        if said := os.read(reading, 4096):
+            return "" if said == PASSED.encode() else said.decode()
+        return "the process ended before its tests did"
     finally:
         os.close(reading)
         os.waitpid(child, 0)
@@ -295,14 +315,20 @@ def main() -> None:
         chosen = sorted(
             random.Random(given.seed).sample(chosen, given.sample), key=lambda m: m.start
         )
-    if given.plain:
+    name = given.module.removesuffix(".py").replace("/", ".")
+    of_the_rig = name.startswith("coupled.rig.")
+    if given.plain or of_the_rig:
         forget(dependants("coupled.rig.compiled") - {"coupled.rig.compiled", __name__})
-        interpret()
+        if given.plain:
+            interpret()
+        else:
+            uncached()
     tests = [*given.tests, *(f"--deselect={each}" for each in given.deselect)]
     tests += ["-k", given.only]
     # Imports all, and runs nothing: a thread that a test starts would be lost in the forks.
     pytest.main([*ALWAYS, "--collect-only", *tests], plugins=[_Watch()])
-    name = given.module.removesuffix(".py").replace("/", ".")
+    if of_the_rig and not given.plain:
+        compile_stages()
     stale = dependants(name) - {"__main__", "tests.mutation"}
     start_s = time.perf_counter()
     if failed := killer(name, source, stale, tests, 600.0):

@@ -2,7 +2,8 @@
 
 `interpret()` puts them in the compiler's place; it is for whoever imports the stages after it.
 A kernel reads the fields of a record as attributes, which numpy's records do not have: each is
-opened into plain objects for the call, and what the kernel has set is written back after it.
+opened into plain objects for the call, and what the kernel has set is written back after it. Where
+another argument is the same memory, each field is read and set in the record itself, more slowly.
 """
 
 from __future__ import annotations
@@ -43,6 +44,36 @@ def written_back(plain: SimpleNamespace, record: Any) -> None:
             record[name] = value
 
 
+class InPlace:
+    """A record's fields as attributes, read from its memory and set there."""
+
+    __slots__ = ("_record",)
+    _record: Any
+
+    def __init__(self, record: Any) -> None:
+        object.__setattr__(self, "_record", record)
+
+    def __getattr__(self, name: str) -> Any:
+        value = self._record[name]
+        if isinstance(value, np.void):
+            return InPlace(value)
+        return value if isinstance(value, np.ndarray) else value.item()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._record[name] = value
+
+
+def _is_table(argument: Any) -> bool:
+    """Tell whether an argument is an array of records."""
+    return type(argument) is np.ndarray and argument.dtype.names is not None
+
+
+def _also_numbers(table: Any, arguments: tuple[Any, ...]) -> bool:
+    """Tell whether another argument is the memory of an array of records."""
+    others = [each for each in arguments if type(each) is np.ndarray and each is not table]
+    return any(np.may_share_memory(table, other) for other in others)
+
+
 def plain(function: Function) -> Function:
     """Return a kernel that takes numpy's records, and plain objects from another kernel."""
 
@@ -54,7 +85,9 @@ def plain(function: Function) -> Function:
             if type(argument) is np.void:
                 given[i] = opened(argument)
                 records.append((given[i], argument))
-            elif type(argument) is np.ndarray and argument.dtype.names:
+            elif _is_table(argument) and _also_numbers(argument, arguments):
+                given[i] = [InPlace(each) for each in argument]
+            elif _is_table(argument):
                 given[i] = [opened(each) for each in argument]
                 records += zip(given[i], argument, strict=True)
         found = function(*given)
