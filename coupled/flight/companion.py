@@ -43,6 +43,7 @@ class Companion(Protocol):
     """Who goes along with a flight, frame by frame: a live host."""
 
     elsewhere: bool  # hand and loader are real: the rig's are not simulated
+    leads: bool  # it may lead the services of any control, between frames
 
     def board(self, aboard: Aboard) -> None:
         """Begin, with the aircraft in trim."""

@@ -75,7 +75,7 @@ def fly(
     data = _noise(channels, rig.noise, frames, manoeuvre.seed)
     noise = data.copy() if lateness(rig) else None
     looks = _looks(controls, names, actions)
-    served = Served(manoeuvre, controls)
+    served = Served(manoeuvre, controls, companion is not None and companion.leads)
     extra: list[tuple[float, ...]] = []
 
     read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
@@ -152,7 +152,8 @@ def _flown(
     data[:, 0] = np.arange(len(data)) / manoeuvre.rig.frame_rate
     if noise is not None:
         stamp(manoeuvre.rig, channels, data, noise[: len(data)])
-    channels, data = (*channels, *served.channels), served.beside(data)
+    more, data = served.beside(data)
+    channels = (*channels, *more)
     if properties:
         channels = (*channels, *properties)
         data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))

@@ -10,26 +10,38 @@ from numpy.typing import NDArray
 from coupled.flight.event import service_events
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.rig.control import ControlArray
+from coupled.rig.services import SERVICE_CHANNELS
 from coupled.rig.serving import noted, service_channels
 
 Floats = NDArray[np.float64]
 Frame = Callable[[int, int, tuple[float, ...], float], tuple[float, float, float]]
 
 
-class Served:
-    """What a flight's services do; false where it has none."""
+# What a service that rests leaves at 0; what is asked of the surface is not of them.
+_RESTING = [i for i, name in enumerate(SERVICE_CHANNELS) if name != "asked_{d}"]
 
-    def __init__(self, manoeuvre: Manoeuvre, controls: ControlArray) -> None:
+
+class Served:
+    """What a flight's services do; false where it has none.
+
+    `any_led` says that those of any control may be led from outside while it flies.
+    """
+
+    def __init__(self, manoeuvre: Manoeuvre, controls: ControlArray, any_led: bool = False) -> None:
         rig = manoeuvre.rig
         self._controls, self._names = controls, [str(name) for name in rig.controls]
-        self._which = manoeuvre.served
+        self._always = manoeuvre.served
+        self._which = tuple(rig.controls) if any_led else self._always
+        # From the first frame on, so that what is recorded before an event is true, too.
+        recorded = [name in self._which for name in rig.controls]
+        controls["state"]["services"]["on"][recorded] = 1
         events = manoeuvre.conditions.event
         self._happen = service_events(events, controls, self._names, 1.0 / rig.frame_rate)
-        self.channels = tuple(each for name in self._which for each in service_channels(name))
-        self._rows = np.zeros((manoeuvre.frames if self.channels else 0, len(self.channels)))
+        shape = (manoeuvre.frames, len(self._which), len(SERVICE_CHANNELS))
+        self._rows = np.zeros(shape if self else (0, *shape[1:]))
 
     def __bool__(self) -> bool:
-        return bool(self.channels)
+        return bool(self._which)
 
     def around(self, frame: Frame) -> Frame:
         """Return the rig's frame with events led before it, and what it recorded noted after."""
@@ -42,11 +54,23 @@ class Served:
         ) -> tuple[float, float, float]:
             happen()
             commands = frame(place, k, motion, load_factor)
-            rows[k] = noted(self._controls, self._names, self._which)
+            noted(self._controls, self._names, self._which, rows[k])
             return commands
 
         return served
 
-    def beside(self, data: Floats) -> Floats:
-        """Return a record's rows with the services' channels behind them."""
-        return np.column_stack((data, self._rows[: len(data)])) if self else data
+    def beside(self, data: Floats) -> tuple[tuple[str, ...], Floats]:
+        """Return the services' channels, and a record's rows with them behind.
+
+        Of a control that has none those are left out, unless one of them was led.
+        """
+        rows = self._rows[: len(data)]
+        kept = [
+            name in self._always or bool(rows[:, i, _RESTING].any())
+            for i, name in enumerate(self._which)
+        ]
+        names = [name for name, has in zip(self._which, kept, strict=True) if has]
+        channels = tuple(each for name in names for each in service_channels(name))
+        if not channels:
+            return (), data
+        return channels, np.column_stack((data, rows[:, kept].reshape(len(data), -1)))

@@ -98,6 +98,7 @@ class Host:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.elsewhere = plan.link is not None
+        self.leads = plan.link is None and bool(plan.watchers)
         self.happened = Happened()
         self.attached: Attached | None = None
         self.time_s = 0.0

@@ -170,6 +170,8 @@ class Services(Section):
     soft_stop_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
     envelope_above: float = quantity("g", 0.0)
     envelope: float = quantity("N_per_g", 0.0, ge=0)
+    envelope_below: float = quantity("g", 0.0)
+    envelope_push: float = quantity("N_per_g", 0.0, ge=0)
 
 
 class Gains(Section):

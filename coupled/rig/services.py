@@ -9,7 +9,7 @@
     pusher       −P, coming and going over its rise
     hinge        −q̄·(h_α·(α − α₀) + h_δ·surface)
     soft stop    −k·(|δc| − s) beyond s, and a damping on the way out
-    envelope     −e·(n_z − n) above n
+    envelope     −e·(n_z − n) above n, and e'·(n' − n_z) below n'
     failed feel  G_T·(1 − lost), eqs. (6) to (12) with what is left
 
 Forces act on the loader beside the pilot's, positive with a pull. Those of the host (pusher,
@@ -80,7 +80,9 @@ class ServicesParameters(Protocol):
     soft_stop_stiffness: float  # N/d
     soft_stop_damping: float  # N·s/d
     envelope_above: float  # n, g
-    envelope: float  # N/g
+    envelope: float  # e, N/g
+    envelope_below: float  # n', g
+    envelope_push: float  # e', N/g
 
 
 class ServicesState(Protocol):
@@ -162,6 +164,8 @@ def begin_services(
     s.slow -= pressure * (p.hinge_alpha * (alpha - s.alpha) + p.hinge_surface * surface)
     if p.envelope > 0.0:
         s.slow -= p.envelope * max(load_factor - p.envelope_above, 0.0)
+    if p.envelope_push > 0.0:
+        s.slow += p.envelope_push * max(p.envelope_below - load_factor, 0.0)
 
 
 @stage

@@ -125,7 +125,8 @@ def led(controls: ControlArray, names: Sequence[str], control: str, service: str
     return float(controls["state"][list(names).index(control)][stage][field])
 
 
-def noted(controls: ControlArray, names: Sequence[str], which: Sequence[str]) -> Floats:
-    """Return what was last recorded of some controls' services, one after the other."""
+def noted(controls: ControlArray, names: Sequence[str], which: Sequence[str], into: Floats) -> None:
+    """Write what was last recorded of some controls' services, a row each, shape (n, channels)."""
     rows = controls["state"]["services"]["row"]
-    return np.concatenate([rows[list(names).index(name)] for name in which])
+    for row, name in zip(into, which, strict=True):
+        row[:] = rows[list(names).index(name)]

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from coupled.errors import InputError
+from coupled.flight.conditions import Conditions
+from coupled.flight.event import Event
+from coupled.flight.loop import fly
+from coupled.flight.pilot import Step
 from coupled.live.attach import rig_live, run_live
 from coupled.live.hands import Follower
 from coupled.live.host import Host, Plan, Word
@@ -122,6 +127,25 @@ def test_switches_marks_and_stop_act_at_their_frame() -> None:
     assert len(live["switched"]) == 1
     assert (flight.since_s, flight.rig.controls["column"].compensation.deflection) == (2.0, False)
     assert len(warned) == 2
+
+
+def test_what_is_led_on_a_rig_without_services_is_recorded_as_a_runs_events_are() -> None:
+    """The rig file gives no services; led from outside, they have a batch flight's own bytes."""
+    led = [("trim_m", 0.5, 0.02), ("feel_lost", 1.0, 0.4), ("jammed", 1.5, 1.0)]
+    pull = {"column": Step(force_N=30.0, start_s=0.2)}
+    plain = replace(rig_live("report-column", 2.0), pilots=pull)
+    events = {name: Event(service=name, control="column", at=at, to=to) for name, at, to in led}
+    batch = fly(replace(plain, conditions=Conditions(event=events)))
+    words = [(at, Word("lead", name, "column", to)) for name, at, to in led]
+    live = fly_live(plain, Plan(paced=False, watchers=[Looker(*words)])).record
+    assert live.channels == batch.channels
+    assert np.array_equal(live.data, batch.data)
+    assert live["column_jammed"][-1] == 1.0
+    asked = live["column_asked_m"][:180]  # before the jam: what the host asks for, from the start
+    assert np.array_equal(asked, live["column_estimate_m"][:180])
+    quiet = fly_live(plain, Plan(paced=False, watchers=[Looker()])).record
+    assert quiet.channels == fly(plain).channels
+    assert np.array_equal(quiet.data, fly(plain).data)
 
 
 def test_a_bench_is_flown_live_too() -> None:

@@ -256,8 +256,14 @@ def test_hinge_moments_stiffen_with_pressure_and_an_envelope_pushes_back() -> No
     record = flown({"hinge_surface_N_per_Pa": 0.02})
     stiffened = G + PRESSURE * 0.02 / 0.1778
     assert at(record, "computed_m", 3.9) == pytest.approx(20.0 / stiffened, rel=1e-3)
-    record = flown({"envelope_above_g": 0.6, "envelope_N_per_g": 30.0})  # a bench stands at 1 g
-    assert at(record, "computed_m", 3.9) == pytest.approx((20.0 - 12.0) / G, rel=1e-3)
+    # A bench stands at 1 g: 0.4 g beyond 0.6 are against a pull, 0.3 g short of 1.3 against a push.
+    above = {"envelope_above_g": 0.6, "envelope_N_per_g": 30.0}
+    below = {"envelope_below_g": 1.3, "envelope_push_N_per_g": 50.0}
+    within = {**above, **below, "envelope_above_g": 1.1, "envelope_below_g": 0.9}
+    for given, added in ((above, -12.0), (below, 15.0), ({**above, **below}, 3.0), (within, 0.0)):
+        for force in (20.0, -20.0):
+            record = flown(given, force_N=force)
+            assert at(record, "computed_m", 3.9) == pytest.approx((force + added) / G, rel=1e-3)
 
 
 def test_a_feel_that_fails_leaves_its_share_of_the_gradient() -> None:
@@ -272,6 +278,7 @@ def test_services_that_rest_change_no_byte_of_the_record() -> None:
     plain = flown(force_N=20.0)
     services = {**DRIVEN, "shaker_N": 10.0, "pusher_N": 50.0, "soft_stop_m": 0.17}
     services |= {"jam_breaks_N": 5.0, "soft_stop_stiffness_N_per_m": 1e4, "envelope_above_g": 2.0}
+    services |= {"envelope_below_g": 0.5, "envelope_push_N_per_g": 20.0}
     given = flown({**services, "envelope_N_per_g": 20.0})
     assert given.channels[: len(plain.channels)] == plain.channels
     assert given.channels[len(plain.channels) :] == service_channels("column")
@@ -285,7 +292,9 @@ def test_a_flying_rig_is_led_and_read_by_one_function() -> None:
         lead(controls, ["column"], "column", service, 0.5)
         assert led(controls, ["column"], "column", service) == 0.5
     assert controls["state"]["services"]["on"][0]
-    assert noted(controls, ["column"], ["column"]).shape == (len(service_channels("column")),)
+    row = np.ones((1, len(service_channels("column"))))
+    noted(controls, ["column"], ["column"], row)
+    assert not row.any()  # nothing is recorded before the first frame
     assert "trim_rad" in services_of("wheel")
     assert len(services_of("wheel")) == len(LED)
 
