@@ -132,8 +132,8 @@ def test_switches_marks_and_stop_act_at_their_frame() -> None:
 def test_what_is_led_on_a_rig_without_services_is_recorded_as_a_runs_events_are() -> None:
     """The rig file gives no services; led from outside, they have a batch flight's own bytes."""
     led = [("trim_m", 0.5, 0.02), ("feel_lost", 1.0, 0.4), ("jammed", 1.5, 1.0)]
-    pull = {"column": Step(force_N=30.0, start_s=0.2)}
-    plain = replace(rig_live("report-column", 2.0), pilots=pull)
+    plain = rig_live("report-column", 2.0)
+    plain = replace(plain, pilots={"column": Step(force_N=30.0, start_s=0.2)})
     events = {name: Event(service=name, control="column", at=at, to=to) for name, at, to in led}
     batch = fly(replace(plain, conditions=Conditions(event=events)))
     words = [(at, Word("lead", name, "column", to)) for name, at, to in led]

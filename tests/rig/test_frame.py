@@ -118,6 +118,25 @@ def test_a_wrong_scale_is_read_and_used_by_the_host() -> None:
     assert record["column_estimate_m"][-1] / record["column_deflection_m"][-1] == pytest.approx(1.1)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_stop_is_recorded_while_it_is_pressed_and_not_where_friction_holds(side: float) -> None:
+    """At a stop F − G·travel is taken by the stop beyond the friction, and by friction within."""
+    friction = 10.0
+    eased = 560.0 * 0.1778 + 0.5 * friction
+    hand = {
+        "kind": "table",
+        "time_s": [0.0, 0.5, 3.0, 3.1, 6.0],
+        "force_N": [0.0, side * 150.0, side * 150.0, side * eased, side * eased],
+    }
+    changes = {"friction_N": friction, "bend_m_per_N": 0.0}
+    record = run(hand, changes, q=0.0)
+    stop, leaning = record["column_stop"], slice(200, 300)
+    assert np.all(record["column_computed_m"][200:] == side * 0.1778)
+    assert np.all(stop[leaning] == side)
+    assert not stop[320:].any()
+    assert not stop[:50].any()
+
+
 @pytest.mark.parametrize("multiplier", ["hybrid", "digital"])
 def test_the_breakouts_term_is_given_once(multiplier: str) -> None:
     """F = F_BO + G·δ at rest, whoever makes the product: the digital one holds F_extra itself."""

@@ -16,7 +16,7 @@ from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Step
 from coupled.record.record import Record
 from coupled.rig.packing import pack
-from coupled.rig.serving import LED, lead, led, noted, service_channels, services_of
+from coupled.rig.serving import LED, check_led, lead, led, noted, service_channels, services_of
 from coupled.schema import build
 from tests.support.rigs import bench
 
@@ -188,8 +188,11 @@ def test_a_jam_holds_control_and_surface_whatever_the_structure_gives() -> None:
     }
     record = flown({}, events, 40.0, 6.0, rig=BENT)
     held = slice(20, 300)
-    for name in ("computed_m", "surface_norm", "asked_m"):
+    for name in ("computed_m", "surface_norm", "asked_m", "stop"):
         assert not record[f"column_{name}"][held].any()
+    pushed = flown({}, {"jam": {"service": "jammed", "at_s": 0.2}}, -40.0)
+    assert not pushed["column_computed_m"].any()
+    assert not pushed["column_stop"].any()  # a jam is no stop
     assert at(record, "deflection_m", 2.9) == pytest.approx(9e-5 * 40.0, rel=1e-6)
     assert at(record, "estimate_m", 2.9) == pytest.approx(9e-5 * 40.0, rel=1e-6)
     assert at(record, "asked_m", 5.9) == pytest.approx(at(record, "deflection_m", 5.9), rel=1e-3)
@@ -297,6 +300,41 @@ def test_a_flying_rig_is_led_and_read_by_one_function() -> None:
     assert not row.any()  # nothing is recorded before the first frame
     assert "trim_rad" in services_of("wheel")
     assert len(services_of("wheel")) == len(LED)
+
+
+def test_only_an_autopilot_that_engages_takes_the_place_where_the_control_is() -> None:
+    controls = pack(bench(STRAIGHT))
+    state = controls["state"][0]
+    state["loader"]["computed"] = 0.03
+
+    def holds_at(service: str, value: float) -> float:
+        lead(controls, ["column"], "column", service, value)
+        return led(controls, ["column"], "column", "autopilot_m")
+
+    assert holds_at("autopilot_m", 0.01) == 0.01
+    assert holds_at("shaker", 1.0) == 0.01
+    assert holds_at("autopilot", 0.5) == 0.01  # half is not engaged
+    assert holds_at("autopilot", 1.0) == 0.03
+    state["loader"]["computed"] = 0.04
+    assert holds_at("autopilot", 0.9) == 0.03  # engaged already
+    assert holds_at("autopilot", 0.0) == 0.03
+
+
+def test_a_switch_is_led_from_0_to_1_and_a_place_within_the_travel() -> None:
+    given = {**DRIVEN, **OTHER, "shaker_N": 1.0, "pusher_N": 1.0}
+    rig = bench({**STRAIGHT, **{f"{PLACE}.services.{key}": to for key, to in given.items()}})
+    travel = rig.controls["column"].travel
+    switches = {"trim_release", "autopilot", "disconnected", "jammed", "other_jammed"}
+    switches |= {"shaker", "pusher", "feel_lost"}
+    ends = dict.fromkeys(switches, (0.0, 1.0))
+    ends |= dict.fromkeys(("trim_m", "autopilot_m"), (-travel, travel))
+    for service in services_of("column"):
+        low, high = ends.get(service, (-1e3, 1e3))
+        for to in (low, high):
+            check_led(rig, "column", service, to, "test", "event.it")
+        for to in (low - 0.05, high + 0.05) if service in ends else ():
+            with pytest.raises(InputError, match=r"event\.it\.to"):
+                check_led(rig, "column", service, to, "test", "event.it")
 
 
 @pytest.mark.parametrize(
