@@ -82,19 +82,19 @@ EFFECTS: tuple[Effect, ...] = (
     one(
         "airframe",
         "pitch_stiffness",
-        factor("flight.pitch_stiffness", 1.2),
+        factor("flight.pitch_stiffness", 1.1),
         *("alpha", "pitch_rate", "loop", 4.0),
     ),
     one(
         "airframe",
         "lift_slope",
-        factor("flight.lift_slope", 0.9, 0.2, 5.0),
+        factor("flight.lift_slope", 0.97, 0.2, 5.0),
         *("alpha", "load_answer", "loop", 4.0),
     ),
     one(
         "airframe",
         "mass",
-        factor("flight.mass", 1.1, 0.3, 3.0),
+        factor("flight.mass", 1.03, 0.3, 3.0),
         *("alpha", "load_answer", "loop", 4.0),
     ),
     replace(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.openloop import about, fly_open_loop
-from coupled.gap.output import memory, white
+from coupled.gap.output import heard, memory, white
 from coupled.gap.smooth import smoothed
 from coupled.gap.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
 from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_SINCE, TRIM_FLIGHT_s, TRIM_LAGS_s, TRIM_s
@@ -80,7 +80,9 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     measured = record[surface_channel(control)]
     held = about(own_trim(rig, control), filed_trim(rig, control), points)
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
-    return float(np.mean(left)), white(measured) / np.sqrt(rows - 1)
+    noise = heard(measured)
+    crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # how few values coloured noise has
+    return float(np.mean(left)), noise.rms * float(np.sqrt(crowded / (rows - 1)))
 
 
 def _followed(rig: Rig, record: Record, control: ControlName, own: float, there: float) -> float:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.gap.airframe import TRIM, airframe_outputs
+from coupled.gap.case import Case
 from coupled.gap.effect import apply
 from coupled.gap.library import BY_NAME
 from coupled.gap.openloop import Moved, about, command_of, fly_open_loop
@@ -18,6 +21,7 @@ from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
+from tests.support.models import edited_model
 
 POINTS = (np.array([-1.0, -0.25, 1.0]), np.array([-0.25, 0.05, 0.3]))  # a kink off trim
 FILED = 0.1  # where the surface stands at no command
@@ -104,3 +108,24 @@ def test_an_aircraft_that_does_not_trim_is_far_off_and_no_fault(tmp_path: Path, 
     outputs = airframe_outputs(rig, record)
     far = real(rig, "mass", 3.0)
     assert all(output.gap(far) > 100.0 for output in outputs)
+
+
+@pytest.mark.slow
+def test_a_mass_is_fitted_where_the_model_soon_ceases_to_trim(tmp_path: Path, rig: Rig) -> None:
+    """A T-37 without lift at no angle of attack trims at up to 1.105 of its weight here."""
+
+    def edit(aerodynamics: ET.Element) -> None:
+        (lift,) = [
+            f for f in aerodynamics.iter("function") if f.get("name", "").endswith("CLalpha")
+        ]
+        (data,) = list(lift.iter("tableData"))
+        rows = [[float(x) for x in line.split()] for line in (data.text or "").split("\n")]
+        data.text = "\n".join(f"{row[0]} {row[1] - 0.08}" for row in rows if row)
+
+    models = edited_model(tmp_path, "T37", edit)
+    weak = rig.changed({"flight.model_folder": str(models)})
+    record = made(tmp_path, weak, {"mass": {"factor": 1.05}}, 4)
+    found = Case(weak, "column", airframe_outputs(weak, record)).fit([BY_NAME["mass"]])
+    assert found.values["mass.factor"] == pytest.approx(1.05, abs=2e-3)
+    with pytest.raises(InputError, match="does not trim"):
+        own_trim(real(weak, "mass", 1.15), "column")

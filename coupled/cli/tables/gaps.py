@@ -82,14 +82,15 @@ def print_closed_loop(console: Console, channels: Sequence[ChannelAgain]) -> Non
 
 def print_in_flight(console: Console, effects: Sequence[EffectInFlight]) -> None:
     """Print what leaving each effect out does to the flight, and its share of what all do."""
-    channels = list(effects[0].changes)
-    table = Table("what it does to the flight", box=None)
+    table = Table("in flight", box=None)
     table.add_column("share", justify="right")
-    for name in channels:
-        table.add_column(name, justify="right")
+    table.add_column("channel")
+    for head in ("changes by", "of its motion"):
+        table.add_column(head, justify="right")
     for one in effects:
-        changes = [f"{one.changes[n]:.3g} ({100 * one.of_motion[n]:.3g} %)" for n in channels]
-        table.add_row(plain(one.name), f"{100 * one.share:.0f} %", *changes)
+        for i, (name, by) in enumerate(one.changes.items()):
+            first = ("", "") if i else (plain(one.name), f"{100 * one.share:.0f} %")
+            table.add_row(*first, name, f"{by:.3g}", f"{100 * one.of_motion[name]:.3g} %")
     console.print()
     console.print(table)
 
