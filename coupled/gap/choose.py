@@ -8,19 +8,19 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from coupled.gap.candidates import fitted_candidates, imitating
-from coupled.gap.case import Case, Tell
+from coupled.gap.case import Case
 from coupled.gap.effect import Effect, apply
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.information import says_nothing
 from coupled.gap.library import BY_NAME, EFFECTS
-from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     FAINT_GAP,
     LAW_GAIN,
@@ -32,8 +32,6 @@ from coupled.gap.thresholds import (
     SIMPLER_SHARE,
 )
 from coupled.gap.twolaws import even_reading, yielding_reading
-from coupled.record.channels import ControlName
-from coupled.rig.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -60,17 +58,8 @@ class Choice:
     rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
 
 
-def search(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    library: Sequence[Effect] = EFFECTS,
-    tell: Tell | None = None,
-    refloored: Callable[[Rig], Sequence[Output]] | None = None,
-    only_wide: bool = False,
-) -> Choice:
-    """Return the effects that explain a record's gap, each earning its place in turn."""
-    case = Case(nominal, control, outputs, tell, refloored, only_wide)
+def searched(case: Case, library: Sequence[Effect]) -> Choice:
+    """Return the effects of a library that explain a case's gap, each earning its place in turn."""
     settled = current = case.fit(())
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []

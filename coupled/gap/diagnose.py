@@ -19,13 +19,15 @@ from coupled.gap.case import Case, Tell
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.choose import Choice, search
+from coupled.gap.choose import Choice
 from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.drives import as_driven
 from coupled.gap.effect import Effect
 from coupled.gap.healthy import Baseline
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Hides, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.result import StageResult
+from coupled.gap.search import search
 from coupled.gap.shrink import floors_of, shrink
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
@@ -59,6 +61,7 @@ def diagnose(
         case = Case(rig, control, well.outputs)
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
+    rig = as_driven(rig, records.values(), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
@@ -201,6 +204,8 @@ class _Judge:
         each = [reader.missing() for reader in self.readers]
         shared = {s: tuple(n) for s, n in each[0].items() if all(s in m for m in each)}
         shared.pop("multiplier", None)
+        if self.readers[0].set_points:
+            shared.pop("loader", None)
         if self.rig.flight is None:
             shared.pop("surface", None)
         return shared
@@ -222,6 +227,8 @@ class _Judge:
     def _without_output(self, name: str) -> StageResult | None:
         """Return a stage that no output judges, None where the rig has none of it."""
         flown = self.rig.flight is not None
+        if name == "loader":
+            return StageResult(name, why="δc is a set point")
         if name == "schedule":
             return StageResult(name, why="constant gradient")
         if name == "surface" and flown:

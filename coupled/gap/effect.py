@@ -153,6 +153,7 @@ class Effect:
     `even`         two effects, friction and a force, that together are the same law
     `sample_error` relative standard error of its number, from what little of it a record meets
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
+    `reserve`      it passes for others: only tried where without it a stage stays unexplained
     """
 
     name: str
@@ -170,6 +171,7 @@ class Effect:
     even: tuple[str, str] | None = None
     sample_error: Callable[[Record, float], float] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
+    reserve: bool = False
 
     @property
     def free(self) -> tuple[Parameter, ...]:

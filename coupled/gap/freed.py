@@ -34,10 +34,12 @@ def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str,
     A basic gradient of 0 is no spring, and stays so.
     """
     fields = {f: key for key, f in _fields(rig, control, "loader").items()}
-    loader = rig.controls[control].loader
+    loader, drive = rig.controls[control].loader, rig.controls[control].drive
     found = []
     for stage, names in USUAL.items():
         wanted = names if stage in stages else ()
+        if stage == "linkage" and drive == "setpoint":
+            wanted = (*wanted, "servo_delay")  # of a bus, or of the servo's own cycle
         absent = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
         found += [f"loader.{fields[name]}" for name in wanted if name not in absent]
     return tuple(found)

@@ -89,6 +89,22 @@ LINKAGE: tuple[Effect, ...] = (
         limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-3, 10, 0.1, 0.18),
         *("speed", "servo_speed", "law", 1.5),
     ),
+    # A servo that was fitted without its dead time is too slow: its frequency is found again.
+    Effect(
+        "servo_delay",
+        "linkage",
+        (
+            added("delay_s", "loader.servo_delay_s", 0, 0.45, 0.02, 0.05, 0.1),
+            replace(
+                factor("loader.servo_frequency_Hz", 1.0),
+                starts=(1.0, 3.0, 8.0),
+                scanned=False,
+                may_end=True,
+            ),
+        ),
+        Signature("speed", "deflection_left", "law", 0.8),
+        reserve=True,
+    ),
     one(
         "linkage",
         "arc_geometry",

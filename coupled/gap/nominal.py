@@ -19,6 +19,7 @@ from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.case import Tell
 from coupled.gap.checks import check_record
+from coupled.gap.drives import as_driven
 from coupled.gap.effect import Effect
 from coupled.gap.fit import Fit, fit, touched
 from coupled.gap.freed import default_keys, freed
@@ -54,6 +55,7 @@ def fit_nominal(
     the stages that the records judge. The rig's `tolerance` holds half of each one's 95 % interval.
     Raises InputError where a record is of another rig, or no record depends on a key.
     """
+    rig = as_driven(rig, records.values(), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
     readers = [

@@ -78,7 +78,28 @@ class Reading:
             "surface": [self.name_of("estimate"), PRESSURE, self.surface],
         }
         lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        if self.set_points:  # a bend is not to be seen without the force, but all else
+            needless = self.name_of("force")
+            lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
         return {stage: names for stage, names in lacking.items() if names}
+
+    @property
+    def set_points(self) -> bool:
+        """Whether δc is a number that is commanded, so that there is no loader to judge."""
+        return self.rig.controls[self.control].drive == "setpoint"
+
+    def commanded(self) -> tuple[Floats, Noise]:
+        """Return δc as it drives the linkage, and its noise: a set point has none."""
+        computed = self.signal("computed")
+        if self.set_points:
+            return computed, Noise(0.0)
+        return smoothed(computed), self.heard("computed")
+
+    def pulled(self) -> tuple[Floats, Noise]:
+        """Return F as it drives the linkage, and its noise; none where the record lacks it."""
+        if self.name_of("force") not in self.record:
+            return np.zeros(len(self.record)), Noise(0.0)
+        return smoothed(self.signal("force")), self.heard("force")
 
     def name_of(self, quantity: str) -> str:
         """Return the name of a quantity's channel."""

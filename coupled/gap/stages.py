@@ -72,6 +72,8 @@ class Reader(Reading):
             "compensation": self._compensation,
             "surface": self._surface,
         }
+        if self.set_points:
+            del makers["loader"], makers["multiplier"]
         found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
         return [out for out in found if np.isfinite(out.floor) and out.floor > 0.0]
 
@@ -218,11 +220,11 @@ class Reader(Reading):
         return [self._made("multiplier", name, product, predict, noisy, own)]
 
     def _linkage(self) -> list[Output]:
-        computed, force, measured = map(self.signal, ("computed", "force", "deflection"))
-        levels = self.heard("computed"), self.heard("force")
-        smooth, smooth_force = map(smoothed, (computed, force))
+        computed, measured = self.signal("computed"), self.signal("deflection")
+        (smooth, level), (smooth_force, force_level) = self.commanded(), self.pulled()
         others = {name: smoothed(signal) for name, signal in self.others().items()}
-        noise = passed_noise(self.rig, (computed, force), levels)
+        force = self.signal("force") if self.name_of("force") in self.record else smooth_force
+        noise = passed_noise(self.rig, (computed, force), (level, force_level))
 
         def driven(c: Floats, f: Floats) -> Predict:
             nodes = on_nodes(self.rig, c)
@@ -235,8 +237,8 @@ class Reader(Reading):
             return lambda rig: unratcheted(rig, self.control, at)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            f = with_error(smooth_force, k + NOISE_TRIES, levels[1])
-            return driven(with_error(smooth, k, levels[0]), f)(rig)
+            f = with_error(smooth_force, k + NOISE_TRIES, force_level)
+            return driven(with_error(smooth, k, level), f)(rig)
 
         made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
         return [self._made("linkage", self.name_of("deflection"), *made, "computed")]

@@ -67,6 +67,12 @@ SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps s
 HEALTHY_ALONE = 0.3  # chosen: relative scatter of a model's error where one record shows it
 HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is as it was
 
+# What drives a machine (`drives`).
+HELD_JUMPS = 20  # chosen: fewer changes do not show that a signal comes in set points
+HELD_AT_MOST = 10  # chosen: frames between two changes, beyond which the machine paused
+HELD_SHARE = 0.98  # chosen: of the changes with a pause before the next
+HELD_STEPS = 3.0  # chosen: least steps that the usual change has; of a slow sensor it is one
+
 # Inputs of the stages (`stages`, `airframe`, `surfaces`).
 ECHO_SHARE = 0.1  # of G_T's noise that echoes q̄'s, from which the host made it of q̄ as recorded
 PRELOAD_UNSURE = 8.0  # chosen: of a channel's noise about neutral, where the preload's side is open

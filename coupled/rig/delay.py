@@ -1,4 +1,4 @@
-"""Delay: the pilot's force reaches the loader late, straight between past nodes."""
+"""Delay: what a stage is given reaches it late, straight between past nodes."""
 
 from __future__ import annotations
 
@@ -14,33 +14,37 @@ from coupled.rig.parameters import DELAY_SLOTS
 class DelayParameters(Protocol):
     """How late it is."""
 
-    delay_substeps: float  # transport delay over the substep
+    delay_substeps: float  # the delay over the substep
 
 
 class DelayState(Protocol):
     """What is on its way."""
 
-    delayed: float  # the pilot's force as the loader has it, N
+    delayed: float  # as the stage has it
+    before_start: float  # what was there before the first node
     node: int  # substeps since the start
-    history: NDArray[np.float64]  # the pilot's force at past nodes, N
+    history: NDArray[np.float64]  # at past nodes
 
 
 @stage
-def start_delay(p: DelayParameters, s: DelayState, force: float) -> None:
-    """Begin with the pilot's force at the first node, N, and none before it."""
-    s.history[0] = force
-    s.delayed = force if p.delay_substeps == 0.0 else 0.0
+def start_delay(p: DelayParameters, s: DelayState, given: float, before: float) -> None:
+    """Begin with what is given at the first node, and what was there before it."""
+    s.history[0] = given
+    s.before_start = before
+    s.delayed = given if p.delay_substeps == 0.0 else before
 
 
 @stage
-def delayed(p: DelayParameters, s: DelayState, force: float) -> float:
-    """Return the force at the next node, N, as the loader gets it."""
+def delayed(p: DelayParameters, s: DelayState, given: float) -> float:
+    """Return what is given at the next node as the stage gets it."""
     s.node += 1
     if p.delay_substeps == 0.0:
-        return force
-    s.history[s.node & (DELAY_SLOTS - 1)] = force
+        return given
+    s.history[s.node & (DELAY_SLOTS - 1)] = given
     whole = int(p.delay_substeps)
     share = p.delay_substeps - whole
-    late = s.history[(s.node - whole) & (DELAY_SLOTS - 1)] if s.node >= whole else 0.0
-    later = s.history[(s.node - whole - 1) & (DELAY_SLOTS - 1)] if s.node > whole else 0.0
+    late = s.history[(s.node - whole) & (DELAY_SLOTS - 1)] if s.node >= whole else s.before_start
+    later = (
+        s.history[(s.node - whole - 1) & (DELAY_SLOTS - 1)] if s.node > whole else s.before_start
+    )
     return (1.0 - share) * late + share * later

@@ -1,6 +1,9 @@
 """Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
 
-    servo      x'' = ω²·(δc − x) − 2ζω·x',    |x'| ≤ rate limit
+    servo      x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit;  u is δc as `command`
+               gives it, late or in set points. p = 0: a servo on position, of second order,
+               and with ζ far above 1 a proportional one, of first; p = 1: a PI controller of the
+               error e, x' = 2ζω·e + ω²·∫e
     backlash   the grip's side follows x once it has taken up the play; with a contact that yields
                the force moves it against spring and damper of the contact, which holds beyond the
                play alone: k·τ·z' + k·(|z| − play/2)·sgn(z) = F, δ = x + z
@@ -26,14 +29,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.rig.command import CommandParameters, CommandState, commanded
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Given
+from coupled.rig.parameters import DELAY_SLOTS
 
 CONTACT_s = 2e-3  # chosen: damping of a play's contact over its stiffness
 SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
 
 
-class LinkageParameters(Protocol):
+class LinkageParameters(CommandParameters, Protocol):
     """Servo, play, structure and grip."""
 
     position: NDArray[np.float64]  # weights of (x, x', δc before, δc after) in the next x
@@ -53,7 +58,7 @@ class LinkageParameters(Protocol):
     arc_length: float  # L of the grip's arc, d; 0 where the transducer reads δ itself
 
 
-class LinkageState(Protocol):
+class LinkageState(CommandState, Protocol):
     """The servo, and the grip's side of the play."""
 
     position: float  # x, d
@@ -67,11 +72,14 @@ class LinkageState(Protocol):
     others: float  # what the other controls' forces bend here, d
 
 
-def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDArray[np.float64]:
+def servo_weights(
+    omega_rad_per_s: float, damping_ratio: float, h: float, rate_share: float = 0.0
+) -> NDArray[np.float64]:
     """Return the servo's exact one-substep map, shape (2, 4).
 
     Rows give (x, x') after h seconds from (x, x', δc before, δc after), δc running
-    straight between. Behind a ramp u₀ + s·t the servo settles at x = u₀ + s·t − 2ζs/ω, x' = s,
+    straight between. Behind a ramp u₀ + s·t the servo settles at x = u₀ + s·t − 2ζ(1 − p)s/ω,
+    x' = s, where p is the share of the command's rate that it is given,
     and what it starts away from that fades as the free servo does.
     """
     w, z = omega_rad_per_s, damping_ratio
@@ -82,7 +90,7 @@ def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDA
     if abs(turn) * h > SMALL:
         swing = ((ahead - behind) / (2j * turn)).real
     free = np.array([[wave + z * w * swing, swing], [-w * w * swing, wave - z * w * swing]])
-    lag = 2.0 * z / w
+    lag = 2.0 * z * (1.0 - rate_share) / w
     # Columns: what u₀ and what s do to (x, x').
     level = np.array([1.0, 0.0]) - free[:, 0]
     ramp = np.array([h - lag, 1.0]) - free @ np.array([-lag, 1.0])
@@ -92,7 +100,7 @@ def servo_weights(omega_rad_per_s: float, damping_ratio: float, h: float) -> NDA
 def _servo(g: Given) -> NDArray[np.float64]:
     loader = g.control.loader
     omega = 2.0 * math.pi * loader.servo_frequency
-    return _weights(omega, loader.servo_damping_ratio, g.substep_s)
+    return _weights(omega, loader.servo_damping_ratio, g.substep_s, loader.servo_rate_share)
 
 
 def _push(g: Given) -> float:
@@ -115,6 +123,8 @@ LINKAGE = Declaration(
     layout(LinkageParameters, position=(4,), speed=(4,), mode_position=(4,), mode_speed=(4,)),
     section="control.loader",
     derived={
+        "held": lambda g: g.control.drive == "setpoint",
+        "delay_substeps": lambda g: g.control.loader.servo_delay / g.substep_s,
         "position": lambda g: _servo(g)[0],
         "speed": lambda g: _servo(g)[1],
         "rate_limit": lambda g: g.control.loader.servo_rate_limit,
@@ -134,7 +144,7 @@ LINKAGE = Declaration(
         ),
         "arc_length": lambda g: g.control.length if g.control.loader.arc_geometry else 0.0,
     },
-    state=layout(LinkageState),
+    state=layout(LinkageState, history=(DELAY_SLOTS,)),
 )
 
 
@@ -143,10 +153,11 @@ def move_linkage(
     p: LinkageParameters, s: LinkageState, computed_before: float, computed: float, h: float
 ) -> None:
     """Advance servo and play over a substep of h seconds in which δc moves as given, d."""
+    before, after = commanded(p, s, computed_before, computed)
     a, b = p.position, p.speed
     x, v = s.position, s.rate
-    s.position = a[0] * x + a[1] * v + a[2] * computed_before + a[3] * computed
-    s.rate = b[0] * x + b[1] * v + b[2] * computed_before + b[3] * computed
+    s.position = a[0] * x + a[1] * v + a[2] * before + a[3] * after
+    s.rate = b[0] * x + b[1] * v + b[2] * before + b[3] * after
     if p.rate_limit > 0.0:
         s.rate = min(max(s.rate, -p.rate_limit), p.rate_limit)
         step = p.rate_limit * h

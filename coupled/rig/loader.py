@@ -98,7 +98,7 @@ def set_external(p: LoaderParameters, s: LoaderState, load_factor: float) -> Non
 def start_loader(p: LoaderParameters, s: LoaderState, force: float) -> None:
     """Begin at rest with the pilot's force at the first node, N, and none before it."""
     s.mass, s.damping = p.mass, p.damping
-    start_delay(p, s, force + s.leaked)
+    start_delay(p, s, force + s.leaked, 0.0)
 
 
 @stage

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.rig.command import take_set_point
 from coupled.rig.compiled import stage
 from coupled.rig.control import ControlParameters, ControlState
 from coupled.rig.gauge import gauge_force, move_gauge
@@ -60,6 +61,7 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
     """Set what holds over a frame; return whether the hand does no more than its script."""
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
+    take_set_point(p.linkage, s.linkage, s.loader.computed)
     if s.services.on:
         set_base(s.services, s.loader)
     stopped = p.reach.reach > 0.0

@@ -51,6 +51,8 @@ class Loader(Section):
     modifying_lag: float = quantity("s", 0.0, ge=0, le=10)
     servo_frequency: float = quantity("Hz", gt=0)
     servo_damping_ratio: float = quantity("", gt=0)
+    servo_delay: float = quantity("s", 0.0, ge=0, le=0.5)
+    servo_rate_share: float = quantity("", 0.0, ge=0, le=1)
     servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)
     bend: float = quantity("{d}_per_N", 0.0, ge=0)
     bend_push: float | None = quantity("{d}_per_N", None, ge=0)
@@ -213,6 +215,7 @@ class Control(Section):
     """One control of the rig."""
 
     surface: Literal["elevator", "aileron", "rudder"]
+    drive: Literal["force", "displacement", "setpoint"] = "force"
     travel: float = quantity("{d}", gt=0)
     length: float = quantity("m", 0.0, ge=0)
     loader: Loader

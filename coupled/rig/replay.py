@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from coupled.rig.command import start_command, take_set_point
 from coupled.rig.compensation import estimate
 from coupled.rig.compiled import entry
 from coupled.rig.frame import set_product
@@ -272,9 +273,11 @@ def _linkage(
 ) -> Floats:
     p, s = parameters[0].linkage, states[0].linkage
     start_bend(p, s, force[0])
+    start_command(p, s, computed[0])
     for k in range(len(force)):
         s.others = others[k]
         out[k] = transducer(p, deflection(p, s, force[k]))
+        take_set_point(p, s, computed[k * substeps])
         if k + 1 < len(force):
             for node in range(k * substeps, (k + 1) * substeps):
                 move_linkage(p, s, computed[node], computed[node + 1], h)

@@ -144,6 +144,12 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.loader.delay_s", "is too long for this loader_rate_Hz; lower either"
         )
+    if loader.servo_delay * rig.frame_rate * rig.substeps > DELAY_SLOTS - 2:
+        raise InputError(
+            file,
+            f"{path}.loader.servo_delay_s",
+            "is too long for this loader_rate_Hz; lower either",
+        )
     if loader.arc_geometry and d == "rad":
         raise InputError(
             file, f"{path}.loader.arc_geometry", "a wheel's deflection is an angle already"

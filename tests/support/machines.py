@@ -85,3 +85,58 @@ def duffing_rig(rate_Hz: float = 100.0, damping: float = DAMPING, cubic: float =
     """Return the rig of that oscillator."""
     numbers = {"mass_kg": MASS_kg, "damping_N_s_per_m": damping, "cubic_N_per_m3": cubic}
     return plain_rig(rate_Hz, numbers, STIFFNESS)
+
+
+def set_points(rate_Hz: float, seconds: float, seed: int, every: int = 1) -> Floats:
+    """Return a servo's set points in m: sines of some periods and holds, new each `every` rows."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(seconds * rate_Hz)) // every * every / rate_Hz
+    wave = np.zeros_like(times)
+    for size, at_Hz in ((0.1, 0.11), (0.06, 0.37), (0.03, 0.9), (0.015, 1.7)):
+        wave += size * np.sin(2.0 * np.pi * at_Hz * times + rng.uniform(0.0, 6.0))
+    return np.asarray((wave - wave[0]) * np.clip(times, 0.0, 1.0))
+
+
+def servo(
+    commands: Floats,
+    rate_Hz: float = 50.0,
+    frequency_Hz: float = 6.0,
+    damping_ratio: float = 0.8,
+    delay_s: float = 0.06,
+    play_m: float = 0.02,
+    count_m: float = 1.5e-3,
+) -> Record:
+    """Return a record of a servo that holds set points, with dead time, play and an encoder.
+
+    Runge and Kutta's fourth order at 4 kHz; the play is a dead zone that the output sits in.
+    """
+    fine, way, speed, out = 4000.0, 0.0, 0.0, 0.0
+    steps, omega = round(fine / rate_Hz), 2.0 * np.pi * frequency_Hz
+    late = round(delay_s * fine)
+    wanted = np.concatenate((np.full(late, commands[0]), np.repeat(commands, steps)))
+    read, h = np.empty(len(commands)), 1.0 / fine
+
+    def pull(x: float, v: float, u: float) -> float:
+        return float(omega * omega * (u - x) - 2.0 * damping_ratio * omega * v)
+
+    for k, u in enumerate(wanted[: len(commands) * steps].tolist()):
+        if k % steps == 0:
+            read[k // steps] = out
+        a1 = pull(way, speed, u)
+        a2 = pull(way + 0.5 * h * speed, speed + 0.5 * h * a1, u)
+        v2 = speed + 0.5 * h * a1
+        a3 = pull(way + 0.5 * h * v2, speed + 0.5 * h * a2, u)
+        v3 = speed + 0.5 * h * a2
+        a4 = pull(way + h * v3, speed + h * a3, u)
+        way += h * (speed + 2.0 * v2 + 2.0 * v3 + speed + h * a3) / 6.0
+        speed += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+        out = min(max(out, way - 0.5 * play_m), way + 0.5 * play_m)
+    counted = count_m * np.round(read / count_m) if count_m else read
+    return recorded(rate_Hz, computed_m=commands, deflection_m=counted)
+
+
+def servo_rig(rate_Hz: float = 50.0, frequency_Hz: float = 6.0, drive: str = "setpoint") -> Rig:
+    """Return the rig of that servo, without dead time and play."""
+    numbers = {"servo_frequency_Hz": frequency_Hz, "servo_damping_ratio": 0.8}
+    rig = plain_rig(rate_Hz, numbers)
+    return rig.changed({"controls.column.drive": drive})

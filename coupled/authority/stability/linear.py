@@ -95,6 +95,7 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     a[_COMPUTED, _RATE] = a[_POSITION, _SPEED] = 1.0
     a[_RATE, :2] = -stiffness / loader.mass, -loader.damping / loader.mass
     a[_SPEED, [_COMPUTED, _POSITION, _SPEED]] = w * w, -w * w, -2.0 * loader.servo_damping_ratio * w
+    a[_SPEED, _RATE] = 2.0 * loader.servo_damping_ratio * w * loader.servo_rate_share
     sensing, free = control.sensing, hand.stiffness == hand.damping == hand.integral == 0.0
     if free and sensing.gauge_mass == 0.0:
         return a[:4, :4].copy()
@@ -104,7 +105,12 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     force -= sensing.gauge_mass * a[_SPEED]
     width, force = _add_amplifier(a, sensing, width, force)
     width, force = _add_lead(a, control.compensation, width, force)
-    late_s = loader.delay + sensing.gauge_delay + 1.0 / (rig.frame_rate * rig.substeps)
+    late_s = (
+        loader.delay
+        + loader.servo_delay
+        + sensing.gauge_delay
+        + 1.0 / (rig.frame_rate * rig.substeps)
+    )
     if sensing.gauge_sampling > 0.0:
         late_s += 0.5 / sensing.gauge_sampling
     # e^(−τs) = 1 − (12/τ)·s/(s² + (6/τ)·s + 12/τ²)

@@ -1,0 +1,49 @@
+"""The search for effects, and a second one with those in reserve where the first leaves a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from coupled.gap.case import Case, Tell
+from coupled.gap.choose import Choice, searched
+from coupled.gap.effect import Effect
+from coupled.gap.library import EFFECTS
+from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+
+
+def search(
+    nominal: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    library: Sequence[Effect] = EFFECTS,
+    tell: Tell | None = None,
+    refloored: Callable[[Rig], Sequence[Output]] | None = None,
+    only_wide: bool = False,
+) -> Choice:
+    """Return the effects that explain a record's gap.
+
+    An effect in reserve passes for others, and takes part in a second search alone, where the
+    first leaves its stage unexplained. The one that leaves less is the answer.
+    """
+    case = Case(nominal, control, outputs, tell, refloored, only_wide)
+    plain = [effect for effect in library if not effect.reserve]
+    found = searched(case, plain)
+    wide = _unexplained(case, found)
+    more = [effect for effect in library if effect.reserve and wide & set(effect.shows_in)]
+    if not more:
+        return found
+    return min((found, searched(case, [*more, *plain])), key=lambda one: _left(case, one))
+
+
+def _unexplained(case: Case, choice: Choice) -> set[str]:
+    """Return the outputs that the effects found leave wider than noise could."""
+    first, limits = stage_gaps(case.outputs, choice.settled.rig), stage_limits(case.outputs)
+    left = case.gaps(choice.fit.rig)
+    return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
+
+
+def _left(case: Case, choice: Choice) -> float:
+    """Return what a choice leaves of all outputs, the sum of their mean squares in floors."""
+    return sum(output.gap(choice.fit.rig) ** 2 for output in case.outputs)
