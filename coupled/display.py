@@ -6,6 +6,7 @@ newtons, or with the system `us` pounds, inches, knots and feet. Files and JSON 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -14,6 +15,7 @@ from coupled.units import (
     POUND_N,
     DEGREE_rad,
     FOOT_m,
+    GRAVITY_m_per_s2,
     INCH_m,
     INCH_PER_POUND_m_per_N,
     KNOT_m_per_s,
@@ -70,6 +72,53 @@ def unit_in(name: str) -> str:
     """Return the unit that a name ends in, as `rad_per_s`; nothing where it has none."""
     ends = [unit for unit in _SI if name == unit or name.endswith(f"_{unit}")]
     return max(ends, key=len, default="")
+
+
+# The same for units as they are written, factor by factor: N·s/m, N/rad.
+_WRITTEN: Final[Mapping[str, Shown]] = {
+    "N": Shown("lb", 1.0 / POUND_N),
+    "m": Shown("in", 1.0 / INCH_m),
+    "rad": Shown("°", 1.0 / DEGREE_rad),
+    "Pa": Shown("(lb/ft²)", 1.0 / PSF_Pa),
+    "kg": Shown("lb", GRAVITY_m_per_s2 / POUND_N),  # of mass
+}
+_FACTOR = re.compile("[A-Za-z]+")
+_POWER: Final[Mapping[str, int]] = {"²": 2, "³": 3}
+
+
+def in_system(unit: str, system: System = "si") -> Shown:
+    """Return what a unit as it is written, `N·s/m`, is shown in; as it is in SI."""
+    if system == "si":
+        return Shown(unit)
+    factor, under, text, end = 1.0, False, "", 0
+    for found in _FACTOR.finditer(unit):
+        between = unit[end : found.start()]
+        under = under or "/" in between
+        one, end = _WRITTEN.get(found[0], Shown(found[0])), found.end()
+        power = _POWER.get(unit[end : end + 1], 1)
+        factor *= one.factor ** (-power if under else power)
+        text += between + one.unit
+    text += unit[end:]
+    return Shown(text[1:-1] if text == "(lb/ft²)" else text, factor)
+
+
+def convert(value: float, unit: str, system: System = "si") -> float:
+    """Return a quantity in the unit that `in_system` shows it in."""
+    return in_system(unit, system).factor * value
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Return a name without its unit, and the unit as it is written: `play_m` is play, m."""
+    words = name.split("_")
+    first = len(words)
+    while first > 1 and words[first - 1] in _PARTS:
+        first -= 1
+    over, _, under = "·".join(words[first:]).partition("per")
+    text = f"{over.strip('·') or '1'}/{under.strip('·')}" if under else over
+    return "_".join(words[:first]), text
+
+
+_PARTS: Final = frozenset(("N", "m", "s", "rad", "kg", "Pa", "V", "g", "Hz", "per", "norm", "bits"))
 
 
 def shown(name: str, system: System = "si") -> Shown:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from coupled.display import System, in_system
 from coupled.record.channels import unit_of
-from coupled.units import POUND_N, DEGREE_rad, INCH_PER_POUND_m_per_N
+from coupled.units import POUND_N, DEGREE_rad, INCH_m, INCH_PER_POUND_m_per_N
 
 if TYPE_CHECKING:
     from coupled.calibration.estimate import Estimate
@@ -22,27 +23,33 @@ HEADS = ("value", "std. error", "95 % interval")
 Row = tuple[str, str, str, str]
 
 
-def rows(found: CalibrationResult) -> Iterator[Row]:
-    """Yield each figure: its label with the unit, value, standard error and 95 % interval."""
+def rows(found: CalibrationResult, system: System = "si") -> Iterator[Row]:
+    """Yield each figure: its label with the unit, value, standard error and 95 % interval.
+
+    K is given in in/lb (°/lb), too, in which its formulas were printed.
+    """
     d, bend = unit_of(found.control), found.line.bend
+    s1, s3, own = (in_system(text, system) for text in (f"V/{d}", "V/N", f"{d}/N"))
     unit, factor = ("in/lb", 1.0 / INCH_PER_POUND_m_per_N)
     if d == "rad":
         unit, factor = ("°/lb", POUND_N / DEGREE_rad)
     a, b = found.printed
     plain = found.plain.bend.scaled(factor)
-    yield _row(f"S1, V/{d}", found.line.s1)
-    yield _row("  ordinary least squares", found.plain.s1)
-    yield ("  normal equations, appendix A", written(a, found.plain.s1.error), "", "")
-    yield _row(f"K, {d}/N", bend)
+    ordinary = found.plain.s1.scaled(s1.factor)
+    yield _row(f"S1, {s1.unit}", found.line.s1.scaled(s1.factor))
+    yield _row("  ordinary least squares", ordinary)
+    yield ("  normal equations, appendix A", written(a * s1.factor, ordinary.error), "", "")
+    if system == "si":
+        yield _row(f"K, {d}/N", bend)
     yield _row(f"K, {unit}", bend.scaled(factor))
     yield _row("  ordinary least squares", plain)
     yield ("  normal equations, appendix A", written(-b / a * factor, plain.error), "", "")
     for name, estimate in found.fit.others.items():
-        yield _row(f"K by {name}, {d}/N", estimate)
-    yield _row("S3, V/N", found.s3)
-    yield _row("  mean of v3/F, eq. (13)", found.s3_mean)
+        yield _row(f"K by {name}, {own.unit}", estimate.scaled(own.factor))
+    yield _row(f"S3, {s3.unit}", found.s3.scaled(s3.factor))
+    yield _row("  mean of v3/F, eq. (13)", found.s3_mean.scaled(s3.factor))
     for i, (way, estimate) in enumerate(found.s2.items()):
-        yield _row(f"{'  ' if i else 'S2, V/N, '}by {way}", estimate)
+        yield _row(f"{'  ' if i else f'S2, {s3.unit}, '}by {way}", estimate.scaled(s3.factor))
 
 
 def basis(found: CalibrationResult) -> str:
@@ -68,7 +75,7 @@ def written(value: float, error: float) -> str:
     return f"{value:#.{min(max(figures, 2), 9)}g}".rstrip(".")
 
 
-def remarks(found: CalibrationResult) -> list[str]:
+def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
     """Return the sentences: residuals, which fit to use, what was left out, what it is worth."""
     line, plain = found.line, found.plain
     size = np.abs(line.residual)
@@ -97,17 +104,19 @@ def remarks(found: CalibrationResult) -> list[str]:
             f"row {s.row} is left out: {s.columns} is {s.deviations:.0f} standard deviations"
             " off, mistyped?"
         )
-    lines += _creep_lines(found) + _accuracy_lines(found) + _arc_lines(found)
+    lines += _creep_lines(found, system) + _accuracy_lines(found, system) + _arc_lines(found)
     lines += [f"stale calibration in the rig file: {change}" for change in found.changed]
     return lines
 
 
-def _creep_lines(found: CalibrationResult) -> list[str]:
+def _creep_lines(found: CalibrationResult, system: System) -> list[str]:
     """Return what the second looks show of a control that crept, and a null from one side."""
     lines = []
     d, factor, unit = unit_of(found.control), 1000.0, "mm"
     if d == "rad":
         factor, unit = 1.0 / DEGREE_rad, "°"
+    elif system == "us":
+        factor, unit = 1.0 / INCH_m, "in"
     rise = found.readings.deflection_rise
     rise = rise[~np.isnan(rise)]
     if len(rise) > 2:
@@ -126,12 +135,13 @@ def _creep_lines(found: CalibrationResult) -> list[str]:
     return lines
 
 
-def _accuracy_lines(found: CalibrationResult) -> list[str]:
+def _accuracy_lines(found: CalibrationResult, system: System) -> list[str]:
     """Return what the figures give to those who fly with them."""
     if found.accuracy is None or found.accuracy.deflection.error == 0.0:
         return []
     off, felt = found.accuracy.deflection, found.accuracy.felt
-    gradient = f"{found.accuracy.gradient:.4g} N/{unit_of(found.control)}"
+    unit = in_system(f"N/{unit_of(found.control)}", system)
+    gradient = f"{unit.written(found.accuracy.gradient)} {unit.unit}"
     text = f"compensated with these, at {gradient} the aircraft gets the deflection to within"
     text += f" {100 * off.half_width:.2g} %"
     if felt is not None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from coupled.calibration.checks import ControlCheck
+from coupled.display import Shown, System, in_system
 from coupled.record.channels import ControlName, unit_of
 
 if TYPE_CHECKING:
@@ -21,15 +22,17 @@ _SURFACE = "surface"
 _SAME = 0.02  # of K: a host's K̂ that is nearer is as good as right
 
 
-def reasons(rig: Rig, name: ControlName, checks: Sequence[ControlCheck]) -> list[str]:
+def reasons(
+    rig: Rig, name: ControlName, checks: Sequence[ControlCheck], system: System = "si"
+) -> list[str]:
     """Return why checks of a rig's control fail, a sentence each; none where all pass."""
     failed = [check for check in checks if not check.passed]
     if not failed:
         return []
     control, d = rig.controls[name], unit_of(name)
-    sentences = _of_the_host(control, d)
+    sentences = _of_the_host(control, in_system(f"{d}/N", system))
     if control.loader.bend > 0.0:
-        sentences += _of_the_bend(control, failed)
+        sentences += _of_the_bend(control, failed, in_system("N", system))
     if not sentences:
         sentences = [
             "The rig file does not say why; docs/calibration.md has a table of which fault fails"
@@ -38,7 +41,7 @@ def reasons(rig: Rig, name: ControlName, checks: Sequence[ControlCheck]) -> list
     return sentences
 
 
-def _of_the_host(control: Control, d: str) -> list[str]:
+def _of_the_host(control: Control, bent: Shown) -> list[str]:
     """Return what the host corrects wrongly or not at all."""
     host, bend, sensing = control.compensation, control.loader.bend, control.sensing
     found = []
@@ -48,7 +51,8 @@ def _of_the_host(control: Control, d: str) -> list[str]:
         found.append("The deflection's correction is off, so the surface lacks the bend K·F.")
     if (host.gradient or host.deflection) and abs(host.bend - bend) > _SAME * max(bend, host.bend):
         found.append(
-            f"The host takes K for {host.bend:.4g} {d}/N, and the structure has {bend:.4g}:"
+            f"The host takes K for {bent.written(host.bend)} {bent.unit}, and the structure has"
+            f" {bent.written(bend)}:"
             " coupled calibrate finds it."
         )
     scales = {
@@ -63,7 +67,7 @@ def _of_the_host(control: Control, d: str) -> list[str]:
     return found
 
 
-def _of_the_bend(control: Control, failed: Sequence[ControlCheck]) -> list[str]:
+def _of_the_bend(control: Control, failed: Sequence[ControlCheck], force: Shown) -> list[str]:
     """Return what a bent structure does that eq. (12) does not give back."""
     found = []
     timed = any(not check.name.startswith((*_FORCE, _SURFACE)) for check in failed)
@@ -77,8 +81,9 @@ def _of_the_bend(control: Control, failed: Sequence[ControlCheck]) -> list[str]:
         )
     pushed = any(check.name.startswith(_FORCE) for check in failed)
     if pushed and control.loader.breakout > 0.0:
+        breakout = f"{force.written(control.loader.breakout)} {force.unit}"
         found.append(
-            f"Force near neutral: within the breakout of {control.loader.breakout:.4g} N the loader"
+            f"Force near neutral: within the breakout of {breakout} the loader"
             " rests while the grip moves by K·F. No correction outside of the loader changes that."
         )
     return found

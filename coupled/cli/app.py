@@ -56,7 +56,7 @@ JsonOption = Annotated[
 UnitsOption = Annotated[
     System,
     typer.Option(
-        "--units", help="What people read: si, or us for lb, in, kt, ft. Files stay in SI."
+        "--units", help="What people read: si, or us for lb, in, kt, ft, °. Files stay in SI."
     ),
 ]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import (
     DEFAULT_RIG,
@@ -21,6 +21,7 @@ from coupled.cli.rigs import (
     rig_and_control,
 )
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say, say_note
+from coupled.display import System, in_system
 from coupled.errors import InputError, shown
 from coupled.files import check_target, write_text
 from coupled.outputs import Outputs
@@ -71,6 +72,7 @@ def calibrate(
     error: ErrorOption = None,
     json_file: JsonOption = "",
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Find S1, S2, S3 and K from readings, with their errors; or plan the readings."""
     file, data, name = rig_and_control(rig or DEFAULT_RIG, control)
@@ -81,7 +83,7 @@ def calibrate(
         if report is not None:
             raise InputError("--plan", "--report", "is for a calibration, not for a plan")
         wanted = (precision / 100.0, strongest, 1 if once else 2, crossed)
-        _plan((file, data, name), tools, wanted, (write, json_file))
+        _plan((file, data, name), tools, wanted, (write, json_file), units)
         _say_default(rig)
         return
     if readings is None:
@@ -99,7 +101,7 @@ def calibrate(
     own = [*inputs, *(path for path in (write, figure) if path)]
     check_json(json_file, [*own, *check_report(report, own)])
     targets = (write, figure, report, json_file)
-    _calibrate(readings, (file, data, name), tools, targets, (date, hardware))
+    _calibrate(readings, (file, data, name), tools, targets, (date, hardware), units)
     _say_default(rig)
 
 
@@ -115,6 +117,7 @@ def _calibrate(
     tools: Instruments,
     targets: tuple[Path | None, Path | None, Path | None, str],
     noted: tuple[str, bool],
+    units: System,
 ) -> None:
     from coupled.calibration.calibrate import calibrate_control as fit
     from coupled.calibration.calibrated import (
@@ -155,7 +158,7 @@ def _calibrate(
                 report, outputs, inputs, lambda made: calibration_report(found, *names, made)
             )
     if json_file != "-":
-        print_calibration(out, found)
+        print_calibration(out, found, units)
         if write is not None:
             unstated = unstated_scales(data.controls[name], found)
             if unstated and not hardware:
@@ -172,6 +175,7 @@ def _plan(
     tools: Instruments,
     wanted: tuple[float, float, int, float],
     targets: tuple[Path | None, str],
+    units: System,
 ) -> None:
     from coupled.calibration.crossed import crossed_forces, crossed_precision
     from coupled.calibration.form import form
@@ -212,12 +216,13 @@ def _plan(
         if write is not None:
             write_text(outputs.at(write), form(chosen, control, looks, held))
         keep_json(table, json_file, outputs)
-    needs = deflection_needs(rig, control, design, tools, looks)
     if json_file != "-":
-        print_plan(out, control, grids, chosen, reached, needs)
+        print_plan(out, control, grids, chosen, reached, needs, units)
         for name, half in terms.items():
-            d = unit_of(control)
-            say(f"with ±{crossed:g} N on the {name}: K by {name} to ±{half:.2g} {d}/N")
+            force, bend = (in_system(u, units) for u in ("N", f"{unit_of(control)}/N"))
+            held_at = f"±{force.factor * crossed:.4g} {force.unit}"
+            reached_to = f"±{bend.written(half, 2)} {bend.unit}"
+            say(f"with {held_at} on the {name}: K by {name} to {reached_to}")
         if write is not None:
             say(f"form: {write}")
     print_json(table, json_file)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from coupled.calibration.documentation import Documentation
     from coupled.calibration.qualification import Issue
     from coupled.calibration.result import CalibrationResult
+    from coupled.display import System
     from coupled.rig.rig import Rig
 
 
@@ -64,6 +65,7 @@ def document(
     revision: Annotated[str, typer.Option(help="Of the document, printed as given.")] = "",
     json_file: JsonOption = "",
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Document a rig's forces: X-Y plots, figure 4, and 14 CFR Part 60 control checks.
 
@@ -114,7 +116,7 @@ def document(
                 report, outputs, inputs, lambda made: force_report(documents, fits, issue, made)
             )
     if json_file != "-":
-        _print(documents, every, bool(travels))
+        _print(documents, every, bool(travels), units)
         say(f"{len(written)} figures and {pdf.name} in {folder}")
         if write is not None:
             say(f"rig: {write}")
@@ -124,15 +126,14 @@ def document(
         raise typer.Exit(1)
 
 
-def _print(documents: Sequence[Documentation], every: bool, judged: bool) -> None:
+def _print(documents: Sequence[Documentation], every: bool, judged: bool, units: System) -> None:
     """Print each control's checks, and why some fail; `judged` is whether surfaces are."""
     from coupled.calibration.reasons import reasons
     from coupled.cli.tables.calibration import print_checks
 
     for found in documents:
-        print_checks(
-            out, found.control, found.checks, every, reasons(found.rig, found.control, found.checks)
-        )
+        why = reasons(found.rig, found.control, found.checks, units)
+        print_checks(out, found.control, found.checks, every, why, units)
     if not judged:
         out.print("no aircraft: the surface's position is not judged\n")
 

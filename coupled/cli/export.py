@@ -11,6 +11,7 @@ from rich.table import Table
 
 from coupled.cli.app import JsonOption, app
 from coupled.cli.progress import progress
+from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, out, say
 from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
@@ -91,7 +92,7 @@ def _say(made: Export, folder: Path, others: list[str]) -> None:
             )
         out.print("by JSBSim alone, off coupled's own flight by (deflection of travel, forces of")
         out.print("the greatest, the authority lost in points):")
-        out.print(table)
+        print_whole(out, table)
     for line in made.left:
         err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
     for line in others:

@@ -13,6 +13,7 @@ from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_stale
+from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target
@@ -170,7 +171,7 @@ def runs(json_file: JsonOption = "") -> None:
         table = Table("run", "rig", "what it shows", box=None, pad_edge=False)
         for name, card in cards.items():
             table.add_row(name, card["rig"], _sentence(card["card"]))
-        out.print(table)
+        print_whole(out, table)
         out.print("\nrigs: " + ", ".join(shipped_rigs()))
     rows = [
         {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()

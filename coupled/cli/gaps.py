@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app, check_cluster
+from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
@@ -18,6 +18,7 @@ from coupled.record.channels import ControlName, control_named
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
+    from coupled.display import System
     from coupled.gap.diagnosis import Diagnosis
     from coupled.record.record import Record
 
@@ -72,6 +73,7 @@ def diagnose(
     ] = "",
     json_file: JsonOption = "",
     report: ReportOption = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
     name = control_named(control, records[0])
@@ -113,7 +115,7 @@ def diagnose(
         keep_json(table, json_file, outputs)
         _report(report, outputs, inputs, whole, power)
     if json_file != "-":
-        _print(whole, power, None if worse else improve, drawn)
+        _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")
@@ -147,8 +149,11 @@ def _diagnose(
     return whole, read
 
 
-def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path]) -> None:
+def _print(
+    whole: Diagnosis, power: bool, written: tuple[Path | None, list[Path]], units: System
+) -> None:
     from coupled.cli.tables.gaps import (
+        in_words,
         print_closed_loop,
         print_effects,
         print_in_flight,
@@ -156,15 +161,16 @@ def _print(whole: Diagnosis, power: bool, improve: Path | None, drawn: list[Path
         print_stages,
     )
 
-    out.print(whole.summary, markup=False, highlight=False)
-    print_effects(out, whole.effects, whole.budget)
+    improve, drawn = written
+    out.print(in_words(whole, units), markup=False, highlight=False)
+    print_effects(out, whole.effects, whole.budget, units)
     print_stages(out, whole.stages)
     if whole.closed_loop is not None:
-        print_closed_loop(out, whole.closed_loop)
+        print_closed_loop(out, whole.closed_loop, units)
     if whole.in_flight is not None:
-        print_in_flight(out, whole.in_flight)
+        print_in_flight(out, whole.in_flight, units)
     if power:
-        print_power(out, whole.power)
+        print_power(out, whole.power, units)
     if improve is not None:
         say(f"improved rig: {improve}")
     for figure in drawn:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from coupled.cli.app import app
+from coupled.cli.app import UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
 from coupled.cli.terminal import say
@@ -32,6 +32,7 @@ def draw_map(
         Path | None,
         typer.Option("--output", "-o", help="Figure, PNG, PDF or SVG.  [default: out/RIG-map.png]"),
     ] = None,
+    units: UnitsOption = "si",
 ) -> None:
     """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot."""
     from coupled.authority.maps import envelope, feel, loss_maps, shipped_flights
@@ -62,11 +63,11 @@ def draw_map(
     maps = {name: loss_maps(data, name) for name in data.controls}
     flown = {name: envelope(records, name) for name in data.controls}
     with Outputs() as outputs:
-        save(draw_losses(data.name, maps, flown), outputs.at(written[0]))
+        save(draw_losses(data.name, maps, flown, units), outputs.at(written[0]))
         losses = (loss_map for of_control in maps.values() for loss_map in of_control)
         write_losses(losses, outputs.at(written[1]))
         if felt is not None:
-            save(draw_feel(data.name, felt), outputs.at(written[2]))
+            save(draw_feel(data.name, felt, units), outputs.at(written[2]))
             write_feel(felt, outputs.at(written[3]))
     if felt is None:
         say("no level trim of a column: no stick force per g or per knot")

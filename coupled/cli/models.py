@@ -13,6 +13,7 @@ from rich.table import Table
 from coupled.cli.app import JsonOption, app
 from coupled.cli.new import new, write_new
 from coupled.cli.progress import progress
+from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, give_json, out
 from coupled.errors import InputError, nearest
 
@@ -65,7 +66,7 @@ def _print(rows: list[Surveyed]) -> None:
             controls = ", ".join(row.controls) or "none"
             controls += "" if row.direct or not row.controls else " (by a law or lag)"
         table.add_row(row.model, where, controls, ", ".join(row.rigs))
-    out.print(table)
+    print_whole(out, table)
     trimmed = [row for row in rows if row.flight is not None]
     led = [row for row in trimmed if row.controls]
     out.print(f"\n{len(trimmed)} of {len(rows)} trim, {len(led)} can be flown by a rig")

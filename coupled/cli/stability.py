@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.rigs import DEFAULT_RIG, say_stale
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
@@ -34,6 +34,7 @@ def stability(
         ),
     ] = None,
     json_file: JsonOption = "",
+    units: UnitsOption = "si",
 ) -> None:
     """Map where a rig is stable, simulated and by linear theory, over K·G_T.
 
@@ -87,7 +88,7 @@ def stability(
         write_planes(data, every, outputs.at(table))
         keep_json(listed, json_file, outputs)
     if json_file != "-":
-        print_limits(out, limits, bob)
+        print_limits(out, limits, bob, units)
         count = sum(len(each.crossings) for each in every)
         say(
             f"{count} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"

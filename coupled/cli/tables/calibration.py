@@ -11,6 +11,8 @@ from rich.table import Table
 
 from coupled.calibration.figures import HEADS, basis, remarks, rows
 from coupled.calibration.qualification import written
+from coupled.cli.tables.whole import print_whole
+from coupled.display import System, convert, in_system
 from coupled.record.channels import unit_of
 
 if TYPE_CHECKING:
@@ -20,19 +22,19 @@ if TYPE_CHECKING:
     from coupled.calibration.result import CalibrationResult
 
 
-def print_calibration(console: Console, found: CalibrationResult) -> None:
+def print_calibration(console: Console, found: CalibrationResult, system: System = "si") -> None:
     """Print what readings tell: the figures, how far to trust them, and which to use."""
     table = Table(box=None, pad_edge=False)
     table.add_column("", no_wrap=True)
     for head in HEADS:
         table.add_column(head, justify="right", no_wrap=True)
-    for row in rows(found):
+    for row in rows(found, system):
         table.add_row(*row)
     console.print(basis(found), highlight=False)
     console.print()
-    console.print(table)
+    print_whole(console, table)
     console.print()
-    for line in remarks(found):
+    for line in remarks(found, system):
         console.print(line, highlight=False, markup=False)
 
 
@@ -43,13 +45,14 @@ def print_plan(
     chosen: Sequence[tuple[Station, int]],
     reached: Precision,
     needs: DeflectionNeeds,
+    system: System = "si",
 ) -> None:
     """Print how precise K gets by grids of readings, and the fewest that reach what is wanted."""
     d = unit_of(control)
+    bend = in_system(f"{d}/N", system)
+    of = f"K = {bend.written(reached.bend)} {bend.unit}"
     console.print(
-        f"95 % interval of K, ± %, for K = {reached.bend:.4g} {d}/N: gradients down,"
-        " deflections across",
-        highlight=False,
+        f"95 % interval of K, ± %, for {of}: gradients down, deflections across", highlight=False
     )
     across = sorted({many for _, many in grids})
     table = Table(box=None, pad_edge=False)
@@ -59,18 +62,22 @@ def print_plan(
     for down in sorted({few for few, _ in grids}):
         cells = [f"{100 * grids[down, many].half_width:.1f}" for many in across]
         table.add_row(str(down), *cells)
-    console.print(table)
+    print_whole(console, table)
     console.print(
         f"\nfewest for ± {100 * reached.half_width:.1f} %: {reached.readings} readings",
         highlight=False,
     )
     table = Table(box=None, pad_edge=False)
-    for head in (f"gradient, N/{d}", "q̄, Pa", f"deflection, {d}", "force, N", "readings"):
-        table.add_column(head, justify="right")
+    units = [in_system(unit, system) for unit in (f"N/{d}", "Pa", d, "N")]
+    words = ("gradient", "q̄", "deflection", "force")
+    for word, unit in zip(words, units, strict=True):
+        table.add_column(f"{word}, {unit.unit}", justify="right")
+    table.add_column("readings", justify="right")
     for s, count in chosen:
         place = (s.gradient, s.pressure_Pa, s.deflection, s.force)
-        table.add_row(*(f"{number:.5g}" for number in place), str(count))
-    console.print(table)
+        numbers = (u.written(number, 5) for u, number in zip(units, place, strict=True))
+        table.add_row(*numbers, str(count))
+    print_whole(console, table)
     console.print(
         "\nThe softest gradient far out gives S1, the stiffest at full force K. A few readings"
         " between them show whether the bend is straight, which the ends alone cannot."
@@ -113,7 +120,7 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     table.add_row("compensated, deflection within 0.5 %", f"{100 * coverage.deflection:.1f} %")
     table.add_row("compensated, felt gradient within 1 %", f"{100 * coverage.felt:.1f} %")
     table.add_row("  both", f"{100 * coverage.circle:.1f} %")
-    console.print(table)
+    print_whole(console, table)
 
 
 _ROUNDED = 1e-9  # of N, s, ° or %: less is a computer's rounding
@@ -125,6 +132,7 @@ def print_checks(
     checks: Sequence[ControlCheck],
     every: bool,
     why: Sequence[str] = (),
+    system: System = "si",
 ) -> None:
     """Print a control's checks: those that fail and each kind's narrowest, or every one.
 
@@ -133,15 +141,18 @@ def print_checks(
     shown = list(checks) if every else _narrowest(checks)
     table = Table(box=None, pad_edge=False)
     table.add_column(control, no_wrap=True)
-    for head in ("q̄, kPa", "rig", "specified", "±", "", "margin", ""):
+    pressure = "q̄, kPa" if system == "si" else f"q̄, {in_system('Pa', system).unit}"
+    for head in (pressure, "rig", "specified", "±", "", "margin", ""):
         table.add_column(head, justify="left" if head == "" else "right", no_wrap=True)
     for c in shown:
-        numbers = (c.pressure_Pa / 1000.0, c.measured, c.reference, c.tolerance)
-        cells = [f"{numbers[0]:.2f}", *(written(number) for number in numbers[1:])]
+        at = c.pressure_Pa / 1000.0 if system == "si" else convert(c.pressure_Pa, "Pa", system)
+        unit = in_system(c.unit, system)
+        numbers = (c.measured, c.reference, c.tolerance)
+        cells = [f"{at:.2f}", *(written(unit.factor * number) for number in numbers)]
         verdict = "pass" if c.passed else "[red]FAIL[/]"
         name = c.name.replace(", positive", " +").replace(", negative", " −")
-        table.add_row(name, *cells, c.unit, f"{100 * c.margin:.0f} %", verdict)
-    console.print(table)
+        table.add_row(name, *cells, unit.unit, f"{100 * c.margin:.0f} %", verdict)
+    print_whole(console, table)
     good = sum(check.passed for check in checks)
     console.print(f"{control}: {good} of {len(checks)} checks pass", highlight=False)
     for sentence in why:

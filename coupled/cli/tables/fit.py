@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from coupled.cli.tables.whole import print_whole
 from coupled.gap.nominalfit import ChannelFit, NominalFit
 from coupled.gap.summary import figure
 
@@ -21,7 +22,7 @@ def print_numbers(console: Console, fitted: NominalFit) -> None:
         if one.interval is not None:
             ends = " to ".join(figure(end) for end in one.interval)
         table.add_row(one.key, figure(one.filed), figure(one.found), ends)
-    console.print(table)
+    print_whole(console, table)
 
 
 def print_channels(console: Console, channels: Sequence[ChannelFit]) -> None:
@@ -33,4 +34,4 @@ def print_channels(console: Console, channels: Sequence[ChannelFit]) -> None:
         numbers = (one.before, one.after, one.floor, one.moves)
         table.add_row(one.channel, *(f"{number:.3g}" for number in numbers))
     console.print()
-    console.print(table)
+    print_whole(console, table)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from coupled.cli.tables.whole import print_whole
+from coupled.display import System, in_system, split_unit
 from coupled.gap.batch import Row
 from coupled.gap.budget import StageBudget
 from coupled.gap.flown import ChannelAgain
@@ -14,6 +18,9 @@ from coupled.gap.inflight import EffectInFlight
 from coupled.gap.power import EffectPower
 from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.summary import change, figure, in_figures, plain
+
+if TYPE_CHECKING:
+    from coupled.gap.diagnosis import Diagnosis
 
 
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
@@ -31,11 +38,14 @@ def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
         remark = "guilty" if stage.guilty else within
         table.add_row(stage.name, f"{stage.gap:.2f}", left, remark)
     console.print()
-    console.print(table)
+    print_whole(console, table)
 
 
 def print_effects(
-    console: Console, effects: Sequence[EffectResult], budget: Sequence[StageBudget]
+    console: Console,
+    effects: Sequence[EffectResult],
+    budget: Sequence[StageBudget],
+    system: System = "si",
 ) -> None:
     """Print each effect's numbers, as filed and as found, and its share of its stage's residual."""
     if not effects:
@@ -48,7 +58,7 @@ def print_effects(
         shares = known[effect.stage].shares if effect.stage in known else ()
         share = next((one for one in shares if one.name == effect.name), None)
         explains = "" if share is None else f"{100 * share.value:.1f} %"
-        first, *rest = effect.parameters or (None,)
+        first, *rest = [in_units(p, system) for p in effect.parameters] or (None,)
         sure = f"{effect.probability:.2f}"
         table.add_row(plain(effect.name), *_number(first), explains, sure)
         for parameter in rest:
@@ -57,7 +67,7 @@ def print_effects(
         for left in (one.unexplained, one.noise):
             table.add_row(f"{one.stage}: {left.name}", "", "", f"{100 * left.value:.1f} %", "")
     console.print()
-    console.print(table)
+    print_whole(console, table)
 
 
 def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
@@ -69,18 +79,51 @@ def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
     return change(parameter), ends
 
 
-def print_closed_loop(console: Console, channels: Sequence[ChannelAgain]) -> None:
+def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
+    """Return a parameter with the rig's own number in the units of a system."""
+    if system == "si":
+        return parameter
+    unit = in_system(parameter.unit, system)
+
+    def to(value: float | None) -> float | None:
+        return None if value is None else unit.factor * value
+
+    return replace(
+        parameter,
+        unit=unit.unit,
+        filed=to(parameter.filed),
+        found=unit.factor * parameter.found,
+        found_low=to(parameter.found_low),
+        found_high=to(parameter.found_high),
+    )
+
+
+def in_words(whole: Diagnosis, system: System) -> str:
+    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit."""
+    text = whole.summary
+    for parameter in (p for effect in whole.effects for p in effect.parameters):
+        text = text.replace(change(parameter), change(in_units(parameter, system)))
+    return text
+
+
+def print_closed_loop(
+    console: Console, channels: Sequence[ChannelAgain], system: System = "si"
+) -> None:
     """Print how far the flights with the record's pilot stay from it, before and after."""
     table = Table("flown again with the record's pilot, rms off by", box=None)
     for head in ("rig as filed", "improved"):
         table.add_column(head, justify="right")
     for one in channels:
-        table.add_row(one.channel, f"{one.before:.3g}", f"{one.after:.3g}")
+        name, unit = _named(one.channel, system)
+        factor = in_system(unit, system).factor
+        table.add_row(name, f"{factor * one.before:.3g}", f"{factor * one.after:.3g}")
     console.print()
-    console.print(table)
+    print_whole(console, table)
 
 
-def print_in_flight(console: Console, effects: Sequence[EffectInFlight]) -> None:
+def print_in_flight(
+    console: Console, effects: Sequence[EffectInFlight], system: System = "si"
+) -> None:
     """Print what leaving each effect out does to the flight, and its share of what all do."""
     table = Table("in flight", box=None)
     table.add_column("share", justify="right")
@@ -90,12 +133,22 @@ def print_in_flight(console: Console, effects: Sequence[EffectInFlight]) -> None
     for one in effects:
         for i, (name, by) in enumerate(one.changes.items()):
             first = ("", "") if i else (plain(one.name), f"{100 * one.share:.0f} %")
-            table.add_row(*first, name, f"{by:.3g}", f"{100 * one.of_motion[name]:.3g} %")
+            word, unit = _named(name, system)
+            changed = in_system(unit, system).factor * by
+            table.add_row(*first, word, f"{changed:.3g}", f"{100 * one.of_motion[name]:.3g} %")
     console.print()
-    console.print(table)
+    print_whole(console, table)
 
 
-def print_power(console: Console, sizes: Sequence[EffectPower]) -> None:
+def _named(name: str, system: System) -> tuple[str, str]:
+    """Return a channel's or a parameter's name for people, and its unit in SI."""
+    stem, unit = split_unit(name)
+    if system == "si" or not unit:
+        return name, unit
+    return f"{plain(stem)}, {in_system(unit, system).unit}", unit
+
+
+def print_power(console: Console, sizes: Sequence[EffectPower], system: System = "si") -> None:
     """Print the least size of each effect that the records would have shown."""
     table = Table("effect", "stage", "would have shown from", box=None)
     for one in sizes:
@@ -104,11 +157,16 @@ def print_power(console: Console, sizes: Sequence[EffectPower]) -> None:
         elif not one.shows:
             least = "no size that it may have"
         else:
-            each = (f"{name} {in_figures(name, value)}" for name, value in one.parameters)
+            each = (_sized(name, value, system) for name, value in one.parameters)
             least = ", ".join(each) or "it would show"
         table.add_row(one.name, one.stage, least)
     console.print()
-    console.print(table)
+    print_whole(console, table)
+
+
+def _sized(name: str, value: float, system: System) -> str:
+    word, unit = _named(name, system)
+    return f"{word} {in_figures(name, in_system(unit, system).factor * value)}"
 
 
 def print_summary(console: Console, rows: Sequence[Row]) -> None:
@@ -118,4 +176,4 @@ def print_summary(console: Console, rows: Sequence[Row]) -> None:
         closed = "" if row.closed is None else f"{row.closed:.3f}"
         verdict = row.verdict + (f": {row.why}" if row.why else "")
         table.add_row(row.record, verdict, ", ".join(row.effects), ", ".join(row.guilty), closed)
-    console.print(table)
+    print_whole(console, table)

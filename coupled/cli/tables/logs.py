@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from coupled.cli.tables.whole import print_whole
 from coupled.record.importing.account import ClockAccount, ImportAccount
 from coupled.record.importing.suggest.propose import Proposal
 
@@ -27,7 +28,7 @@ def print_account(console: Console, account: ImportAccount) -> None:
             doubts.append(f"{found.filled_cells} empty cells filled")
         verdict = f"[yellow]{escape('; '.join(doubts))}[/]" if doubts else "ok"
         table.add_row(escape(name), *figures, f"{found.noise:.2g}", verdict)
-    console.print(table, highlight=False)
+    print_whole(console, table)
     for warning in account.warnings:
         console.print(f"[yellow]{escape(warning)}[/]", highlight=False)
     left = account.unmapped
@@ -43,7 +44,7 @@ def print_proposal(console: Console, proposal: Proposal) -> None:
     table.add_column("from")
     for channel, column in proposal.mapped.items():
         table.add_row(escape(channel), escape(column))
-    console.print(table, highlight=False)
+    print_whole(console, table)
     for question in proposal.questions:
         console.print(f"[yellow]to answer:[/] {escape(question)}", highlight=False)
     if proposal.unmapped:

@@ -12,6 +12,8 @@ from rich.table import Table
 from coupled.authority.stability.aircraft import BobWeight
 from coupled.authority.stability.limits import Limit, StabilityLimits
 from coupled.authority.stability.planes import Kind, Plane
+from coupled.cli.tables.whole import print_whole
+from coupled.display import System, in_system
 from coupled.record.channels import unit_of
 from coupled.record.csvfile import write_table
 from coupled.rig.rig import Rig
@@ -36,15 +38,19 @@ _WORDS: dict[Kind, tuple[str, float]] = {
 
 
 def print_limits(
-    console: Console, limits: Sequence[StabilityLimits], bob: BobWeight | None
+    console: Console,
+    limits: Sequence[StabilityLimits],
+    bob: BobWeight | None,
+    system: System = "si",
 ) -> None:
     """Print the limits of each control at its stiffest gradient, simulated and by theory."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for head in ("", "stable", "simulated", "theory", "filed"):
         table.add_column(head, justify="left" if head in ("", "stable") else "right")
     for control in limits:
-        unit = unit_of(control.control)
-        head = f"{control.control}, {control.gradient:.4g} N/{unit}, K·G_T = {control.share:.3g}"
+        unit = in_system(f"N/{unit_of(control.control)}", system)
+        gradient = f"{unit.written(control.gradient)} {unit.unit}"
+        head = f"{control.control}, {gradient}, K·G_T = {control.share:.3g}"
         table.add_row(f"[bold]{head}[/]")
         for limit in control.limits:
             table.add_row(*_row(limit))
@@ -54,10 +60,11 @@ def print_limits(
             table.add_row(word, side, f"{growth.simulated:.2f}", f"{growth.theory:.2f}")
     if bob is not None:
         table.add_row(f"[bold]column through the aircraft, {bob.rate_rad_per_s:.3g} rad/s[/]")
-        flown = "–" if bob.simulated_N_per_g is None else f"{bob.simulated_N_per_g:.4g}"
-        word = f" bob weight, free hand, N/g (filed: {bob.own_N_per_g:.3g})"
-        table.add_row(word, "below", flown, f"{bob.theory_N_per_g:.4g}")
-    console.print(table, highlight=False)
+        unit = in_system("N/g", system)
+        flown = "–" if bob.simulated_N_per_g is None else unit.written(bob.simulated_N_per_g)
+        word = f" bob weight, free hand, {unit.unit} (filed: {unit.written(bob.own_N_per_g, 3)})"
+        table.add_row(word, "below", flown, unit.written(bob.theory_N_per_g))
+    print_whole(console, table)
 
 
 def _row(limit: Limit) -> tuple[str, ...]:

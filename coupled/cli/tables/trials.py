@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.blind.trials.result import Score, Share
+from coupled.cli.tables.whole import print_whole
 
 
 def _lines(score: Score) -> list[tuple[str, Share]]:
@@ -41,7 +42,7 @@ def print_score(console: Console, score: Score) -> None:
     for label, found in _lines(score):
         if found.share is not None:
             table.add_row(label, percent(found.share), span(found), str(found.of))
-    console.print(table)
+    print_whole(console, table)
     stated = score.probabilities
     if stated.brier is not None:
         console.print(f"\nBrier score of {stated.effects} probabilities: {stated.brier:.3f}")
@@ -72,7 +73,7 @@ def _print_power(console: Console, score: Score) -> None:
         size = f"{row.ratio:.1f} times"
         table.add_row(size, percent(named.share), span(named), str(row.wrong), str(named.of))
     console.print()
-    console.print(table)
+    print_whole(console, table)
 
 
 def _print_effects(console: Console, score: Score) -> None:
@@ -84,4 +85,4 @@ def _print_effects(console: Console, score: Score) -> None:
         )
         table.add_row(name.replace("_", " "), f"{row.right}/{row.of}", instead)
     console.print()
-    console.print(table)
+    print_whole(console, table)

@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 
 def print_whole(console: Console, table: Table) -> None:
-    """Print a table; where its columns do not fit, a line a cell under the row's name."""
-    if _needs(console, table) <= console.width:
+    """Print a table; where its columns do not fit, a line a cell under the row's name.
+
+    A cell without a head, as a unit or a verdict, stands behind the one before it.
+    """
+    if _needs(table) <= console.width:
         console.print(table, highlight=False)
         return
-    heads = [" ".join(str(column.header).split()).replace("- ", "") for column in table.columns]
+    first, *heads = [" ".join(str(one.header).split()).replace("- ", "") for one in table.columns]
     if table.title is not None:
         console.print(Text.from_markup(str(table.title), style="bold"))
     for row in zip(*(column.cells for column in table.columns), strict=True):
         name, *cells = (Text.from_markup(str(cell)) for cell in row)
-        console.print(name, style="bold")
-        for head, cell in zip(heads[1:], cells, strict=True):
-            if cell.plain:
-                console.print(Text(f"  {head}: ") + cell if head else Text("  ") + cell)
+        if first and table.columns[0].justify == "right":  # a number, which says nothing alone
+            name = Text(f"{first}: ") + name
+        if name.plain:
+            console.print(name, style="bold")
+        lines: list[Text] = []
+        for head, cell in zip(heads, cells, strict=True):
+            if head or not lines:
+                lines.append(Text(f"  {head}: " if head else "  ") + cell if cell.plain else Text())
+            elif cell.plain:
+                lines[-1] = lines[-1] + (" " if lines[-1].plain else "  ") + cell
+        for line in lines:
+            if line.plain:
+                console.print(line)
 
 
-def _needs(console: Console, table: Table) -> int:
+def _needs(table: Table) -> int:
     """Return the columns of a terminal that a table needs for its words and numbers whole."""
-    width = 0
+    _, right, _, left = table.padding
+    width = len(table.columns) * (left + right) - (0 if table.pad_edge else left + right)
     for column in table.columns:
-        texts = [Text.from_markup(str(cell)) for cell in (column.header, *column.cells)]
+        texts = [Text.from_markup(str(cell)).plain for cell in (column.header, *column.cells)]
         whole = column.no_wrap or column.justify == "right"
-        sizes = [
-            max(
-                (len(word) for word in (text.plain.splitlines() if whole else text.plain.split())),
-                default=0,
-            )
-            for text in texts
-        ]
-        width += max(sizes, default=0)
-    return width + 2 * len(table.columns)
+        parts = [part for text in texts for part in (text.splitlines() if whole else text.split())]
+        width += max((cell_len(part) for part in parts), default=0)
+    return width
