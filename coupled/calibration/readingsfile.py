@@ -18,13 +18,14 @@ import io
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.calibration.readings import Readings, readings_of
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, collected, nearest, together
 from coupled.files import read_text, write_text
 from coupled.record.channels import CONTROL_NAMES
 from coupled.schema import LARGEST, SMALLEST
@@ -52,15 +53,19 @@ def read_readings(path: Path, control: str) -> Readings:
         raise InputError(path, "", "holds no readings below its column names")
     if len(rows) > MOST_ROWS:
         raise InputError(path, "", f"holds more than {MOST_ROWS} rows")
-    parsed = []
+    parsed, faults = [], list[InputError]()
     for number, cells in rows:
         if not any(cells):
-            raise InputError(path, f"row {number}", "is empty; take it out")
-        if len(cells) != len(heads):
+            faults.append(InputError(path, f"row {number}", "is empty; take it out"))
+        elif len(cells) != len(heads):
             problem = f"has {len(cells)} cells, the columns are {len(heads)}"
-            raise InputError(path, f"row {number}", problem)
-        parsed.append((number, dict(zip(heads, cells, strict=True))))
-    return _assembled(path, parsed, units)
+            faults.append(InputError(path, f"row {number}", problem))
+        else:
+            parsed.append((number, dict(zip(heads, cells, strict=True))))
+    read = _read_rows(path, parsed, units, faults)
+    if faults:
+        raise together(faults)
+    return _assembled(read, [quantity for quantity in units if quantity.startswith(ON)])
 
 
 def rows_of(path: Path) -> list[tuple[int, list[str]]]:
@@ -150,42 +155,78 @@ def _on(control: str, column: str) -> str:
     return column.replace("force", f"force_on_{control}")
 
 
-def _assembled(
-    path: Path, rows: list[tuple[int, dict[str, str]]], units: dict[str, tuple[str, float]]
-) -> Readings:
-    taken: list[tuple[int, str, tuple[float, ...]]] = []
-    others = [quantity for quantity in units if quantity.startswith(ON)]
-    nulls: list[tuple[int, tuple[float, ...]]] = []
+@dataclass(frozen=True)
+class _Row:
+    """A row read: its gradient set, {quantity: SI value}, and the side of a null."""
+
+    number: int
+    label: str
+    value: Mapping[str, float]
+    side: float | None
+
+
+def _read_rows(
+    path: Path,
+    rows: list[tuple[int, dict[str, str]]],
+    units: dict[str, tuple[str, float]],
+    faults: list[InputError],
+) -> list[_Row]:
+    """Return the rows without a fault; the faults of the others are added to `faults`."""
+    read = []
     seen: dict[tuple[str, ...], int] = {}
     for number, cells in rows:
-        null = "v2" in units and cells["v2_V"] != ""
-        may_lack = {"v2", "deflection after", "force after"}
-        may_lack |= {"deflection", "force", *others} if null else set()
-        value = {
-            quantity: number_in(path, number, column, cells[column]) * factor
-            for quantity, (column, factor) in units.items()
-            if cells[column] or quantity not in may_lack
-        }
         same = seen.setdefault(tuple(cells.values()), number)
-        if same != number:
-            problem = f"is the same as row {same}; no two readings are, take one out"
-            raise InputError(path, f"row {number}", problem)
-        if null:
-            if value["v2"] == 0.0 or value["v3"] == 0.0:
-                problem = "a null at 0 V tells nothing of S2; hold the control off neutral"
+        with collected(faults):
+            if same != number:
+                problem = f"is the same as row {same}; no two readings are, take one out"
                 raise InputError(path, f"row {number}", problem)
-            side = _side(path, number, cells.get(APPROACH, ""))
-            nulls.append((number, (value["v1"], value["v2"], value["v3"], side)))
+            read.append(_read_row(path, number, cells, units, faults))
+    return read
+
+
+def _read_row(
+    path: Path,
+    number: int,
+    cells: dict[str, str],
+    units: dict[str, tuple[str, float]],
+    faults: list[InputError],
+) -> _Row:
+    null = "v2" in units and cells["v2_V"] != ""
+    may_lack = {"v2", "deflection after", "force after"}
+    if null:
+        may_lack |= {"deflection", "force", *(name for name in units if name.startswith(ON))}
+    value: dict[str, float] = {}
+    before = len(faults)
+    for quantity, (column, factor) in units.items():
+        if cells[column] or quantity not in may_lack:
+            with collected(faults):
+                value[quantity] = number_in(path, number, column, cells[column]) * factor
+    whole = len(faults) == before
+    if null and whole and 0.0 in (value["v2"], value["v3"]):
+        problem = "a null at 0 V tells nothing of S2; hold the control off neutral"
+        raise InputError(path, f"row {number}", problem)
+    side = _side(path, number, cells.get(APPROACH, "")) if null else None
+    if "deflection" in value and "force" in value:
+        if not cells[LABEL]:
+            raise InputError(path, f"row {number}: {LABEL}", "is empty; name the gradient set")
+    elif whole and any(quantity.split()[0] in ("deflection", "force") for quantity in value):
+        raise InputError(path, f"row {number}", "has a deflection or a force without the other")
+    return _Row(number, cells[LABEL], value, side)
+
+
+def _assembled(rows: list[_Row], others: list[str]) -> Readings:
+    taken: list[tuple[int, str, tuple[float, ...]]] = []
+    nulls: list[tuple[int, tuple[float, ...]]] = []
+    for row in rows:
+        value = row.value
+        if row.side is not None:
+            nulls.append((row.number, (value["v1"], value["v2"], value["v3"], row.side)))
         if "deflection" in value and "force" in value:
-            if not cells[LABEL]:
-                raise InputError(path, f"row {number}: {LABEL}", "is empty; name the gradient set")
             means = [_mean(value, quantity) for quantity in ("deflection", "force")]
             (delta, rise), (force, force_rise) = means
             six = (delta, force, value["v1"], value["v3"], rise, force_rise)
             held = tuple(value.get(quantity, 0.0) for quantity in others)
-            taken.append((number, cells[LABEL], six + held))
-        elif any(quantity.split()[0] in ("deflection", "force") for quantity in value):
-            raise InputError(path, f"row {number}", "has a deflection or a force without the other")
+            taken.append((row.number, row.label, six + held))
     columns = np.array([one for *_, one in taken], float).reshape(-1, 6 + len(others)).T
     crossed = {quantity[len(ON) :]: columns[6 + k] for k, quantity in enumerate(others)}
     return readings_of(
@@ -198,7 +239,7 @@ def _assembled(
     )
 
 
-def _mean(value: dict[str, float], quantity: str) -> tuple[float, float]:
+def _mean(value: Mapping[str, float], quantity: str) -> tuple[float, float]:
     """Return the mean of the looks at an instrument, and the second less the first."""
     first, second = value[quantity], value.get(f"{quantity} after")
     return (first, math.nan) if second is None else (0.5 * (first + second), second - first)

@@ -10,7 +10,7 @@ import copy
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -22,7 +22,7 @@ import numpy as np
 from coupled.campaign.entry import Columns
 from coupled.campaign.points import grid_size, points
 from coupled.campaign.sweepfile import MOST_FLIGHTS, Survive, SweepFile, Vary
-from coupled.errors import InputError, nearest
+from coupled.errors import MISSING, InputError, collected, nearest, together
 from coupled.files import sha256
 from coupled.flight.loop import make_airframe
 from coupled.flight.manifest import input_files
@@ -86,17 +86,9 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
 
     A run that is named by a relative path is sought beside it first.
     """
-    table = dict(given)
-    known_keys(table, file_keys(SweepFile, "m"), file, "")
-    kinds: dict[str, type[Section]] = {"vary": Vary, "survive": Survive}
-    for key, kind in kinds.items():
-        listed = table.get(key, [])
-        if not isinstance(listed, list):
-            raise InputError(file, key, f"each is written [[{key}]]")
-        if listed:
-            table[key] = [build(kind, item, file, f"{key}[{i}]") for i, item in enumerate(listed)]
-    sweep = build(SweepFile, table, file, "")
-    _check_values(sweep, file)
+    sweep = _sections(given, file)
+    if faults := list(_faults(sweep, file)):
+        raise together(faults)
     run_file = find(sweep.run, shipped_runs(), "run", beside=file.parent)
     run_table = load_toml(run_file)
     try_changes = partial(_changed, run_table, run_file, sweep.case)
@@ -105,17 +97,48 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
         if sweep.case not in labels:
             raise InputError(file, "case", f"no {sweep.case!r}; {nearest(sweep.case, labels)}")
     base = try_changes({})
-    files = {*input_files(base), *_check_keys(sweep, file, try_changes)}
-    for i, each in enumerate(sweep.survive):
-        if each.least is None and each.most is None:
-            raise InputError(file, f"survive[{i}]", "has no bound: give least or most")
+    files = set(input_files(base))
+    with collected(faults):
+        files |= _check_keys(sweep, file, try_changes)
     named = [("extremes", channel) for channel in sweep.extremes]
     named += [(f"survive[{i}].channel", each.channel) for i, each in enumerate(sweep.survive)]
     for key, channel in named:
         if channel not in base.channels:
             hint = nearest(channel, base.channels)
-            raise InputError(file, key, f"no channel {channel!r}; {hint}")
+            faults.append(InputError(file, key, f"no channel {channel!r}; {hint}"))
+    if faults:
+        raise together(faults)
     return SweepPlan(sweep, file, run_file, run_table, _identity(sweep, files), frozenset(files))
+
+
+def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
+    """Return a sweep file's tables, checked by themselves; all their faults are raised together."""
+    table, faults = dict(given), list[InputError]()
+    with collected(faults):
+        known_keys(table, file_keys(SweepFile, "m"), file, "")
+    kinds: dict[str, type[Section]] = {"vary": Vary, "survive": Survive}
+    for key, kind in kinds.items():
+        listed = table.get(key, [])
+        if not isinstance(listed, list):
+            faults.append(InputError(file, key, f"each is written [[{key}]]"))
+            del table[key]
+            continue
+        built = []
+        for i, item in enumerate(listed):
+            with collected(faults):
+                built.append(build(kind, item, file, f"{key}[{i}]"))
+        if built:
+            table[key] = built
+        elif listed:
+            del table[key]
+    known = {key: value for key, value in table.items() if key in file_keys(SweepFile, "m")}
+    sweep: SweepFile | None = None
+    with collected(faults):
+        sweep = build(SweepFile, known, file, "")
+    if faults or sweep is None:
+        there = [key for key in kinds if key in given]  # but with faults of their own
+        raise together([f for f in faults if f.problem != MISSING or f.key not in there])
+    return sweep
 
 
 def planned_flights(plan: SweepPlan) -> list[PlannedFlight]:
@@ -156,33 +179,37 @@ def _changed(
     return manoeuvres_from_table(tables, file)[0]
 
 
-def _check_values(sweep: SweepFile, file: Path) -> None:
+def _faults(sweep: SweepFile, file: Path) -> Iterator[InputError]:
+    """Yield what of a sweep's values does not go together."""
     keys: list[Any] = [key for vary in sweep.vary for key in (vary.key, *vary.also)]
     lists: dict[str, list[Any]] = {"vary": keys, "keep": sweep.keep, "extremes": sweep.extremes}
     lists["configurations"] = sweep.configurations
     for name, words in lists.items():
-        for word in words:
+        for word in dict.fromkeys(words):
             if words.count(word) > 1:
-                raise InputError(file, name, f"duplicate {word}")
+                yield InputError(file, name, f"duplicate {word}")
     for key in keys:
         if key.partition(".")[0] in _NO_CONDITION:
-            raise InputError(file, "vary", f"{key} changes no flight")
-    _check_size(sweep, file)
-    for i, vary in enumerate(sweep.vary):
-        _check_range(sweep, vary, f"vary[{i}]", file)
+            yield InputError(file, "vary", f"{key} changes no flight")
+    ranges = [fault for i in range(len(sweep.vary)) for fault in _range_faults(sweep, i, file)]
+    yield from ranges
+    yield from _size_faults(sweep, file, countable=not ranges)
+    for i, each in enumerate(sweep.survive):
+        if each.least is None and each.most is None:
+            yield InputError(file, f"survive[{i}]", "has no bound: give least or most")
 
 
-def _check_size(sweep: SweepFile, file: Path) -> None:
+def _size_faults(sweep: SweepFile, file: Path, countable: bool) -> Iterator[InputError]:
     if (sweep.method != "grid") != (sweep.samples is not None):
         problem = "is given with sobol, random and sensitivity, and not with grid"
-        raise InputError(file, "samples", problem)
+        yield InputError(file, "samples", problem)
+        return
     samples = sweep.samples or 0
     if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
         near = 2 ** max(3, round(math.log2(samples)))
-        raise InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
-    flights = flight_count(sweep)
-    if flights > MOST_FLIGHTS:
-        raise InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
+        yield InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
+    if countable and (flights := flight_count(sweep)) > MOST_FLIGHTS:
+        yield InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
 
 
 def flight_count(sweep: SweepFile) -> int:
@@ -196,23 +223,28 @@ def extreme_names(channels: Sequence[str]) -> list[str]:
     return [f"{which}_{name}" for name in channels for which in ("least", "greatest")]
 
 
-def _check_range(sweep: SweepFile, vary: Vary, place: str, file: Path) -> None:
+def _range_faults(sweep: SweepFile, index: int, file: Path) -> Iterator[InputError]:
+    vary, place = sweep.vary[index], f"vary[{index}]"
     ranged = vary.low is not None and vary.high is not None
     if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
-        raise InputError(file, place, "give values, or low and high")
+        yield InputError(file, place, "give values, or low and high")
+        return
     if ranged and (sweep.method == "grid") != (vary.steps is not None):
-        raise InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
+        yield InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
     low, high = vary.low or 0.0, vary.high or 0.0
     if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
         problem = "must be above low, and low above 0 where the spread is log"
-        raise InputError(file, f"{place}.high", problem)
+        yield InputError(file, f"{place}.high", problem)
 
 
 def _check_keys(
     sweep: SweepFile, file: Path, try_changes: Callable[[dict[str, Any]], Manoeuvre]
 ) -> set[Path]:
-    """Try every value alone, and return the files that its flight would read."""
-    files = set[Path]()
+    """Try every value alone, and return the files that its flight would read.
+
+    Raises the first fault of each parameter, together.
+    """
+    files, faults = set[Path](), list[InputError]()
     for i, vary in enumerate(sweep.vary):
         values = vary.values if vary.values is not None else [vary.low, vary.high]
         for value in values:
@@ -221,8 +253,11 @@ def _check_keys(
                 if value is values[0] and "flight.properties." in vary.key:
                     _check_property(scenario, vary.key)
             except InputError as error:
-                raise _blamed(vary, i, value, error, file, try_changes) from None
+                faults.append(_blamed(vary, i, value, error, file, try_changes))
+                break
             files |= set(input_files(scenario))
+    if faults:
+        raise together(faults)
     return files
 
 

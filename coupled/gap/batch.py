@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import coupled
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, collected, nearest, together
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
 from coupled.gap.result import FORMAT
@@ -56,21 +56,28 @@ def jobs(folder: Path, out: Path, control: ControlName = "column") -> list[Job]:
     the shipped ones.
     """
     listed = load_toml(folder / LIST)
-    found = []
-    for name, rig in listed.items():
-        if not isinstance(rig, str):
-            raise InputError(folder / LIST, name, "needs the name of a rig, in quotes")
-        if not re.match(PLAIN_NAME, name):
-            problem = "should be a record's name: letters, digits, dots and dashes, no folder"
-            raise InputError(folder / LIST, name, problem)
-        if not re.match(PLAIN_NAME, rig):
-            raise InputError(folder / LIST, name, f"names the rig {rig!r}: give a name, no folder")
-        file = f"{name}.json"
-        check_target(out / file, made=out)
-        found.append(Job(name, _record(folder, name), _rig(folder, name, rig), out / file, control))
-    if not found:
+    if not listed:
         raise InputError(folder / LIST, "", "names no record")
+    found, faults = [], list[InputError]()
+    for name, rig in listed.items():
+        with collected(faults):
+            found.append(_job(folder, out, name, rig, control))
+    if faults:
+        raise together(faults)
     return found
+
+
+def _job(folder: Path, out: Path, name: str, rig: object, control: ControlName) -> Job:
+    if not isinstance(rig, str):
+        raise InputError(folder / LIST, name, "needs the name of a rig, in quotes")
+    if not re.match(PLAIN_NAME, name):
+        problem = "should be a record's name: letters, digits, dots and dashes, no folder"
+        raise InputError(folder / LIST, name, problem)
+    if not re.match(PLAIN_NAME, rig):
+        raise InputError(folder / LIST, name, f"names the rig {rig!r}: give a name, no folder")
+    file = out / f"{name}.json"
+    check_target(file, made=out)
+    return Job(name, _record(folder, name), _rig(folder, name, rig), file, control)
 
 
 def _record(folder: Path, name: str) -> Path:

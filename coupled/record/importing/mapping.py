@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, collected, nearest, together
 from coupled.record.channels import CONTROL_NAMES, LATERAL, LONGITUDINAL, TIME, control_channels
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, named, quantity
 from coupled.units import Unit, parse_unit, unit_names, units_like
@@ -95,42 +95,70 @@ class LogMap(Section):
 
 
 def read_map(path: Path) -> LogMap:
-    """Return the map of a file; every fault is one line with its key."""
-    table = load_toml(path)
-    known_keys(table, file_keys(LogMap, "m"), path, "")
+    """Return the map of a file; every fault is one line with its key, all raised together."""
+    table, faults = load_toml(path), list[InputError]()
+    with collected(faults):
+        known_keys(table, file_keys(LogMap, "m"), path, "")
     channels = table.get("channels")
     if not isinstance(channels, dict) or not channels:
-        raise InputError(path, "channels", "needs at least one, as [channels.column_force_N]")
-    for name in channels:
-        if name == TIME:
-            raise InputError(path, f"channels.{name}", "the time is given by [clock]")
-        if name not in CHANNELS:
-            hint = nearest(name, CHANNELS)
-            raise InputError(path, f"channels.{name}", f"no record has such a channel; {hint}")
-    made = {name: build(Channel, channels[name], path, f"channels.{name}") for name in channels}
-    clocks = table.get("clocks", {})
+        problem = "needs at least one, as [channels.column_force_N]"
+        raise together([*faults, InputError(path, "channels", problem)])
+    made = {}
+    for name, given in channels.items():
+        with collected(faults):
+            _check_name(name, path)
+            made[name] = build(Channel, given, path, f"channels.{name}")
+    clocks, others = table.get("clocks", {}), {}
     if not isinstance(clocks, dict):
-        raise InputError(path, "clocks", 'is a table for each further log, as [clocks."state.csv"]')
-    others = {name: build(OtherClock, clocks[name], path, f"clocks.{name}") for name in clocks}
-    found = build(LogMap, {**table, "channels": made, "clocks": others}, path, "")
-    _check_clock(found.clock, path)
-    for name, clock in others.items():
-        _check_stamps(clock, path, f"clocks.{name}")
+        problem = 'is a table for each further log, as [clocks."state.csv"]'
+        faults.append(InputError(path, "clocks", problem))
+        clocks = {}
+    for name, given in clocks.items():
+        with collected(faults):
+            others[name] = build(OtherClock, given, path, f"clocks.{name}")
+    known = {key: table[key] for key in ("log", "clock") if key in table}
+    found: LogMap | None = None
+    with collected(faults):
+        found = build(LogMap, {**known, "channels": made, "clocks": others}, path, "")
+    if found is not None:
+        faults += _faults(found, path)
+    if faults or found is None:
+        raise together(faults)
+    return found
+
+
+def _check_name(name: str, path: Path) -> None:
+    if name == TIME:
+        raise InputError(path, f"channels.{name}", "the time is given by [clock]")
+    if name not in CHANNELS:
+        hint = nearest(name, CHANNELS)
+        raise InputError(path, f"channels.{name}", f"no record has such a channel; {hint}")
+
+
+def _faults(found: LogMap, path: Path) -> list[InputError]:
+    """Return what of a map's values does not go together."""
+    faults: list[InputError] = []
+    with collected(faults):
+        _check_clock(found.clock, path)
+    for name, clock in found.clocks.items():
+        with collected(faults):
+            _check_stamps(clock, path, f"clocks.{name}")
     if not found.log.delimiter.isascii() or found.log.delimiter in '"\r\n':
         problem = f'is {found.log.delimiter!r}; give one plain character, as ";" or "\\t"'
-        raise InputError(path, "log.delimiter", problem)
+        faults.append(InputError(path, "log.delimiter", problem))
     if found.log.decimal == "," and found.log.delimiter == ",":
         problem = 'is the decimal comma as well; give the delimiter, as ";"'
-        raise InputError(path, "log.delimiter", problem)
+        faults.append(InputError(path, "log.delimiter", problem))
     for name, channel in found.channels.items():
         if channel.scale == 0.0:
-            raise InputError(path, f"channels.{name}.scale", "must not be 0")
+            faults.append(InputError(path, f"channels.{name}.scale", "must not be 0"))
         if channel.sign_bit is not None and channel.wraps_at is not None:
             problem = "and wraps_at are two ways to keep a sign: give one"
-            raise InputError(path, f"channels.{name}.sign_bit", problem)
-        if channel.unit:
-            factor_of(name, channel.unit, path)
-    return found
+            faults.append(InputError(path, f"channels.{name}.sign_bit", problem))
+        with collected(faults):
+            if channel.unit:
+                factor_of(name, channel.unit, path)
+    return faults
 
 
 def _check_clock(clock: Clock, path: Path) -> None:
