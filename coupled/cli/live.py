@@ -229,6 +229,8 @@ def _print(flight: LiveFlight, path: Path) -> None:
     say(f"manifest: {manifest_path(path)}")
     if flight.lateness is not None:
         say(str(flight.lateness))
+    if flight.round_trips is not None:
+        say(str(flight.round_trips))
     for name, found in record.manifest["live"]["bend_in_service"].items():
         if found["bend"] is not None:
             d = "rad" if name == "wheel" else "m"

@@ -29,6 +29,7 @@ from collections import Counter, deque
 from collections.abc import Sequence
 
 from coupled.live.link import Measured, Order, Sample
+from coupled.live.roundtrip import RoundTrips
 from coupled.live.transport import Given, Transport
 from coupled.live.udp import reaches
 from coupled.rig.rig import Rig
@@ -50,6 +51,7 @@ class _Cls2Sim:
 
     measures_force = False
     measures_deflection = False
+    round_trips: RoundTrips | None = None  # no source gives a number that an answer repeats
 
     def __init__(self, name: str, wire: Transport, rig: Rig, given: Given) -> None:
         self.name, self._wire, self._given = name, wire, given

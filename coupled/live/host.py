@@ -278,6 +278,7 @@ class Host:
         if link is not None and attached is not None:
             found |= {
                 "dropped_packets": dict(link.dropped),
+                "round_trip": None if link.round_trips is None else link.round_trips.as_dict(),
                 "limits": asdict(self.plan.limits),
                 "limited_frames": attached.limited_frames,
                 **asdict(attached.losses),

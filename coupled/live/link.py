@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from coupled.errors import InputError
+from coupled.live.roundtrip import RoundTrips
 
 WATCHDOG_s = 0.1  # without a valid packet for so long, the loader is lost
 
@@ -61,13 +62,18 @@ class Link(Protocol):
     """A loader at the other end of a wire.
 
     `dropped` counts the packets that were not used, by reason; `measures_force` and
-    `measures_deflection` say whether F and δ are the loader's own.
+    `measures_deflection` say whether F and δ are the loader's own; `round_trips` is None on a
+    wire whose answers do not say which order they answer.
     """
 
     name: str
     dropped: Counter[str]
     measures_force: bool
     measures_deflection: bool
+
+    @property
+    def round_trips(self) -> RoundTrips | None:
+        """How long orders take to be answered."""
 
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest valid sample since the last call, waiting for one so long at most."""

@@ -14,6 +14,7 @@ from coupled.live.host import STOPPED, Host, Plan
 from coupled.live.measured import as_measured
 from coupled.live.pacing import Lateness
 from coupled.live.priority import first_place
+from coupled.live.roundtrip import RoundTrips
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -30,6 +31,7 @@ class LiveFlight:
     since_s: float  # of the last change of a switch: what follows was flown with `rig`
     lateness: Lateness | None
     stopped: bool  # by the user
+    round_trips: RoundTrips | None = None  # of a loader whose answers say what they answer
 
 
 def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None) -> LiveFlight:
@@ -57,6 +59,7 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
         max((change.time_s for change in changes), default=0.0),
         host.pacer.result() if plan.paced else None,
         stopped,
+        None if plan.link is None else plan.link.round_trips,
     )
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from coupled.errors import InputError
 from coupled.live.link import Order, Reach, Sample
+from coupled.live.roundtrip import RoundTrips, ask_for_stamps, receive
 from coupled.live.wire import ORDER, BadPacketError, Header, newer, pack_orders, unpack_state
 from coupled.rig.rig import Rig
 
@@ -55,6 +56,7 @@ class UdpLink:
         self.name = f"udp://{host}:{port}"
         self.measures_deflection = deflection
         self.dropped: Counter[str] = Counter()
+        self.round_trips = RoundTrips()
         self._reaches = reaches(rig)
         self._session = secrets.randbits(32)
         self._sequence = 0
@@ -62,6 +64,7 @@ class UdpLink:
         family, self._address = resolved(host, port, self.name)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        self.round_trips.stamped = ask_for_stamps(self._socket)
 
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest valid sample since the last call, waiting for one so long at most."""
@@ -77,18 +80,20 @@ class UdpLink:
         found = None
         for _ in range(MOST_PACKETS):
             try:
-                packet, sender = self._socket.recvfrom(LARGEST_bytes + 1)
+                packet, sender, came_ns = receive(
+                    self._socket, LARGEST_bytes + 1, self.round_trips.stamped
+                )
             except BlockingIOError:
                 break
             except OSError:  # the other end refused a packet: it is not there yet, or any more
                 continue
             try:
-                found = self._taken(packet, sender)
+                found = self._taken(packet, sender, came_ns)
             except BadPacketError as reason:
                 self.dropped[str(reason)] += 1
         return found
 
-    def _taken(self, packet: bytes, sender: Sequence[object]) -> Sample:
+    def _taken(self, packet: bytes, sender: Sequence[object], came_ns: int) -> Sample:
         if tuple(sender[:2]) != tuple(self._address[:2]):
             raise BadPacketError("from elsewhere")
         header, sample = unpack_state(packet, self._reaches)
@@ -97,6 +102,7 @@ class UdpLink:
         if self._last is not None and not newer(header.sequence, self._last):
             raise BadPacketError("replayed or late")
         self._last = header.sequence
+        self.round_trips.hear(header.echo, came_ns)
         if self._lockstep and header.echo != self._sequence:
             raise BadPacketError("answers older orders")
         return sample
@@ -111,8 +117,10 @@ class UdpLink:
         now = time.monotonic_ns() // 1000
         numbers = (self._session, self._sequence, self._last or 0, now)
         header = Header(ORDER, len(orders), mode, *numbers)
+        packet = pack_orders(header, orders)
+        self.round_trips.send(self._sequence, time.time_ns())
         with contextlib.suppress(OSError):
-            self._socket.sendto(pack_orders(header, orders), self._address)
+            self._socket.sendto(packet, self._address)
 
     def close(self) -> None:
         """Close the socket."""

@@ -164,6 +164,7 @@ def test_a_loader_in_another_process_is_flown_and_its_k_found() -> None:
     assert len(record) == 1440
     live = record.manifest["live"]
     assert (live["dropped_packets"], live["spells"], live["limited_frames"]) == ({}, [], 0)
+    assert live["round_trip"]["answers"] >= 1440  # those of the frames, and of the forces' coming
     found, bend = live["bend_in_service"]["column"], RIG.controls["column"].loader.bend
     assert found["bend"] == pytest.approx(bend, rel=0.01)
     assert not found["alarm"]

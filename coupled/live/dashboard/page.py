@@ -16,6 +16,7 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.live.dashboard.board import FLIGHT, Board, columns, shared_memory
 from coupled.live.host import Host, Word
+from coupled.live.roundtrip import RECENT
 from coupled.record.channels import (
     ALTITUDE,
     HEADING,
@@ -118,11 +119,13 @@ class Page:
     def _show(self, host: Host) -> None:
         """Write how things stand."""
         attached, link = host.attached, host.plan.link
+        trips = None if link is None else link.round_trips
         self._state |= {
             "time_s": host.time_s,
             "lateness": host.pacer.recent() if host.plan.paced else None,
             "lost": attached is not None and attached.lost,
             "dropped": 0 if link is None else sum(link.dropped.values()),
+            "round_trip": None if trips is None else trips.as_dict(RECENT),
             "switches": {name: host.switches.values(name) for name in host.names},
             "service": {name: one.now.as_dict() for name, one in host.service.items()},
             "calibrated": {name: one.calibrated for name, one in host.service.items()},

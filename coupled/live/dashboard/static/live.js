@@ -36,7 +36,7 @@ function take(given) {
   by("phase").textContent = lost ? "loader lost" : given.phase;
   by("phase").className = "pill" + (lost ? " bad" : over ? " over" : "");
   for (const id of ["mark", "save", "stop"]) by(id).disabled = over;
-  if (setup) { switches(); services(); service(); late(); }
+  if (setup) { switches(); services(); service(); late(); wireTime(); }
   if (over) found();
 }
 
@@ -172,6 +172,13 @@ function service() {
     ["learning", k.frozen ? "frozen: the hand does too little" : "yes"],
     ["alarm", k.alarm ? "K has left the calibrated one" : "none", k.alarm], ["adapts K̂", state.adapt ? "yes" : "no"],
   ]);
+}
+
+function wireTime() {
+  const r = state.round_trip;
+  by("wire").hidden = !r;
+  if (r) by("wire").textContent = `round trip to the loader${r.stamped ? "" : ", with the wait for the next frame"}: `
+    + `p50 ${num(r.p50_ms, 3)} ms · p99 ${num(r.p99_ms, 3)} ms · largest ${num(r.largest_ms, 3)} ms`;
 }
 
 function late() {
