@@ -113,12 +113,16 @@ def _trim(flight: str, controls: tuple[ControlName, ...], rate_Hz: float) -> tup
 
 
 def moved(
-    rig: Rig, record: Record, trims: Mapping[ControlName, float], rng: np.random.Generator
+    rig: Rig,
+    record: Record,
+    trims: Mapping[ControlName, tuple[float, float]],
+    rng: np.random.Generator,
 ) -> tuple[list[Moved], list[Moved]]:
     """Return what the surfaces did, and the same with a sample of the error in that.
 
-    In the order of the rig's controls. `trims` are where they stood in trim, rad. A control that
-    the record knows nothing of is taken to have been left alone.
+    In the order of the rig's controls. `trims` are where they stood in trim, rad, and by how much
+    they jump from there after the first row, which no smoother is to blur. A control that the
+    record knows nothing of is taken to have been left alone.
     """
     found = list[Moved]()
     wrong = list[Moved]()
@@ -129,9 +133,10 @@ def moved(
             found, wrong = [*found, one], [*wrong, one]
             continue
         position, filed = record[name], filed_trim(rig, control)
-        level, smooth = heard(position), smoothed(position)
-        error = Smoother.of(position).wiener_error(level, len(smooth), rng)
-        trim = trims.get(control, filed)
+        trim, jump = trims.get(control, (filed, 0.0))
+        step = np.where(np.arange(len(position)) > 0, jump, 0.0)
+        level, smooth = heard(position), smoothed(position - step) + step
+        error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
         found.append(Moved(name, smooth, points, trim, filed))
         wrong.append(Moved(name, smooth + error, points, trim, filed))
     return found, wrong

@@ -36,12 +36,14 @@ WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
 class Trim:
     """Where a surface stood in trim, rad: where its motion counts from, and what was measured.
 
-    `error` is the standard error of `measured`.
+    `error` is the standard error of `measured`; `jump` by how much the surface stands off from the
+    second row on.
     """
 
     position: float
     measured: float
     error: float
+    jump: float = 0.0
 
 
 def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
@@ -61,7 +63,7 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
     if control == "column":
         evidence += _followed(rig, record, control, own, there)
-    return Trim(there, there, error) if evidence > -TRIM_SINCE else Trim(own, own, noise)
+    return Trim(there, there, error) if evidence > -TRIM_SINCE else Trim(own, own, noise, standing)
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
@@ -93,8 +95,8 @@ def _followed(rig: Rig, record: Record, control: ControlName, own: float, there:
     if WEIGHED[0] not in names or rig.flight is None:
         return 0.0
     lefts = []
-    for trim in (own, there):
-        surfaces, _ = moved(rig, short, {control: trim}, np.random.default_rng(43))
+    for trim, jump in ((own, there - own), (there, 0.0)):
+        surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
         flown = fly_open_loop(rig.flight, rig.frame_rate, list(rig.controls), surfaces, names)
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
