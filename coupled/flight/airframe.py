@@ -231,9 +231,8 @@ class JSBSimAirframe:
         problem = ""
         try:
             started = fdm.run_ic()
-            weighed = [wrapper.weigh(self) for wrapper in wrappers]  # each of them
-            if any(weighed):
-                started = fdm.run_ic()
+            for wrapper in wrappers:
+                wrapper.weigh(self)
             if started and flight.trim == "newton":
                 problem = newton_trim(fdm, flight)
             elif started:

@@ -44,10 +44,10 @@ class Loading(Wrapper):
         """A mass that is another than the model's is made up by a ballast."""
         return self._flight.mass != 1.0
 
-    def weigh(self, aircraft: Aircraft) -> bool:
+    def weigh(self, aircraft: Aircraft) -> None:
         """Put the ballast at the centre of gravity of the aircraft as it is loaded and fuelled."""
         if not self.ballast:
-            return False
+            return
         found = [match for name in aircraft.names() if (match := _BALLAST(name))]
         if not found:
             raise aircraft.fault("mass", f"{self._flight.model} has no mass to add to")
@@ -58,7 +58,6 @@ class Loading(Wrapper):
             place.set(_read(aircraft, centre))
         more = (self._flight.mass - 1.0) * _read(aircraft, _WEIGHT)
         aircraft.lever(f"inertia/pointmass-weight-lbs{index}").set(more)
-        return True
 
     def _fill(self, aircraft: Aircraft) -> None:
         flight = self._flight

@@ -2,7 +2,8 @@
 
 An aircraft is loaded, trimmed and stepped by `airframe`. What else becomes of it (how it is
 loaded, what of its aerodynamics differs, the air, what fails) is a list of wrappers. Each may act
-at three moments: as the model's file is read, before the trim, and before every frame after it.
+at four moments: as the model's file is read, before the trim, there once JSBSim knows its weight,
+and before every frame after it.
 """
 
 from __future__ import annotations
@@ -60,9 +61,8 @@ class Wrapper:
     def load(self, aircraft: Aircraft) -> None:
         """Act on the loaded aircraft before it is trimmed."""
 
-    def weigh(self, aircraft: Aircraft) -> bool:
-        """Act on the aircraft once JSBSim knows its weight; tell whether that is another then."""
-        return False
+    def weigh(self, aircraft: Aircraft) -> None:
+        """Act on the aircraft once JSBSim knows its weight, before it is trimmed."""
 
     def meet(self, aircraft: Aircraft) -> Hook | None:
         """Act on the aircraft in trim; return what is to be done before each frame, if anything."""

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import pytest
 
-from coupled.flight.airframe import packaged_models
+from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effect import apply
 from coupled.gap.flown import fly_force
 from coupled.gap.library import BY_NAME
-from coupled.gap.surfaces import surface_points
+from coupled.gap.surfaces import _moves_itself, surface_points
 from coupled.models.draft import draft
 from coupled.models.survey import survey
+from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
@@ -49,6 +50,26 @@ def test_a_surface_that_laws_move_has_no_map() -> None:
     by_laws = {**aircraft, "direct_controls": False}
     assert surface_points(trainer, "column") is not None
     assert surface_points(trainer.changed({"flight": by_laws}), "column") is None
+
+
+@pytest.mark.parametrize(("law", "moves"), [(0.0, False), (0.02, True)])
+def test_a_surface_that_moves_with_the_air_is_moved_by_laws(law: float, moves: bool) -> None:
+    """Still in trim, and with no other control to be moved."""
+
+    class Held(JSBSimAirframe):
+        gust = position = 0.0
+
+        def __init__(self) -> None:
+            self.motion = lambda: tuple(self.position for _ in LONGITUDINAL)
+            self.step = self.answer
+
+        def set_gust(self, up_m_per_s: float) -> None:
+            self.gust = up_m_per_s
+
+        def answer(self, commands: tuple[float, float, float], /) -> None:
+            self.position = 0.3 * commands[0] + law * self.gust
+
+    assert _moves_itself(Held(), ["column"], 120.0, "column") is moves
 
 
 @pytest.mark.slow
