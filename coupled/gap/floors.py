@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise import Noise
 from coupled.gap.output import heard, rounding
-from coupled.gap.quiet import quiet_noise
+from coupled.gap.quiet import noise_of_input, quiet_noise
 from coupled.gap.smooth import Smoother
 from coupled.gap.thresholds import LEAST_NOISE
 from coupled.rig.rig import Rig
@@ -32,6 +32,12 @@ def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
+def input_noise(heard_: Noise, signal: Floats) -> Noise:
+    """Return the noise of a channel that drives its stage; no less than its rounding."""
+    found = None if heard_.filtered else noise_of_input(signal)
+    return heard_ if found is None else _no_less(found, signal)
+
+
 def left_noise(heard_: Noise, signal: Floats, left: Floats) -> Noise:
     """Return a channel's noise by what its stage leaves of it; no less than its rounding.
 
@@ -40,6 +46,11 @@ def left_noise(heard_: Noise, signal: Floats, left: Floats) -> Noise:
     found = None if heard_.filtered else quiet_noise(left)
     if found is None:
         return heard_
+    return _no_less(found, signal)
+
+
+def _no_less(found: Noise, signal: Floats) -> Noise:
+    """Return a noise that is no less than a signal's rounding."""
     rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
     return replace(found, rms=max(found.rms, rounding(signal, rough)))
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.floors import floor_from, noise_in
+from coupled.gap.floors import floor_from, input_noise, noise_in
 from coupled.gap.missed import Missed, missed_in
 from coupled.gap.noise import Noise, noise_of
 from coupled.gap.sensed import Sensed
@@ -138,7 +138,8 @@ class Reading:
 
     def heard(self, quantity: str) -> Noise:
         """Return the noise of a control's channel."""
-        return noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
+        known = noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
+        return input_noise(known, self.signal(quantity)) if quantity == "force" else known
 
     def filtered(self) -> dict[str, str]:
         """Return {a channel of the control whose log was filtered: where its floor comes from}."""
