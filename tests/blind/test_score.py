@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from coupled.blind.trials.answers import read_answers
+from coupled.blind.trials.answers import Answer, FoundEffect, read_answers
 from coupled.blind.trials.key import Key, Seal, digest, read_key
 from coupled.blind.trials.result import Share
 from coupled.blind.trials.score import score, share
-from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
+from coupled.blind.trials.truth import Reading, Sizes, TrueEffect, Truth
 from coupled.errors import InputError
 from tests.support.commands import coupled, files
 
@@ -132,6 +133,7 @@ def test_every_share_is_the_one_made(trials: Path) -> None:
         ("pairs", "stages"): (2, 3),
         ("lacking", "lack_said"): (1, 2),
         ("intervals", "covered"): (3, 4),
+        ("budget", "within_5_points"): (0, 0),
     }
     assert (found["closed"]["right"], found["closed"]["of"]) == (2, 3)
     assert (found["records"], found["missing"]) == (17, 1)
@@ -144,6 +146,51 @@ def test_every_share_is_the_one_made(trials: Path) -> None:
     }
     assert sum(row["of"] for row in found["power"]) == 8
     assert found["power"][-1]["right"] == 2
+
+
+RUBS, YIELDS = Reading(("yields",), ("loader",), True), Reading(("zero",), ("sensing",), False)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "names", "rivals", "exact", "stage"),
+    [
+        ("effect", ("inertia",), (), True, True),
+        ("effect", ("yields",), (), True, True),  # the same law, whatever is recorded
+        ("effect", ("zero",), (), False, True),  # on this record alone: no reason to be sure
+        ("ambiguous", ("zero",), [["zero", "inertia"]], True, True),
+        ("ambiguous", ("zero",), [["zero", "yields"]], True, True),
+        ("ambiguous", ("zero",), [["zero", "inertia", "bend"]], False, True),
+        ("effect", ("inertia", "yields"), (), False, True),
+        ("effect", ("bend",), (), False, False),
+    ],
+)
+def test_other_readings_of_a_truth(
+    verdict: str, names: tuple[str, ...], rivals: Any, exact: bool, stage: bool
+) -> None:
+    stages = {"zero": "sensing", "bend": "linkage"}
+    found = {name: FoundEffect(0.9, {}) for name in names}
+    possible = frozenset(found) | {name for group in rivals for name in group}
+    guilty = frozenset(stages.get(name, "loader") for name in names)
+    known = replace(truth("single", "inertia"), readings=(RUBS, YIELDS))
+    answer = Answer("r", known, verdict, found, possible, guilty, frozenset(), 0.99)
+    assert (answer.exact, answer.stage_right) == (exact, stage)
+
+
+def test_a_budgets_shares_are_held_against_the_twins_own() -> None:
+    known = replace(
+        truth("pair", "inertia", "bend"),
+        budget={"loader": {"inertia": 0.9, "bend": 0.0}, "linkage": {"bend": 0.8}},
+        readings=(Reading(("bend", "yields"), ("linkage", "loader"), True),),
+    )
+    for names, loader, right in ((("inertia", "bend"), 0.94, 2), (("yields", "bend"), 0.83, 1)):
+        found = {name: FoundEffect(0.9, {}) for name in names}
+        shares = {"loader": {names[0]: loader, "noise": 0.02}, "linkage": {"bend": 0.82}}
+        stages = frozenset(known.stages)
+        answer = Answer(
+            "r", known, "effect", found, frozenset(found), stages, frozenset(), 0.99, shares
+        )
+        held = score([answer]).budget
+        assert (held.right, held.of) == (right, 2)
 
 
 def test_brier_and_reliability_by_hand(tmp_path: Path) -> None:

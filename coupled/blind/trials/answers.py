@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,7 @@ class Answer:
     guilty    the stages that it finds a gap in
     lacking   channels whose lack it says
     closed    share of the gap that it closed, where it says so
+    budget    {guilty stage: {effect: its share of the residual's power}}
     """
 
     record: str
@@ -62,6 +63,7 @@ class Answer:
     guilty: frozenset[str]
     lacking: frozenset[str]
     closed: float | None
+    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def exact(self) -> bool:
@@ -71,22 +73,35 @@ class Answer:
         """
         if self.verdict in NAMING:
             return self.names_right
-        alike = frozenset(self.truth.alike)
-        return bool(alike) and self.contains and self.possible == self.truth.names | alike
+        alike = frozenset(self.truth.alike) | self.truth.not_told_apart
+        return bool(alike) and self.contains and self.possible <= self._known | alike
+
+    @property
+    def _known(self) -> frozenset[str]:
+        """The names of the truth by any reading that is the same law."""
+        return self.truth.names.union(*self._laws)
+
+    @property
+    def _laws(self) -> list[frozenset[str]]:
+        """The sets of effects that are the truth."""
+        same = (frozenset(one.names) for one in self.truth.readings if one.sure)
+        return [self.truth.names, *same]
 
     @property
     def names_right(self) -> bool:
         """Whether it names what is there, and beyond that only what the rig has besides."""
-        names = self.truth.names
-        return names <= frozenset(self.found) <= names | frozenset(self.truth.also)
+        found, also = frozenset(self.found), frozenset(self.truth.also)
+        return any(names <= found <= names | also for names in self._laws)
 
     @property
     def contains(self) -> bool:
         """Whether it is exact, or names no more than it holds possible, the truth among them."""
         if self.verdict in NAMING:
             return self.names_right
-        ambiguous = self.verdict == "ambiguous" and self.truth.names <= self.possible
-        return ambiguous and len(self.found) == len(self.truth.names)
+        if self.verdict != "ambiguous":
+            return False
+        sizes = {len(names) for names in self._laws if names <= self.possible}
+        return len(self.found) in sizes
 
     @property
     def wrong(self) -> bool:
@@ -96,7 +111,22 @@ class Answer:
     @property
     def stage_right(self) -> bool:
         """Whether just the stages that have something are guilty."""
-        return self.guilty == frozenset(self.truth.stages)
+        known = [self.truth.stages, *(one.stages for one in self.truth.readings)]
+        return self.guilty in [frozenset(stages) for stages in known]
+
+    def share(self, stage: str, effect: str) -> float:
+        """Return the share of a stage's power that it gives an effect, by whatever name."""
+        shares = self.budget.get(stage, {})
+        if effect in self.found:
+            return shares.get(effect, 0.0)
+        others = frozenset(self.found) - self.truth.names
+        return sum(share for name, share in shares.items() if name in others)
+
+    def interval(self, effect: str, parameter: str) -> Interval | None:
+        """Return the interval of a true effect's parameter, by whatever name it was found."""
+        names = [effect] if effect in self.found else sorted({*self.found} - self.truth.names)
+        found = (self.found[name].intervals.get(parameter) for name in names)
+        return next((interval for interval in found if interval is not None), None)
 
 
 def read_answers(folder: Path, key: Key) -> list[Answer]:
@@ -137,6 +167,7 @@ def _answer(name: str, truth: Truth, table: Mapping[str, Any]) -> Answer:
         frozenset(stage for stage, judged in stages if judged.get("guilty")),
         frozenset(c for _, judged in stages for c in judged.get("missing", [])),
         None if closed is None else float(closed),
+        {str(stage): dict(shares) for stage, shares in table.get("budget", {}).items()},
     )
 
 

@@ -8,7 +8,7 @@ lists counts, since a draw is a place in a list.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +58,20 @@ def read_deck(version: int) -> Deck:
     rigs = {str(name): read_rig(homes / f"{name}.toml") for name in table["rigs"]}
     return Deck(
         version,
-        _chosen(path, "effects", table, (*EFFECTS, *REVISION_2)),
+        _sized(path, table, _chosen(path, "effects", table, (*EFFECTS, *REVISION_2))),
         _chosen(path, "outsiders", table, OUTSIDERS),
         rigs,
         _realism(table.get("realism")),
     )
+
+
+def _sized(path: Path, table: Mapping[str, Any], kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:
+    """Return kinds with the least sizes that the deck gives some of them."""
+    least = table.get("least", {})
+    for name in least:
+        if name not in [kind.name for kind in kinds]:
+            raise InputError(path, f"least.{name}", "is no effect of this deck")
+    return tuple(replace(kind, least=least.get(kind.name, kind.least)) for kind in kinds)
 
 
 def _realism(table: Mapping[str, Any] | None) -> Realism:

@@ -5,10 +5,17 @@ from __future__ import annotations
 from coupled.gap.airframe import airframe_outputs
 from coupled.gap.fit import fit
 from coupled.gap.library import BY_NAME
+from coupled.gap.output import Output
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+
+
+def outputs_of(rig: Rig, record: Record, airframe: bool) -> list[Output]:
+    """Return what a record lets judge; `airframe` says whether to fly for that."""
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    return outputs + (airframe_outputs(rig, record) if airframe else [])
 
 
 def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, float]:
@@ -18,11 +25,8 @@ def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, flo
     output of its own, stands at the widest of those that a wrong scale shows in. `airframe`
     says whether to fly for the airframe's, which takes longest.
     """
-    outputs = Reader(rig, record, "column", surface_points).outputs()
-    if airframe:
-        outputs += airframe_outputs(rig, record)
     gaps: dict[str, float] = {}
-    for output in outputs:
+    for output in outputs_of(rig, record, airframe):
         stage = "loader" if output.stage == "multiplier" else output.stage
         gaps[stage] = max(output.gap(rig), gaps.get(stage, 0.0))
     shown = [gaps[stage] for stage in ("loader", "linkage") if stage in gaps]

@@ -113,6 +113,7 @@ class Score:
     pairs: Pairs
     lack_said: Share
     intervals: Intervals
+    budget: Share
     closed: Share
     probabilities: Probabilities
     power: tuple[Power, ...]
@@ -131,6 +132,7 @@ class Score:
             "pairs": asdict(self.pairs),
             "lacking": {"lack_said": asdict(self.lack_said)},
             "intervals": asdict(self.intervals),
+            "budget": {"within_5_points": asdict(self.budget)},
             "closed": asdict(self.closed),
             "probabilities": {
                 "brier": stated.brier,

@@ -28,6 +28,8 @@ from coupled.blind.trials.result import (
 
 CLEAR = 2.0  # a single that at least doubles its stage's residual is to be named
 CLOSED = 0.95
+NO_SHARE = 0.01
+SHARE_NEAR = 0.05  # of a stage's power, by which a share of the budget may be off
 SIZES = (0.0, 1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0, 20.0, float("inf"))  # bins of ratio
 PROBABILITIES = (0.0, 0.5, 0.7, 0.9, 0.97, 1.0)
 
@@ -83,6 +85,7 @@ def score(answers: Sequence[Answer]) -> Score:
         ),
         lack_said=_of(of("lacking"), lambda a: set(a.truth.missing) <= a.lacking),
         intervals=_intervals(right),
+        budget=_budget(right),
         closed=_of(right, lambda a: a.closed is not None and a.closed > CLOSED),
         probabilities=_probabilities(answers),
         power=_power(singles),
@@ -106,15 +109,26 @@ def _intervals(right: Sequence[Answer]) -> Intervals:
     covered = total = without = 0
     for answer in right:
         for effect in answer.truth.effects:
-            found = answer.found.get(effect.name)
             for name, value in effect.parameters.items():
-                interval = None if found is None else found.intervals.get(name)
+                interval = answer.interval(effect.name, name)
                 if interval is None or not interval.whole:
                     without += 1
                     continue
                 total += 1
                 covered += interval.holds(value)
     return Intervals(share(covered, total), without)
+
+
+def _budget(right: Sequence[Answer]) -> Share:
+    """Return how often an effect's share of its stage's power is as the twin's own."""
+    off = [
+        abs(answer.share(stage, name) - true)
+        for answer in right
+        for stage, shares in answer.truth.budget.items()
+        for name, true in shares.items()
+        if abs(true) > NO_SHARE  # it acts there
+    ]
+    return share(sum(one <= SHARE_NEAR for one in off), len(off))
 
 
 def _probabilities(answers: Sequence[Answer]) -> Probabilities:

@@ -10,7 +10,9 @@ import numpy as np
 
 from coupled.blind.trials.deck import Deck
 from coupled.blind.trials.measure import alike, stage_gaps
+from coupled.blind.trials.readings import not_told_apart, same_law
 from coupled.blind.trials.rigs import DRAWN
+from coupled.blind.trials.shares import true_shares
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
 from coupled.blind.twin.conditions import Realism
 from coupled.blind.twin.kinds import Clean, Draw, Kind
@@ -59,10 +61,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class _Sized:
-    """A kind at the size it was given, and the gap that it makes alone."""
+    """A kind at the size it was given, the gap that it makes alone, and that record."""
 
     put: Installed
     gap: float
+    record: Record
 
 
 def plans(rng: Rng, records: int, deck: Deck) -> list[Plan]:
@@ -173,8 +176,25 @@ def _flown(
     if plan.category == "single":
         others = alike(setting.rig, flown.record, kinds[0].name)
         truth = replace(truth, alike=others)
+    if plan.category in ("single", "pair") and setting.conditions.presliding_m is not None:
+        truth = _read_otherwise(truth, setting, clean, parts, flown.record)
     trial = Trial(setting.rig, flown.record, truth)
     return _lacking(rng, trial) if plan.category == "lacking" else trial
+
+
+def _read_otherwise(
+    truth: Truth, setting: Setting, clean: Clean, parts: Sequence[_Sized], record: Record
+) -> Truth:
+    """Return the truth with its other readings, and what each effect holds of the gap."""
+    names = [effect.name for effect in truth.effects]
+    records = {frozenset[str](): clean.record, frozenset(names): record}
+    if len(names) > 1:
+        records |= {frozenset([part.put.kind.name]): part.record for part in parts}
+    return replace(
+        truth,
+        readings=(*same_law(names), *not_told_apart(setting.rig, record, names)),
+        budget=true_shares(setting.rig, records, truth.stages),
+    )
 
 
 def _part(
@@ -249,7 +269,7 @@ def _sized(
         excess = math.sqrt(max(gap**2 - bare**2, 0.01))
         off = abs(math.log(wanted / excess))
         if off < miss:
-            best, miss = _Sized(put, gap), off
+            best, miss = _Sized(put, gap, record), off
         last = size
         size *= min(max(wanted / excess, 0.02), 50.0)
         size = min(max(size, kind.least), kind.most)

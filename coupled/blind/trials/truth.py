@@ -45,6 +45,23 @@ class Sizes:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """Effects that are the same law as the truth's, and their stages, sorted.
+
+    `sure`: whatever is recorded, so that naming them is right; else on this record, so that
+    naming them is right only beside the truth.
+    """
+
+    names: tuple[str, ...]
+    stages: tuple[str, ...]
+    sure: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the reading as the key has it."""
+        return {"names": list(self.names), "stages": list(self.stages), "sure": self.sure}
+
+
+@dataclass(frozen=True)
 class Truth:
     """The truth of a record, an entry of the key.
 
@@ -54,6 +71,8 @@ class Truth:
     gap         each stage's residual over its floor under the nominal rig
     missing     channels that were taken out
     alike       effects that are the same law on this record; of a single
+    readings    other effects that are the same law, or are on this record; of the later versions
+    budget      {stage: {effect: its share of the residual's power}}; of the later versions
     also        what the rig has besides and the nominal one lacks; naming it is not wrong
     tolerance   factors on numbers that are off within their setting, which is no effect
     sizes       None where the rig has nothing
@@ -68,6 +87,8 @@ class Truth:
     gap: Mapping[str, float] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     alike: tuple[str, ...] = ()
+    readings: tuple[Reading, ...] = ()
+    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = field(default_factory=dict)
     sizes: Sizes | None = None
@@ -78,6 +99,12 @@ class Truth:
     def names(self) -> frozenset[str]:
         """The names of what the rig has."""
         return frozenset(effect.name for effect in self.effects)
+
+    @property
+    def not_told_apart(self) -> frozenset[str]:
+        """The names of the effects that this record does not tell from the truth's."""
+        others = (one.names for one in self.readings if not one.sure)
+        return frozenset(name for names in others for name in names) - self.names
 
     @property
     def ratio(self) -> float:
@@ -97,6 +124,10 @@ class Truth:
         }
         if self.category == "single":
             table["alike"] = list(self.alike)
+        if self.readings:
+            table["readings"] = [one.as_dict() for one in self.readings]
+        if self.budget:
+            table["budget"] = {stage: dict(shares) for stage, shares in self.budget.items()}
         if self.also:
             table["also"] = list(self.also)
         if self.category == "none":
@@ -130,6 +161,11 @@ def truth_from(table: Mapping[str, Any]) -> Truth:
         gap=dict(table["gap"]),
         missing=tuple(map(str, table["missing"])),
         alike=tuple(map(str, table.get("alike", ()))),
+        readings=tuple(
+            Reading(tuple(one["names"]), tuple(one["stages"]), bool(one["sure"]))
+            for one in table.get("readings", ())
+        ),
+        budget=dict(table.get("budget", {})),
         also=tuple(map(str, table.get("also", ()))),
         tolerance=dict(table.get("tolerance", {})),
         sizes=sizes,

@@ -30,6 +30,7 @@ def _lines(score: Score) -> list[tuple[str, Share]]:
         ("  their stages, and no other", score.pairs.stages),
         ("channels lacking, and said so", score.lack_said),
         ("where right: 95 % intervals that hold the truth", score.intervals.covered),
+        ("where right: budget's shares within 5 points", score.budget),
         ("where right: more than 95 % of the gap closed", score.closed),
     ]
 

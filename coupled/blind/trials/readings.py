@@ -1,0 +1,85 @@
+"""Other readings of a trial's truth: the same law by other names, and what its record cannot tell.
+
+A reading that is the same law whatever is recorded may be named with confidence. One that this
+record does not tell from the truth may only be named beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from coupled.blind.trials.measure import outputs_of
+from coupled.blind.trials.truth import Reading
+from coupled.gap.case import Case
+from coupled.gap.fit import Fit
+from coupled.gap.library import BY_NAME
+from coupled.gap.output import Output, memory
+from coupled.gap.thresholds import NO_GAP_LEFT, RIVAL_GAIN
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+# One law by other names, where friction yields: friction by direction is plain friction of the
+# mean with a force of half the difference, and how far any yields is in the twin's rigs.
+PLAIN, YIELDS = "coulomb_friction", "presliding_friction"
+SAME = {
+    (PLAIN,): ((YIELDS,),),
+    (YIELDS,): ((PLAIN,),),
+    ("asymmetric_friction",): ((PLAIN, "force_offset"), (YIELDS, "force_offset")),
+    (PLAIN, "force_offset"): (("asymmetric_friction",), (YIELDS, "force_offset")),
+}
+# One law in a limit that a record may not leave: a rig that does not bend, a short lag, a stiff
+# contact, a lift that is all of the angle of attack.
+NEAR = (
+    ("force_zero", "force_offset"),
+    ("force_skew", "transport_delay"),
+    ("viscous_damping", "modifying_lag"),
+    ("backlash", "soft_backlash"),
+    ("mass", "lift_slope"),
+)
+
+
+def same_law(effects: Sequence[str]) -> Iterator[Reading]:
+    """Yield the readings of effects that are the same law, whatever the record holds."""
+    for names, others in SAME.items():
+        if set(names) <= set(effects):
+            rest = set(effects) - set(names)
+            for other in others:
+                yield reading(rest | set(other), sure=True)
+
+
+def not_told_apart(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator[Reading]:
+    """Yield the readings of a rig's effects that this record does not tell from them.
+
+    What is left with the other effect fitted is likelier by less than a diagnosis asks for.
+    """
+    for pair in NEAR:
+        for name, other in (pair, pair[::-1]):
+            if name not in effects or other in effects:
+                continue
+            shown = {*BY_NAME[name].shows_in, *BY_NAME[other].shows_in}
+            here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
+            outputs = outputs_of(rig, record, "airframe" in shown)
+            case = Case(rig, "column", [o for o in outputs if o.stage in shown])
+            right = case.fit([BY_NAME[n] for n in here])
+            wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
+            if _gain(case.outputs, right, wrong) < RIVAL_GAIN:
+                yield reading({other, *effects} - {name}, sure=False)
+
+
+def reading(names: Iterable[str], *, sure: bool) -> Reading:
+    """Return a reading with the stages of its effects."""
+    known = sorted(names)
+    return Reading(tuple(known), tuple(sorted({BY_NAME[name].stage for name in known})), sure)
+
+
+def _gain(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
+    """Return the log-likelihood by which the right fit beats the wrong one."""
+    gain = 0.0
+    for output in outputs:
+        left = output.residual(right.rig)
+        after, before = (float(np.mean(output.residual(r.rig) ** 2)) for r in (right, wrong))
+        count = 0.5 * len(left) / memory(left)
+        gain += count * float(np.log((before + NO_GAP_LEFT) / (after + NO_GAP_LEFT)))
+    return gain

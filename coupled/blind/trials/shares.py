@@ -1,0 +1,76 @@
+"""What each effect of a trial truly holds of its stages' gaps, by flying the twin without it.
+
+The budget of a diagnosis shares out the power of a stage's residual (docs/diagnosis.md). Here the
+twin is flown with every subset of its effects, the same noise in each, and an effect's share is
+what it takes off on the mean over all orders (Shapley). What the rig has besides, settings and
+friction that yields, is no part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+
+from coupled.blind.trials.measure import outputs_of
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.output import Output
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Subset = frozenset[str]
+
+
+def true_shares(
+    rig: Rig, records: Mapping[Subset, Record], stages: Sequence[str]
+) -> dict[str, dict[str, float]]:
+    """Return {stage: {effect: its share of the residual's power}}.
+
+    `records` are the twin's, by the effects that it had: all subsets of all of them.
+    """
+    flown = "airframe" in stages
+    outputs = {had: outputs_of(rig, record, flown) for had, record in records.items()}
+    every = max(outputs, key=len)
+    found = {}
+    for stage in stages:
+        judged = _judged(stage, outputs[every], rig)
+        if judged:
+            powers = {had: _power(judged, made, rig) for had, made in outputs.items()}
+            found[stage] = _shapley(every, powers)
+    return found
+
+
+def _judged(stage: str, outputs: Sequence[Output], rig: Rig) -> list[Output]:
+    """Return the outputs of a stage whose power is shared out: those that show a gap."""
+    names = STAGE_OF[stage].outputs or STAGE_OF[stage].effects_show_in
+    own = [output for output in outputs if output.stage in names]
+    wide = [output for output in own if output.gap(rig) > output.limit]
+    return wide or sorted(own, key=lambda output: -output.gap(rig))[:1]
+
+
+def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:
+    """Return a record's residual power in some outputs, over their floors² with all effects."""
+    known = {(output.stage, output.channel): output for output in made}
+    total = 0.0
+    for output in judged:
+        other = known[output.stage, output.channel]
+        total += (other.gap(rig) * other.floor / output.floor) ** 2
+    return total / len(judged)
+
+
+def _shapley(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
+    """Return each effect's share of the power with all of them, noise of one floor² with it."""
+    whole = powers[every] - powers[frozenset()] + 1.0
+    n, found = len(every), {}
+    for name in sorted(every):
+        others = sorted(every - {name})
+        held = 0.0
+        for size in range(n):
+            weight = factorial(size) * factorial(n - size - 1) / factorial(n)
+            for some in combinations(others, size):
+                without = frozenset(some)
+                held += weight * (powers[without | {name}] - powers[without])
+        found[name] = float(np.clip(held / whole, -1.0, 1.0)) if whole > 0.0 else 0.0
+    return found

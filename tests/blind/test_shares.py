@@ -1,0 +1,46 @@
+"""What each effect truly holds of a gap, and which readings of it are the same law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.blind.trials.deck import read_deck
+from coupled.blind.trials.readings import same_law
+from coupled.blind.trials.shares import _shapley
+from coupled.blind.trials.trial import Plan, draw_trial
+
+
+def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
+    a, b, both, none = frozenset("a"), frozenset("b"), frozenset("ab"), frozenset[str]()
+    found = _shapley(both, {none: 1.0, a: 4.0, b: 7.0, both: 10.0})
+    assert found == pytest.approx({"a": 0.3, "b": 0.6})  # and noise a tenth
+    # Together they leave what either leaves alone: they share it.
+    assert _shapley(both, {none: 1.0, a: 10.0, b: 10.0, both: 10.0}) == pytest.approx(
+        {"a": 0.45, "b": 0.45}
+    )
+    # What the rig has besides, here three floors² more, is no part of the gap.
+    besides = _shapley(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
+    assert besides == pytest.approx({"a": 0.3, "b": 0.6})
+
+
+def test_friction_that_yields_is_friction() -> None:
+    [one] = same_law(["coulomb_friction"])
+    assert one.names == ("presliding_friction",)
+    assert one.sure
+    [other] = same_law(["bend", "coulomb_friction"])
+    assert other.names == ("bend", "presliding_friction")
+    assert other.stages == ("linkage", "loader")
+    assert not list(same_law(["bend", "inertia"]))
+
+
+@pytest.mark.slow
+def test_a_force_read_with_a_zero_is_an_offset_where_nothing_bends() -> None:
+    deck = read_deck(2)
+    rigid = {"bench-rigid": deck.rigs["bench-rigid"]}
+    for names, other in ((["force_zero"], "force_offset"), (["inertia"], None)):
+        plan = Plan("single", tuple(names))
+        truth = draw_trial(np.random.default_rng(5), plan, deck, rigid).truth
+        assert truth.not_told_apart == ({other} if other else set())
+        [shares] = truth.budget.values()
+        assert 0.0 < shares[names[0]] < 1.0
