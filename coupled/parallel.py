@@ -1,7 +1,7 @@
 """Where much work is done: here, on all cores, or on a dask cluster.
 
 The three have one face, that of `concurrent.futures`. However the parent ends, its workers end
-with it.
+with it. Within one piece of work, threads share what runs compiled.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from concurrent.futures import (
 )
 from concurrent.futures import wait as wait_for
 from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from coupled.errors import InputError
@@ -31,6 +34,83 @@ from coupled.errors import InputError
 _PATIENCE_s = 10.0
 _ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
 T = TypeVar("T")
+S = TypeVar("S")
+
+
+class HaltedError(Exception):
+    """Work in a thread is not wanted any more."""
+
+
+@dataclass(frozen=True)
+class _Team:
+    """So many threads that may work at once, and whether they are to stop."""
+
+    threads: int = 1
+    halt: threading.Event = field(default_factory=threading.Event)
+
+
+_ALONE = _Team()
+_team: ContextVar[_Team] = ContextVar("_team", default=_ALONE)
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Let `in_threads` use so many threads within; 0 is one a core."""
+    before = _team.set(_Team(cores(count)))
+    try:
+        yield
+    finally:
+        _team.reset(before)
+
+
+def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
+    """Return what `work` gives of each item, in their order, by the threads that there are.
+
+    What one raises is raised here, and halts the others (`go_on`), as an interruption does. Work
+    within work has no more threads. Compiled stages and large arrays run beside each other.
+    """
+    count = min(_team.get().threads, len(items))
+    if count < 2:
+        return [work(item) for item in items]
+    team, todo, done = _Team(), SimpleQueue[int](), dict[int, T]()
+    faults: list[BaseException] = []
+    for number in range(len(items)):
+        todo.put(number)
+
+    def some() -> None:
+        before = _team.set(team)
+        try:
+            while True:
+                go_on()
+                number = todo.get_nowait()
+                done[number] = work(items[number])
+        except (Empty, HaltedError):
+            pass
+        except BaseException as error:  # raised where the work was asked for
+            faults.append(error)
+            team.halt.set()
+        finally:
+            _team.reset(before)
+
+    helpers = [threading.Thread(target=some, daemon=True) for _ in range(count - 1)]
+    try:
+        for helper in helpers:
+            helper.start()
+        some()
+        for helper in helpers:
+            while helper.is_alive():
+                helper.join(_ATTENTIVE_s)
+    finally:  # interrupted
+        team.halt.set()
+    for fault in faults:
+        raise fault
+    return [done[number] for number in range(len(items))]
+
+
+def go_on() -> None:
+    """Raise HaltedError where this thread's work is not wanted any more."""
+    if _team.get().halt.is_set():
+        raise HaltedError
 
 
 class Here(Executor):

@@ -31,6 +31,10 @@ LATERAL_PROPERTIES = (
 )
 assert len(LONGITUDINAL_PROPERTIES) == len(LONGITUDINAL)
 assert len(LATERAL_PROPERTIES) == len(LATERAL)
+# By channel; JSBSim has all but q̄, airspeed and height in SI, too.
+PROPERTIES = dict(
+    zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
+)
 
 
 class Lever(NamedTuple):

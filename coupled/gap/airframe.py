@@ -48,7 +48,7 @@ COMPARED = (
     "sideslip_rad",
 )
 TRIM = "elevator_trim_rad"  # where the elevator stands in trim
-_KEPT = 4  # flights remembered
+_KEPT = 8  # flights remembered
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 
 from coupled.gap.case import Case
 from coupled.gap.effect import Effect, value_of
@@ -10,6 +11,7 @@ from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate
 from coupled.gap.information import informative
 from coupled.gap.screen import screen
+from coupled.parallel import in_threads
 
 
 def fitted_candidates(
@@ -25,25 +27,44 @@ def fitted_candidates(
         and effect.name not in same
         and outputs & set(effect.shows_in)
     ]
-    found: list[tuple[Effect, Fit]] = []
     screened = screen(case, current, candidates)
+    found = _fitted(case, current, [one for one in screened if one[0].alike is None])
     # The richer of two laws also starts from where the plainer one ended.
-    screened.sort(key=lambda one: one[0].alike is not None)
-    for i, (effect, seen) in enumerate(screened):
-        starts = [*seen, *_from_plainer(case, effect, found)]
+    richer = [
+        (effect, [*starts, *_from_plainer(case, effect, found)])
+        for effect, starts in screened
+        if effect.alike is not None
+    ]
+    return informative(case, current, found + _fitted(case, current, richer))
+
+
+Starts = list[dict[str, float]]
+
+
+def _fitted(
+    case: Case, current: Fit, screened: Sequence[tuple[Effect, Starts]]
+) -> list[tuple[Effect, Fit]]:
+    """Return the effects that fit beside the current ones, each with the best of its fits."""
+    tries = [(effect, start) for effect, starts in screened for start in starts]
+    begun = count()
+
+    def one(tried: tuple[Effect, dict[str, float]]) -> Fit:
+        effect, start = tried
         if case.tell is not None:
-            case.tell(f"fitting {effect.name}", i, len(screened))
-        chosen = (*current.effects, effect)
-        tries = [
-            case.fit(chosen, "fitted", {**current.values, **start}, effect) for start in starts
-        ]
-        fitted = min(tries, key=lambda one: one.cost)
-        bound = any(effect.value_key(p) in fitted.at_bound for p in effect.free)
-        if bound:
-            continue
-        if not _within_tolerance(case, effect, fitted):
-            found.append((effect, fitted))
-    return informative(case, current, found)
+            case.tell(f"fitting {effect.name}", next(begun), len(tries))
+        return case.fit((*current.effects, effect), "fitted", {**current.values, **start}, effect)
+
+    fits = iter(in_threads(one, tries))
+    best = [
+        (effect, min((next(fits) for _ in starts), key=lambda fitted: fitted.cost))
+        for effect, starts in screened
+    ]
+    return [
+        (effect, fitted)
+        for effect, fitted in best
+        if not any(effect.value_key(p) in fitted.at_bound for p in effect.free)
+        and not _within_tolerance(case, effect, fitted)
+    ]
 
 
 def _from_plainer(

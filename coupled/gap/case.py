@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from coupled.gap.effect import Effect, possible
-from coupled.gap.fit import Fit, fit
+from coupled.gap.fit import Fit, Known, fit
 from coupled.gap.output import Output, Part, stage_gaps
 from coupled.gap.settings import contact, is_dry, settings
 from coupled.gap.thresholds import SETTLE_FROM
@@ -31,6 +31,7 @@ class Case:
     refloored: Callable[[Rig], Sequence[Output]] | None = None
     # A model with an error of its own strains its settings: only a stage over its limit is guilty.
     only_wide: bool = False
+    _known: Known = field(default_factory=dict, repr=False, compare=False)  # fits
 
     @cached_property
     def known(self) -> dict[str, Effect]:
@@ -101,4 +102,5 @@ class Case:
         With `only`, just that one and what shares an output with it; the others stay.
         """
         free = self.nuisances(effects)
-        return fit(self.nominal, self.control, self.outputs, effects, free, part, start, only)
+        given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
+        return fit(*given, self._known)

@@ -33,6 +33,7 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.gap.thresholds import MOST
 from coupled.gap.where import remains, where
+from coupled.parallel import threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -48,16 +49,29 @@ def diagnose(
     control: ControlName = "column",
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
+    workers: int = 0,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
     `tell` is called with what is being done, and how much of how much is done. With records of the
-    machine when it was well (`healthy`), the difference from those is judged (`healthy`). Raises
-    InputError where a record cannot be of this rig, or lets no stage be judged.
+    machine when it was well (`healthy`), the difference from those is judged (`healthy`). So many
+    threads work as `workers`, 0 being one a core; the answer is that of one. Raises InputError
+    where a record cannot be of this rig, or lets no stage be judged.
     """
+    with threads(workers):
+        return _diagnose(rig, records, control, tell, healthy or {})
+
+
+def _diagnose(
+    rig: Rig,
+    records: Mapping[str, Record],
+    control: ControlName,
+    tell: Tell | None,
+    healthy: Mapping[str, Record],
+) -> Diagnosis:
     baseline = None
     if healthy:
-        well = diagnose(rig, healthy, control, tell)
+        well = _diagnose(rig, healthy, control, tell, {})
         case = Case(rig, control, well.outputs)
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
@@ -85,8 +99,8 @@ def diagnose(
             known[:] = [(other, made)]
         return known[0][1]
 
-    choice = search(rig, control, outputs, library, tell, refloored, baseline is not None)
-    case = Case(rig, control, outputs, tell, refloored)
+    case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
+    choice = search(case, library)
     stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
     fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values)
     floors = floors_of(case, choice)

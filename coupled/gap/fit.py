@@ -20,6 +20,7 @@ from scipy.stats import t as student
 from coupled.gap.effect import Effect, Parameter, possible
 from coupled.gap.output import Output, Part, memory
 from coupled.gap.thresholds import DIFFERENCE, DIFFERENCE_STEPS, FIT_ITERATIONS
+from coupled.parallel import go_on, in_threads
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -57,6 +58,7 @@ def fit(
     part: Part = "all",
     start: Mapping[str, float] | None = None,
     only: Effect | None = None,
+    known: Known | None = None,
 ) -> Fit:
     """Return the effects fitted to a part of the outputs that they touch.
 
@@ -65,7 +67,8 @@ def fit(
     Effects that share no output are fitted each on its own, so that neither's misfit misleads
     the other; of effects that free the same number the first fits it, and the others have it
     from there. With `only`, just those that share one with it, and the others stay at `start`. A
-    set that the physics cannot give stands at its bounds.
+    set that the physics cannot give stands at its bounds. `known` remembers what was fitted to
+    these outputs, so that none is fitted twice.
     """
     every = [*effects, *nuisances]
     values: dict[str, float] = {}
@@ -76,7 +79,7 @@ def fit(
     for group in _groups(every):
         if only is None or only in group:
             ours = touched(outputs, group)
-            found = _fit(nominal, control, ours, group, part, start or {}, nuisances)
+            found = _remembered(known, nominal, control, ours, group, part, start or {}, nuisances)
             low, high, bound = low | found.low, high | found.high, bound + found.at_bound
             values, cost = values | found.values, cost + found.cost
             information[tuple(found.values)] = found.information
@@ -120,6 +123,31 @@ class _Group:
     information: Floats
 
 
+# {effects, which are nuisances, part, values at the starts: the fit}, of one rig and its outputs
+Known = dict[tuple[tuple[Effect, ...], frozenset[str], Part, tuple[tuple[float, ...], ...]], _Group]
+
+
+def _remembered(
+    known: Known | None,
+    nominal: Rig,
+    control: ControlName,
+    ours: Sequence[Output],
+    effects: Sequence[Effect],
+    part: Part,
+    start: Mapping[str, float],
+    nuisances: Sequence[Effect],
+) -> _Group:
+    """Return a fit, as it is known; one that starts where another ended is that one."""
+    if known is None:
+        return _fit(nominal, control, ours, effects, part, start, nuisances)
+    what = (tuple(effects), frozenset(one.name for one in nuisances if one in effects), part)
+    key = (*what, tuple(map(tuple, _starts(*_free(effects), start))))
+    if key not in known:
+        found = known[key] = _fit(nominal, control, ours, effects, part, start, nuisances)
+        known[*what, (tuple(found.values.values()),)] = found
+    return known[key]
+
+
 def _fit(
     nominal: Rig,
     control: ControlName,
@@ -134,6 +162,7 @@ def _fit(
     frames = sum(int(output.rows(part).sum()) for output in ours)
 
     def residual(scaled: Floats) -> Floats:
+        go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
@@ -199,18 +228,20 @@ class _Slopes:
 
     def __call__(self, x: Floats) -> Floats:
         here = self._residual(x)
-        columns = []
-        for i, value in enumerate(x):
+
+        def column(i: int) -> Floats:
+            value = x[i]
             room = max(self._high[i] - value, value - self._low[i])
             step = min(self._step[i], 0.5 * room)
             there = x.copy()
             there[i] = value + (step if self._high[i] - value > step else -step)
             change = self._residual(there) - here
-            columns.append(change / (there[i] - value))
             size = float(np.sqrt(np.mean(change**2)))
             growth = np.clip(DIFFERENCE / max(size, 1e-9), 0.1, 10.0)
             self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
-        return np.column_stack(columns)
+            return np.asarray(change / (there[i] - value))
+
+        return np.column_stack(in_threads(column, range(len(x))))
 
 
 def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:

@@ -7,14 +7,16 @@ trim, so that what is compared is the aircraft's answer, and no jolt from one tr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.everyframe import PROPERTIES
 from coupled.flight.gusts import Gusts
 from coupled.gap.thresholds import LOST_MOTION, SAME_TRIM_rad
 from coupled.record.channels import ControlName, motion_channels
@@ -24,6 +26,7 @@ from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
+_flying = Lock()  # JSBSim never lets another thread run: two flights at once would only alternate
 
 
 def command_of(position: Floats, points: Points) -> Floats:
@@ -89,22 +92,30 @@ def fly_open_loop(
     still = changed(flight, {"gust_rms_m_per_s": 0.0}, "rig", "flight")
     frame_s = 1.0 / frame_rate_Hz
     gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
-    airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
-    every = motion_channels(controls, flown=True)
-    at = [every.index(name) for name in channels]
-    start = airframe.motion()
-    trim = tuple(start[every.index(one.channel)] for one in moved)
-    asked = np.zeros((len(moved[0].values), 3))
-    for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
-        asked[:, i] = one.commands(own)
-    motion = np.full((len(asked), len(at)), np.nan)
-    rows = [(a, b, c) for a, b, c in asked.tolist()]
-    for k in range(len(rows)):
-        now = airframe.motion()
-        motion[k] = [now[i] for i in at]
-        if not math.isfinite(motion[k, 0]) or abs(motion[k, 0]) > LOST_MOTION:
-            motion[k:] = motion[max(k - 1, 0)]
+    with _flying:
+        airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
+        start = dict(zip(motion_channels(controls, flown=True), airframe.motion(), strict=True))
+        trim = tuple(start[one.channel] for one in moved)
+        asked = np.zeros((len(moved[0].values) + 1, 3))
+        for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
+            asked[:-1, i] = one.commands(own)
+        asked[-1] = asked[-2]
+        return Flown(_motion(airframe, asked[1:], channels), trim)
+
+
+def _motion(airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str]) -> Floats:
+    """Return the channels, shape (frames, channels), as the aircraft flies by commands about trim.
+
+    A row is the answer to the row of commands before it.
+    """
+    each = [airframe.reader(PROPERTIES[name]) for name in channels]
+    step, readers = airframe.step, [read for read in each if read is not None]
+    motion: list[list[float]] = []
+    for a, b, c in asked.tolist():
+        now = [read() for read in readers]
+        if not abs(now[0]) <= LOST_MOTION:  # nor is it a number
+            motion += [motion[-1] if motion else now] * (len(asked) - len(motion))
             break
-        # Row k + 1 is the answer to the command of row k.
-        airframe.step(rows[min(k + 1, len(rows) - 1)])
-    return Flown(motion, trim)
+        motion.append(now)
+        step((a, b, c))
+    return np.array(motion)

@@ -30,7 +30,7 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
-_KEPT = 4  # predictions remembered
+_KEPT = 8  # predictions remembered: threads fit different effects at once
 
 
 @dataclass(frozen=True)

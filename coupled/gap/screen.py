@@ -24,6 +24,7 @@ from coupled.gap.thresholds import (
     SCREENED,
     SCREENED_LEAST,
 )
+from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
 
 
@@ -35,32 +36,36 @@ def screen(
     There is a start for each shape that an effect of several parameters begins from. One without
     a parameter costs next to nothing to fit, and is always among them.
     """
-    scores = []
-    for effect in candidates:
-        ours = touched(case.outputs, [effect])
-        now = np.concatenate([output.residual(current.rig) for output in ours])
-        best, starts = 0.0, []
-        for tries in _tries(case, current, effect):
-            least, start = np.inf, {}
-            for values in tries:
-                rig = _with(case, current, effect, values)
-                if rig is None:
-                    continue
-                left = np.concatenate([output.residual(rig) for output in ours])
-                sign = now - left
-                size = float(sign @ sign)
-                best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
-                # A limit that is never met leaves the residual as it is, and a fit where it was.
-                if size > SCREEN_SHOWN * len(now) and float(left @ left) < least:
-                    least, start = float(left @ left), values
-            starts += [start] if start or not effect.free else []
-        if starts:
-            scores.append((best, effect, starts))
+    found = in_threads(lambda effect: _screened(case, current, effect), candidates)
+    scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
     scores.sort(key=lambda item: -item[0])
     near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
     most = min(SCREENED, max(SCREENED_LEAST, len(near)))
-    kept = scores[:most] + [item for item in scores[most:] if not item[1].free]
-    return [(effect, starts) for _, effect, starts in kept]
+    kept = scores[:most] + [item for item in scores[most:] if not item[2].free]
+    return [(effect, starts) for _, starts, effect in kept]
+
+
+def _screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:
+    """Return the power that an effect's signature takes, floors², and the starts of its fits."""
+    ours = touched(case.outputs, [effect])
+    now = np.concatenate([output.residual(current.rig) for output in ours])
+    best, starts = 0.0, list[dict[str, float]]()
+    for tries in _tries(case, current, effect):
+        least, start = np.inf, {}
+        for values in tries:
+            go_on()
+            rig = _with(case, current, effect, values)
+            if rig is None:
+                continue
+            left = np.concatenate([output.residual(rig) for output in ours])
+            sign = now - left
+            size = float(sign @ sign)
+            best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)
+            # A limit that is never met leaves the residual as it is, and a fit where it was.
+            if size > SCREEN_SHOWN * len(now) and float(left @ left) < least:
+                least, start = float(left @ left), values
+        starts += [start] if start or not effect.free else []
+    return best, starts
 
 
 def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig | None:

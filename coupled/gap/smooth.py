@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from coupled.gap.lines import Line, lines_in
 from coupled.gap.noise import Noise
 
 Floats = NDArray[np.float64]
+_REMEMBERED = 64  # signals whose smoother is known: those of one record, noise and all
 
 
 def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
@@ -44,19 +45,7 @@ class Smoother:
     @classmethod
     def of(cls, signal: Floats, orders: Sequence[int] = (3, 2, 1)) -> Smoother:
         """Return the one that suits a signal best, with differences of one of these orders."""
-        lines = tuple(lines_in(signal))
-        signal = signal - sum(line.over(len(signal)) for line in lines)
-        reach = min(len(signal) - 1, 200)
-        long = _lengthened(signal, reach)
-        rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
-        power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2
-        best, gain = np.inf, np.ones_like(power)
-        for order, strength in product(orders, np.logspace(-3, 12, 61)):
-            passed = 1.0 / (1.0 + strength * rate ** (2 * order))
-            score = np.mean((1.0 - passed) ** 2 * power) / np.mean(1.0 - passed) ** 2
-            if score < best:
-                best, gain = score, passed
-        return cls(gain, reach, lines)
+        return _known(np.ascontiguousarray(signal, dtype=np.float64).tobytes(), tuple(orders))
 
     def smooth(self, signal: Floats) -> Floats:
         """Return a signal of the same length without its white noise; zero phase.
@@ -77,6 +66,36 @@ class Smoother:
         noise = level.sample(frames + 2 * self.reach, rng)
         out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(self.gain), len(noise))
         return np.asarray(out[self.reach : self.reach + frames])
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _known(signal: bytes, orders: tuple[int, ...]) -> Smoother:
+    """Return the smoother of a signal; a diagnosis smooths each of them several times."""
+    plain = np.frombuffer(signal)
+    lines = tuple(lines_in(plain))
+    reach = min(len(plain) - 1, 200)
+    long = _lengthened(plain - sum(line.over(len(plain)) for line in lines), reach)
+    gain = _gain(long, orders)
+    gain.flags.writeable = False
+    return Smoother(gain, reach, lines)
+
+
+def _gain(long: Floats, orders: Sequence[int]) -> Floats:
+    """Return the gain by which a lengthened signal is best foretold from its own neighbours."""
+    rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
+    power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2
+    best, found, stopped = np.inf, (orders[0], 0.0), np.empty_like(power)
+    for order in orders:
+        steep = rate ** (2 * order)
+        for strength in np.logspace(-3, 12, 61).tolist():
+            np.multiply(steep, strength, out=stopped)
+            stopped /= 1.0 + stopped  # 1 − H
+            share = float(stopped.sum())
+            score = float(np.square(stopped, out=stopped) @ power) / share**2
+            if score < best:
+                best, found = score, (order, strength)
+    order, strength = found
+    return np.asarray(1.0 / (1.0 + strength * rate ** (2 * order)))
 
 
 def smoothed(signal: Floats) -> Floats:

@@ -37,7 +37,7 @@ def stage(function: F) -> F:
     return cast(F, numba.njit(function))
 
 
-def entry(function: F) -> F:
+def entry(function: F, nogil: bool = False) -> F:
     """Compile a function that Python calls, and keep the result on disk.
 
     Where no folder can be written (a read-only install without a writable home, and no
@@ -46,13 +46,18 @@ def entry(function: F) -> F:
     chosen = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(chosen, Path(function.__code__.co_filename).parent)
     try:
-        dispatcher = numba.njit(function)
+        dispatcher = numba.njit(function, nogil=nogil)
         dispatcher._cache = _kept(function)
         return cast(F, dispatcher)
     except RuntimeError:  # numba's, for a function without a place for its cache
-        return cast(F, numba.njit(function))
+        return cast(F, numba.njit(function, nogil=nogil))
     finally:
         config.CACHE_DIR = chosen
+
+
+def long_entry(function: F) -> F:
+    """Compile an entry during which other threads run; a short one would lose by handing over."""
+    return entry(function, nogil=True)
 
 
 def _kept(function: Callable[..., Any]) -> Any:

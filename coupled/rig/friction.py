@@ -168,11 +168,13 @@ def yielding_speed(
     """Return the speed u at the middle of a step of `span` seconds, in d/s, of a yielding contact.
 
     inertia·(u − v) + force over the way u·span = push, with `v` the speed at its start. The force
-    rises with the way, ever less: from the speed of a contact that does not slip, Newton's steps
-    run up to u from one side.
+    rises with the way, ever less: from the speed that its slope at the start would let, Newton's
+    steps run up to u from one side.
     """
     spring = p.stiffness * (0.5 * span)
-    u = (inertia * v + push - p.stiffness * bent) / (inertia + spring + p.contact_damping)
+    free = inertia * v + push - p.stiffness * bent
+    bends = _bending(p, _slipping(p, load, v), bent, free)
+    u = free / (inertia + bends * (spring + p.contact_damping))
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = 0.0

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from coupled.rig.command import start_command, take_set_point
 from coupled.rig.compensation import estimate
-from coupled.rig.compiled import entry
+from coupled.rig.compiled import long_entry
 from coupled.rig.frame import set_product
 from coupled.rig.hosted import HOSTED, Hosted, Mask, held_over
 from coupled.rig.inertia import lead_force, set_inertia
@@ -196,7 +196,7 @@ def on_nodes(rig: Rig, samples: Floats) -> Floats:
     return np.asarray(CubicSpline(frames, samples)(nodes))
 
 
-@entry
+@long_entry
 def _schedule(p: Any, s: Any, pressure: Floats, out: Floats) -> Floats:
     for k in range(len(pressure)):
         read = read_pressure(p[0].schedule, s[0].schedule, pressure[k])
@@ -204,7 +204,7 @@ def _schedule(p: Any, s: Any, pressure: Floats, out: Floats) -> Floats:
     return out
 
 
-@entry
+@long_entry
 def _loader(
     parameters: Any,
     states: Any,
@@ -251,7 +251,7 @@ def _loader(
                 move_loader(p.loader, p.friction, m, s.loader, led, here, h)
 
 
-@entry
+@long_entry
 def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) -> Floats:
     m = s[0].modification
     for k in range(len(out)):
@@ -260,7 +260,7 @@ def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) ->
     return out
 
 
-@entry
+@long_entry
 def _linkage(
     parameters: Any,
     states: Any,
@@ -287,14 +287,14 @@ def _linkage(
     return out
 
 
-@entry
+@long_entry
 def _compensation(p: Any, computed: Floats, force: Floats, out: Floats) -> Floats:
     for k in range(len(out)):
         out[k] = estimate(p[0].compensation, computed[k], force[k])
     return out
 
 
-@entry
+@long_entry
 def _surface(p: Any, s: Any, estimated: Floats, pressure: Floats, out: Floats) -> Floats:
     for k in range(len(out)):
         out[k] = command_surface(p[0].surface, s[0].surface, estimated[k], pressure[k])

@@ -1,0 +1,78 @@
+"""Threads that share one piece of work: its order, its faults, and its end."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from coupled.parallel import HaltedError, go_on, in_threads, threads
+
+
+def test_threads_give_what_one_gives_in_the_same_order() -> None:
+    def square(x: int) -> int:
+        time.sleep(0.001 * (x % 3))
+        return x * x
+
+    alone = in_threads(square, range(20))
+    with threads(2):
+        assert in_threads(square, range(20)) == alone == [x * x for x in range(20)]
+
+
+def test_two_threads_work_at_once_and_their_own_work_has_no_more() -> None:
+    met = threading.Barrier(2, timeout=10.0)
+
+    def meet(_: int) -> list[int]:
+        met.wait()  # breaks unless another is there
+        return in_threads(lambda _: threading.get_ident(), range(4))
+
+    with threads(2):
+        inner = in_threads(meet, range(2))
+    assert all(len(set(each)) == 1 for each in inner)
+    assert inner[0] != inner[1]
+
+
+def test_without_leave_there_is_one_thread() -> None:
+    assert set(in_threads(lambda _: threading.get_ident(), range(4))) == {threading.get_ident()}
+
+
+def test_a_fault_is_raised_where_the_work_was_asked_for_and_halts_the_rest() -> None:
+    met, halted = threading.Barrier(2, timeout=10.0), threading.Event()
+
+    def one(x: int) -> None:
+        met.wait()
+        if x == 0:
+            raise KeyError("broken")
+        try:
+            while True:
+                go_on()
+                time.sleep(0.001)
+        except HaltedError:
+            halted.set()
+            raise
+
+    with threads(2), pytest.raises(KeyError, match="broken"):
+        in_threads(one, range(2))
+    assert halted.is_set()
+    go_on()  # what comes after goes on
+
+
+def test_an_interruption_halts_the_helpers() -> None:
+    main, halted = threading.current_thread(), threading.Event()
+    met = threading.Barrier(2, timeout=10.0)
+
+    def one(_: int) -> None:
+        met.wait()
+        if threading.current_thread() is main:
+            raise KeyboardInterrupt
+        try:
+            while True:
+                go_on()
+                time.sleep(0.001)
+        finally:
+            halted.set()
+
+    with threads(2), pytest.raises(KeyboardInterrupt):
+        in_threads(one, range(2))
+    assert halted.wait(10.0)
