@@ -8,8 +8,9 @@ holds half of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from coupled.errors import InputError
 from coupled.gap.airframe import airframe_outputs, needs, trim_speed
@@ -33,7 +34,7 @@ from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.gap.thresholds import MOST
 from coupled.gap.where import remains, where
-from coupled.parallel import threads
+from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -84,7 +85,8 @@ def _diagnose(
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]
     raised = list if baseline is None else baseline.raised
-    outputs = [output.halved(rig) for output in raised(_outputs(readers))]
+    judged = _outputs(readers)
+    outputs = [output.halved(rig) for output in raised(judged)]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
@@ -95,7 +97,9 @@ def _diagnose(
 
     def refloored(other: Rig) -> Sequence[Output]:
         if not known or known[0][0] != other:
-            made = raised(_outputs([replace(reader, rig=other) for reader in readers]))
+            flown = [one for one in judged if one.stage == "airframe"]
+            anew = [replace(reader, rig=other) for reader in readers]
+            made = raised(_outputs(anew, flown if _fly_alike(rig, other) else None))
             known[:] = [(other, made)]
         return known[0][1]
 
@@ -132,12 +136,21 @@ def _diagnose(
     )
 
 
-def _outputs(readers: Sequence[Reader]) -> list[Output]:
-    found: list[Output] = []
-    for reader in readers:
-        found += reader.outputs()
-        found += airframe_outputs(reader.rig, reader.record, reader.number)
-    return found
+def _outputs(readers: Sequence[Reader], flown: Sequence[Output] | None = None) -> list[Output]:
+    """Return the outputs that records let judge; `flown` are the airframe's, where known."""
+    makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
+    if flown is None:
+        makers += [partial(airframe_outputs, r.rig, r.record, r.number) for r in readers]
+    made = in_threads(lambda make: make(), makers)
+    return [output for each in [*made, flown or []] for output in each]
+
+
+def _fly_alike(one: Rig, other: Rig) -> bool:
+    """Tell whether two rigs' surfaces and aircraft are the same."""
+    rigged = all(
+        one.controls[name].rigging == other.controls[name].rigging for name in one.controls
+    )
+    return rigged and one.flight == other.flight
 
 
 def _by_stage(gaps: Mapping[str, float]) -> dict[str, float]:

@@ -52,7 +52,7 @@ CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
 LEAST_N = 1e-9  # friction of bristles that carry none at this load
 FADED = 6.0  # times the speed over which it fades, from which contacts do not damp
-SOLVED = 1e-9  # of the speeds at hand
+SOLVED = 1e-7  # of the speeds at hand; another step would be a thousandth of this one
 
 
 def _stiffness(given: Given) -> float:
