@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from coupled.gap.case import Case, Tell
+from coupled.gap.case import Case
 from coupled.gap.choose import Choice, searched
 from coupled.gap.effect import Effect
 from coupled.gap.library import EFFECTS
-from coupled.gap.output import Output, explained_below, stage_gaps, stage_limits
-from coupled.record.channels import ControlName
-from coupled.rig.rig import Rig
+from coupled.gap.output import explained_below, stage_gaps, stage_limits
 
 
-def search(
-    nominal: Rig,
-    control: ControlName,
-    outputs: Sequence[Output],
-    library: Sequence[Effect] = EFFECTS,
-    tell: Tell | None = None,
-    refloored: Callable[[Rig], Sequence[Output]] | None = None,
-    only_wide: bool = False,
-) -> Choice:
+def search(case: Case, library: Sequence[Effect] = EFFECTS) -> Choice:
     """Return the effects that explain a record's gap.
 
     An effect in reserve passes for others, and takes part in a second search alone, where the
     first leaves its stage unexplained. The one that leaves less is the answer.
     """
-    case = Case(nominal, control, outputs, tell, refloored, only_wide)
     plain = [effect for effect in library if not effect.reserve]
     found = searched(case, plain)
     wide = _unexplained(case, found)
