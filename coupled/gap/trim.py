@@ -4,7 +4,8 @@ A record starts in trim. A surface that stands off the model's trim by more than
 belongs to an aircraft that trims elsewhere (its mass, lift or moment differs), and then the
 first row stands there, too, and the aircraft stays in trim; or something has moved it since
 (a rigging offset), and the aircraft answers. Both are weighed: by the first row, and by which
-the model follows better, flown open loop. Where neither tells, it is the aircraft's trim.
+the model follows better, flown open loop. Where neither tells, it is the aircraft's trim; of a
+record without motion, the surface's fault.
 
 What a record says of its trim is also a measurement of its own, which the model's trim is held
 against: with the angle of attack in trim it tells lift, moment and weight apart.
@@ -61,9 +62,9 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
         return Trim(own, own + standing, error)
     there = own + standing
     evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
-    if control == "column":
-        evidence += _followed(rig, record, control, own, there)
-    return Trim(there, there, error) if evidence > -TRIM_SINCE else Trim(own, own, noise, standing)
+    flown = _followed(rig, record, control, own, there) if control == "column" else None
+    in_trim = evidence > TRIM_SINCE if flown is None else evidence + flown > -TRIM_SINCE
+    return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
@@ -87,13 +88,18 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     return float(np.mean(left)), noise.rms * float(np.sqrt(crowded / (rows - 1)))
 
 
-def _followed(rig: Rig, record: Record, control: ControlName, own: float, there: float) -> float:
-    """Return by how much twice the log-likelihood is higher with the surface in trim `there`."""
+def _followed(
+    rig: Rig, record: Record, control: ControlName, own: float, there: float
+) -> float | None:
+    """Return by how much twice the log-likelihood is higher with the surface in trim `there`.
+
+    None where the record does not hold the motion.
+    """
     rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
     short = Record(record.channels, record.data[:rows])
     names = [name for name in WEIGHED if name in record]
-    if WEIGHED[0] not in names or rig.flight is None:
-        return 0.0
+    if not names or rig.flight is None:
+        return None
     lefts = []
     for trim, jump in ((own, there - own), (there, 0.0)):
         surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))

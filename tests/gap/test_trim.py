@@ -16,7 +16,7 @@ from coupled.gap.effect import apply
 from coupled.gap.library import BY_NAME
 from coupled.gap.openloop import Moved, about, command_of, fly_open_loop
 from coupled.gap.surfaces import own_trim, surface_points
-from coupled.gap.trim import trim_of
+from coupled.gap.trim import WEIGHED, trim_of
 from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -101,6 +101,21 @@ def test_without_the_command_the_first_row_tells(tmp_path: Path, rig: Rig) -> No
     found = trim_of(rig, record, "column")
     assert found is not None
     assert found.position == record["elevator_rad"][0]
+
+
+def test_without_motion_a_small_offset_is_the_surfaces(tmp_path: Path, rig: Rig) -> None:
+    """Whatever the noise of the first row, of half a milliradian; a large one is seen there."""
+    whole = made(tmp_path, rig, {"rigging_offset": {"offset_norm": 0.001}}, 4)
+    kept = [i for i, name in enumerate(whole.channels) if name not in WEIGHED]
+    data = whole.data[:, kept].copy()
+    record = Record(tuple(whole.channels[i] for i in kept), data)
+    own = own_trim(rig, "column")
+    for first, elsewhere in ((2e-4, False), (2e-3, True)):
+        data[:, record.channels.index("elevator_rad")] += 0.0 if first < 1e-3 else first
+        data[0, record.channels.index("elevator_rad")] = own + first
+        found = trim_of(rig, record, "column")
+        assert found is not None
+        assert (found.position != own) is elsewhere
 
 
 def test_an_aircraft_that_does_not_trim_is_far_off_and_no_fault(tmp_path: Path, rig: Rig) -> None:
