@@ -1,0 +1,64 @@
+"""The noise of a residual and of a force, where what the rig does would pass for colour."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.gap.noise import Noise, noise_of
+from coupled.gap.quiet import noise_of_input, quiet_noise
+
+FRAMES, RATE_Hz = 4800, 120.0
+TIME = np.arange(FRAMES) / RATE_Hz
+
+
+def sticking() -> NDArray[np.float64]:
+    """Return a motion that stops dead every second, as dry friction stops it."""
+    return 0.02 * np.abs(np.sin(np.pi * TIME)) * np.sign(np.sin(0.6 * TIME))
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.55])
+def test_what_happens_now_and_then_is_no_noise(memory: float) -> None:
+    rng = np.random.default_rng(3)
+    noise = Noise(2e-5, memory)
+    # What a stage leaves of it: a knock of 30 floors at each stop.
+    knocks = 6e-4 * np.exp(-30.0 * (TIME % 2.5)) + 3e-4 * np.sin(0.7 * TIME)
+    residual = knocks + noise.sample(FRAMES, rng)
+    found = quiet_noise(residual)
+    assert found is not None
+    assert found.rms == pytest.approx(noise.rms, rel=0.15)
+    assert found.memory == pytest.approx(memory, abs=0.12)
+    plain = noise_of(sticking() + noise.sample(FRAMES, rng))
+    assert abs(math.log(plain.rms / noise.rms)) > 0.2  # by the motion itself
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.3, 0.6])
+def test_a_forces_colour_is_told_from_the_force(memory: float) -> None:
+    rng = np.random.default_rng(4)
+    noise = Noise(0.15, memory)
+    starts = np.arange(1.0, 38.0, 1.7)
+    rises = np.clip((TIME[:, None] - starts) / 0.25, 0.0, 1.0)
+    force = (0.5 * (1.0 - np.cos(np.pi * rises))) @ rng.uniform(-40.0, 40.0, len(starts))
+    found = noise_of_input(force + noise.sample(FRAMES, rng))
+    assert found is not None
+
+    def slow(one: Noise) -> float:
+        """Return its rms at low frequencies, by which a loader is shaken."""
+        return one.rms * math.sqrt((1.0 + one.memory) / (1.0 - one.memory))
+
+    assert 0.75 < slow(found) / slow(noise) < 1.35
+
+
+def test_a_line_and_a_short_or_silent_signal() -> None:
+    rng = np.random.default_rng(5)
+    white = Noise(1.0).sample(FRAMES, rng)
+    for found in (quiet_noise(white + 3.0 * np.sin(2 * np.pi * 50.0 * TIME)), quiet_noise(white)):
+        assert found is not None
+        assert found.rms == pytest.approx(1.0, rel=0.08)
+        assert found.memory == 0.0
+    assert quiet_noise(white[:200]) is None
+    assert quiet_noise(np.zeros(FRAMES)) is None
+    assert noise_of_input(np.zeros(FRAMES)) is None

@@ -1,0 +1,62 @@
+"""How effects are searched: outputs one by one, and intervals beside what is known beforehand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from coupled.gap import choose
+from coupled.gap.case import Case
+from coupled.gap.choose import searched
+from coupled.gap.fit import _half_width, fit
+from coupled.gap.gain import Candidate
+from coupled.gap.library import BY_NAME
+from coupled.gap.output import Output
+from coupled.rig.rig import Rig
+from tests.support.rigs import bench
+
+FRAMES = 2400
+
+
+def output(stage: str, gap: float) -> Output:
+    """Return an output of a gap that no rig changes."""
+    noise = np.random.default_rng(len(stage)).normal(0.0, gap, FRAMES)
+    return Output(stage, stage, noise, lambda rig: np.zeros(FRAMES), 1.0, 120.0)
+
+
+def test_each_guilty_output_has_candidates_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What explains a wide gap says nothing of what is worth trying for a narrow one."""
+    asked: list[set[str]] = []
+    bend = BY_NAME["bend"]
+
+    def candidates(case: Case, current: object, library: object, at: set[str]) -> list[Candidate]:
+        asked.append(at)
+        first = at == {"linkage"} and {"linkage"} not in asked[:-1]
+        found = fit(rig, "column", outputs, [bend])
+        return [Candidate(50.0, bend, found)] if first else []
+
+    monkeypatch.setattr(choose, "fitted_candidates", candidates)
+    rig: Rig = bench({})
+    outputs = [output("loader", 40.0), output("linkage", 4.0), output("schedule", 1.0)]
+    choice = searched(Case(rig, "column", outputs), [])
+    # The widest first; what has nothing is not asked for again, what changed is.
+    assert asked == [{"loader"}, {"linkage"}, {"linkage"}]
+    assert [len(gains) for gains in choice.rounds] == [1, 0]
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.3])
+def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
+    """Two numbers that do the same: one is known as well as the other was beforehand."""
+    rng = np.random.default_rng(2)
+    left = rng.normal(size=FRAMES)
+    same = np.ones((FRAMES, 2))
+    found = SimpleNamespace(jac=same, fun=left - left.mean())
+    groups = np.arange(FRAMES) // 300
+    half = _half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]))
+    wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
+    assert half[0] == pytest.approx(wanted, rel=0.15)
+    alone = _half_width(SimpleNamespace(jac=same[:, :1], fun=left), 1, groups, np.zeros(1))
+    assert alone[0] < half[0]
