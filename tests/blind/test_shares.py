@@ -7,20 +7,20 @@ import pytest
 
 from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.readings import same_law
-from coupled.blind.trials.shares import _shapley
+from coupled.blind.trials.shares import _shared
 from coupled.blind.trials.trial import Plan, draw_trial
 
 
 def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
     a, b, both, none = frozenset("a"), frozenset("b"), frozenset("ab"), frozenset[str]()
-    found = _shapley(both, {none: 1.0, a: 4.0, b: 7.0, both: 10.0})
+    found = _shared(both, {none: 1.0, a: 4.0, b: 7.0, both: 10.0})
     assert found == pytest.approx({"a": 0.3, "b": 0.6})  # and noise a tenth
     # Together they leave what either leaves alone: they share it.
-    assert _shapley(both, {none: 1.0, a: 10.0, b: 10.0, both: 10.0}) == pytest.approx(
+    assert _shared(both, {none: 1.0, a: 10.0, b: 10.0, both: 10.0}) == pytest.approx(
         {"a": 0.45, "b": 0.45}
     )
     # What the rig has besides, here three floors² more, is no part of the gap.
-    besides = _shapley(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
+    besides = _shared(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
     assert besides == pytest.approx({"a": 0.3, "b": 0.6})
 
 

@@ -9,14 +9,13 @@ friction that yields, is no part of it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
-from math import factorial
 
 import numpy as np
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.output import Output
+from coupled.gap.shapley import shapley_weights
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -38,7 +37,7 @@ def true_shares(
         judged = _judged(stage, outputs[every], rig)
         if judged:
             powers = {had: _power(judged, made, rig) for had, made in outputs.items()}
-            found[stage] = _shapley(every, powers)
+            found[stage] = _shared(every, powers)
     return found
 
 
@@ -60,17 +59,14 @@ def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:
     return total / len(judged)
 
 
-def _shapley(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
+def _shared(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
     """Return each effect's share of the power with all of them, noise of one floor² with it."""
+    names = sorted(every)
+    explained = [
+        frozenset(name for i, name in enumerate(names) if subset & 1 << i)
+        for subset in range(2 ** len(names))
+    ]
+    left = np.array([powers[every - known] for known in explained])
     whole = powers[every] - powers[frozenset()] + 1.0
-    n, found = len(every), {}
-    for name in sorted(every):
-        others = sorted(every - {name})
-        held = 0.0
-        for size in range(n):
-            weight = factorial(size) * factorial(n - size - 1) / factorial(n)
-            for some in combinations(others, size):
-                without = frozenset(some)
-                held += weight * (powers[without | {name}] - powers[without])
-        found[name] = float(np.clip(held / whole, -1.0, 1.0)) if whole > 0.0 else 0.0
-    return found
+    held = shapley_weights(len(names)) @ left
+    return {name: float(share / whole) for name, share in zip(names, held, strict=True)}
