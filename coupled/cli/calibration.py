@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, UnitsOption, app
+from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import (
     DEFAULT_RIG,
@@ -133,7 +134,8 @@ def _calibrate(
 
     (file, data, name), (write, figure, report, json_file) = rig, targets
     date, hardware = noted
-    found = fit(read_readings(path, name), data.controls[name], name, tools, path)
+    with progress(f"fitting the {name}'s readings"):
+        found = fit(read_readings(path, name), data.controls[name], name, tools, path)
     text = ""
     if write is not None:
         new = with_calibration(data, name, found, date, hardware)
@@ -190,16 +192,19 @@ def _plan(
         check_target(write, [file])
     check_json(json_file, [file, *([write] if write else [])])
     sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
-    grids = {
-        size: precision(rig, control, stations(rig, control, *size, strongest), tools, looks)
-        for size in sizes
-    }
-    chosen = fewest(rig, control, tools, share, strongest, looks)
-    design = [s for s, count in chosen for _ in range(count)]
-    reached = precision(rig, control, design, tools, looks)
-    needs = deflection_needs(rig, control, design, tools, looks)
-    held = crossed_forces(rig, control, len(design), crossed)
-    terms = crossed_precision(rig, control, design, crossed, tools, looks) if held else {}
+    grids = {}
+    with progress() as advance:
+        for done, (few, many) in enumerate(sizes):
+            advance(f"{few} gradients by {many} deflections", done, len(sizes))
+            grid = stations(rig, control, few, many, strongest)
+            grids[few, many] = precision(rig, control, grid, tools, looks)
+        advance("the fewest readings that reach it", 0, 0)
+        chosen = fewest(rig, control, tools, share, strongest, looks)
+        design = [s for s, count in chosen for _ in range(count)]
+        reached = precision(rig, control, design, tools, looks)
+        needs = deflection_needs(rig, control, design, tools, looks)
+        held = crossed_forces(rig, control, len(design), crossed)
+        terms = crossed_precision(rig, control, design, crossed, tools, looks) if held else {}
     table: dict[str, object] = {
         "half_width": reached.half_width,
         "bend": reached.bend,

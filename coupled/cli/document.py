@@ -104,7 +104,7 @@ def document(
 
     issue = _issue(file, text, reference, aircraft, (date, revision))
     table = {found.control: [check.as_dict() for check in found.checks] for found in documents}
-    with Outputs() as outputs:
+    with progress("drawing the pages"), Outputs() as outputs:
         written = draw_pages(documents, fits, issue, outputs.folder(folder), outputs.at(pdf))
         if write is not None:
             write_text(outputs.at(write), text)

@@ -107,7 +107,7 @@ def diagnose(
     whole, read = _diagnose(records, rig_file, name, healthy or [])
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
-    with Outputs() as outputs:
+    with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:

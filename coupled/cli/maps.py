@@ -60,9 +60,12 @@ def draw_map(
         if not record:
             records = shipped_flights(data, advance)
         felt = feel(data, file, advance)
-    maps = {name: loss_maps(data, name) for name in data.controls}
+        maps = {}
+        for done, name in enumerate(data.controls):
+            advance(f"{name}: losses over q̄ and deflection", done, len(data.controls))
+            maps[name] = loss_maps(data, name)
     flown = {name: envelope(records, name) for name in data.controls}
-    with Outputs() as outputs:
+    with progress("drawing the maps"), Outputs() as outputs:
         save(draw_losses(data.name, maps, flown, units), outputs.at(written[0]))
         losses = (loss_map for of_control in maps.values() for loss_map in of_control)
         write_losses(losses, outputs.at(written[1]))

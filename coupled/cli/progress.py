@@ -43,7 +43,7 @@ def _bar(first: str) -> Iterator[Advance]:
         task = bar.add_task(escape(first), total=None)
 
         def advance(label: str, done: int, total: int) -> None:
-            bar.update(task, description=escape(label), completed=done, total=total)
+            bar.update(task, description=escape(label), completed=done, total=total or None)
 
         yield advance
 

@@ -83,7 +83,7 @@ def stability(
         "controls": [each.as_dict() for each in limits],
         "greatest_difference_percent": worst,
     }
-    with Outputs() as outputs:
+    with progress("drawing the maps"), Outputs() as outputs:
         save(draw_stability(data, planes), outputs.at(path))
         write_planes(data, every, outputs.at(table))
         keep_json(listed, json_file, outputs)
