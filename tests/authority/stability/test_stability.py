@@ -1,22 +1,18 @@
-"""Stability: closed forms, then the rig as it flies against linear theory, then the command."""
+"""Stability: closed forms, then the rig as it flies against linear theory."""
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import polars as pl
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from typer.testing import CliRunner
 
-from coupled.authority.stability import planes
 from coupled.authority.stability.aircraft import bob_weight
 from coupled.authority.stability.limits import gradient_range, stability_limits
 from coupled.authority.stability.linear import (
@@ -24,19 +20,14 @@ from coupled.authority.stability.linear import (
     frame_map,
     growth,
     held_limit,
-    mass_limit,
     motion_matrix,
 )
 from coupled.authority.stability.planes import (
     Question,
     crossings,
     linear_rig,
-    plane,
-    posed,
     simulated_along,
 )
-from coupled.cli import app
-from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import manoeuvres_from_table
@@ -45,8 +36,6 @@ from coupled.rig.growth import growth as simulated
 from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
-from coupled.rig.rigwrite import rig_text
-from tests.support.commands import files
 from tests.support.rigs import BENCH, G_STIFF, K_REPORT, amounts, bench
 
 MASS, DAMPING = 4.0, 75.0
@@ -267,138 +256,6 @@ def test_a_late_force_takes_its_delay_off_the_damping() -> None:
     lost = hand.stiffness * delay_s / (2.0 * MASS)
     assert growth(late, hand) - growth(prompt, hand) == pytest.approx(lost, rel=0.15)
     assert simulated(late, hand, 6.0) == pytest.approx(growth(late, hand), rel=0.005)
-
-
-SENSING = "controls.column.sensing"
-
-
-@pytest.mark.parametrize("bandwidth_Hz", [2.0, 10.0, 50.0])
-def test_a_mass_beyond_the_gauge_runs_away_where_rouths_criterion_says(
-    bandwidth_Hz: float,
-) -> None:
-    """A loader with next to no spring and damping, and a gauge with a first-order lag."""
-    limit = mass_limit(36.0 * math.pi, 0.7, 1.0 / (2.0 * math.pi * bandwidth_Hz))
-    for factor, grows in ((0.9, False), (1.1, True)):
-        values = {
-            "damping_N_s_per_m": 1.0,
-            "basic_gradient_N_per_m": 0.5,
-            f"{SENSING}.gauge_order": "first",
-            f"{SENSING}.gauge_frequency_Hz": bandwidth_Hz,
-            f"{SENSING}.gauge_mass_kg": factor * limit * MASS,
-        }
-        # A substep passes before the loader has the force: here a short one.
-        rig = linear_rig(bench(values).changed({"loader_rate_Hz": 20_000.0}), "column", 1.0)
-        assert (growth(rig, Hand()) > 0.0) == grows
-        assert (simulated(rig, Hand(), 8.0) > 0.0) == grows
-    assert mass_limit(36.0 * math.pi, 0.7, 0.0) == math.inf
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    over=amounts(4.0),
-    order=st.sampled_from(["first", "second"]),
-    bandwidth_Hz=st.floats(3.0, 80.0),
-    delay_s=st.sampled_from([0.0, 0.004]),
-    sampling_Hz=st.sampled_from([0.0, 1000.0]),
-    share=st.floats(0.05, 0.8),
-    arm=st.sampled_from([0.0, 0.05, 1.0]),
-)
-def test_any_gauge_grows_as_linear_theory_says(
-    over: float,
-    order: str,
-    bandwidth_Hz: float,
-    delay_s: float,
-    sampling_Hz: float,
-    share: float,
-    arm: float,
-) -> None:
-    # Theory takes a converter that samples for a delay. Behind four times the loader's mass that is
-    # off by 4 % of the fastest rate, which is beyond what this test allows.
-    assume(sampling_Hz == 0.0 or over <= 1.0)
-    values: dict[str, str | float] = {
-        f"{SENSING}.gauge_order": order,
-        f"{SENSING}.gauge_frequency_Hz": bandwidth_Hz,
-        f"{SENSING}.gauge_mass_kg": over * MASS,
-        f"{SENSING}.gauge_delay_s": delay_s,
-        f"{SENSING}.gauge_sampling_Hz": sampling_Hz,
-    }
-    rig = linear_rig(bench(values), "column", share / K_REPORT)
-    hand = Hand(arm / K_REPORT)
-    expected, found = growth(rig, hand), simulated(rig, hand, 12.0)
-    rate = math.sqrt((G_STIFF + 1.0 / K_REPORT) / MASS)  # a sampling converter is no pure delay
-    assert found == pytest.approx(expected, abs=0.03 * rate, rel=0.05)
-
-
-def test_a_slow_gauge_brings_the_limit_of_a_hand_and_of_the_grips_mass_down() -> None:
-    """How the limits move: the figures of docs/stability.md."""
-    limits: dict[planes.Kind, list[float]] = {"hand": [], "mass": []}
-    for bandwidth_Hz in (0.0, 100.0, 50.0, 20.0):
-        rig = bench({f"{SENSING}.gauge_frequency_Hz": bandwidth_Hz})
-        for kind, found in limits.items():
-            values = planes.axis(kind, 25)
-            growths = simulated_along(rig, "column", kind, G_STIFF, values)
-            limit = crossings(rig, "column", kind, G_STIFF, values, growths)[0]
-            assert limit.difference < 0.01
-            found.append(limit.simulated)
-    assert limits["hand"] == pytest.approx([1.19, 0.90, 0.72, 0.46], rel=0.01)
-    # Where the rig has none of its own the mass is asked about behind one of 50 Hz.
-    assert limits["mass"] == pytest.approx([3.08, 5.24, 3.08, 2.05], rel=0.01)
-
-
-@pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes, "_COARSE", (7, 9))
-    monkeypatch.setattr(planes, "_FINE", (15, 13))
-
-
-def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
-    found = plane(bench(), "column", "frame")
-    assert found.simulated.shape == found.theory.shape == (7, 9)
-    assert found.fine.shape == (15, 13)
-    assert np.array_equal(found.simulated > 0.0, found.theory > 0.0)
-    assert found.crossings
-    for crossing in found.crossings:
-        assert crossing.difference < 0.01
-        rig, hand = posed(bench(), "column", "frame", crossing.share / K_REPORT, crossing.simulated)
-        assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
-
-
-def test_the_command_writes_figure_table_and_json(
-    coarse: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = ["stability", "737", "--control", "wheel", "-o", "w.png", "--json", "w.json"]
-    ran = CliRunner().invoke(app, words)
-    assert ran.exit_code == 0, ran.output
-    assert files(tmp_path) == {"w.png", "w.csv", "w.json"}
-    cells = pl.read_csv(tmp_path / "w.csv")
-    assert len(cells) == 6 * 7 * 9
-    assert set(cells["gradient_unit"]) == {"N/rad"}
-    found = json.loads((tmp_path / "w.json").read_text())
-    assert [each["control"] for each in found["controls"]] == ["wheel"]
-    assert found["greatest_difference_percent"] < 1.0
-    assert "limits on the map" in ran.output
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["stiff.toml"], "stiff.toml: controls.column.loader.bend_m_per_N: is 0 and nothing bends"),
-        (["737", "--control", "whel"], "--control: no 'whel'; did you mean wheel?"),
-        (["737", "-o", "x.gif"], "x.gif: a figure ends in .png, .pdf, .svg"),
-        (["7377"], "7377: is no shipped rig"),
-    ],
-)
-def test_what_cannot_be_mapped_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], says: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "stiff.toml").write_text(rig_text(bench({"bend_m_per_N": 0.0}), "a rigid rig"))
-    ran = CliRunner().invoke(app, ["stability", *words])
-    assert isinstance(ran.exception, InputError)  # which the command line makes one line, code 2
-    assert says in str(ran.exception)
-    assert "\n" not in str(ran.exception)
-    assert files(tmp_path) == {"stiff.toml"}
 
 
 @given(

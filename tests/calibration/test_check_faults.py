@@ -1,0 +1,119 @@
+"""Which fault of a rig fails which check, as the table in docs/calibration.md says."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from coupled.calibration.documentation import check_feel
+from coupled.gap.effect import apply
+from coupled.gap.library import BY_NAME
+from tests.support.rigs import K_REPORT, bench
+
+# Each fault of the library on the column of a test bench, at a size beyond its tolerance.
+FAULTS: dict[str, dict[str, float]] = {
+    "coulomb_friction": {"friction_N": 30.0},
+    "stribeck_friction": {"friction_N": 25.0, "breakaway_N": 35.0, "stribeck_{d}_per_s": 2e-3},
+    "viscous_damping": {"factor": 1.5},
+    "inertia": {"factor": 1.5},
+    "gradient_error": {"factor": 2.0},
+    "cubic_stiffness": {"cubic_N_per_{d}3": 3e4},
+    "breakout": {"breakout_N": 15.0},
+    "force_offset": {"offset_N": 30.0},
+    "modifying_lag": {"lag_s": 0.03},
+    "presliding_friction": {"friction_N": 30.0, "stiffness_N_per_{d}": 1e5},
+    "asymmetric_friction": {"pull_N": 30.0, "push_N": 10.0},
+    "load_friction": {"factor": 0.2},
+    "friction_ripple": {"ripple_N": 30.0, "period_{d}": 0.05, "phase_rad": 0.0},
+    "relaxation": {"stiffness_N_per_{d}": 3000.0, "time_s": 0.3},
+    "force_limit": {"limit_N": 100.0},
+    "deflection_scale": {"factor": 1.15},
+    "force_scale": {"factor": 1.8},
+    "force_zero": {"offset_N": 250.0},
+    "deflection_zero": {"offset_{d}": 0.02},
+    "scale_drift": {"per_s": 2e-3},
+    "bend": {"bend_{d}_per_N": 2.0 * K_REPORT},
+    "stiffening_bend": {"bend_{d}_per_N": K_REPORT, "limit_{d}": 5e-3},
+    "backlash": {"play_{d}": 0.03},
+    "soft_backlash": {"play_{d}": 0.03, "stiffness_N_per_{d}": 1e4},
+    "bend_hysteresis": {"bend_{d}_per_N": 1.5 * K_REPORT, "share": 0.5, "width_N": 60.0},
+    "structural_mode": {
+        "bend_{d}_per_N": 2.0 * K_REPORT,
+        "frequency_Hz": 2.0,
+        "damping_ratio": 0.05,
+    },
+    "servo_lag": {"factor": 0.15},
+    "servo_rate_limit": {"rate_{d}_per_s": 0.1},
+    "pressure_scale": {"factor": 1.4},
+    "schedule_slope": {"factor": 0.5},
+    "cable_stretch": {"loss_per_Pa": 1e-4},
+    "surface_freeplay": {"play_norm": 0.3},
+    "rigging_offset": {"offset_norm": 0.2},
+}
+
+
+# What no check of this kind looks at: what needs a q̄ that moves, an aircraft, or a sampled product.
+UNSEEN = {
+    "pressure_lag": "q̄ is held",
+    "transport_delay": "a release is timed from its own 90 %; in flight `Part 60 4.a latency`,"
+    " `coupled diagnose`",
+    "digital_multiplier": "steps of force; `coupled compare` shows them",
+    "bob_weight": "nz is 1",
+    "arc_geometry": "0.7 % at this column's 11°, within its tolerance",
+    "surface_lag": "a slow sweep; 2.b.4 and `coupled diagnose`",
+    "surface_rate_limit": "a slow sweep; `coupled diagnose`",
+    "elevator_effectiveness": "the aircraft's",
+    "pitch_damping": "the aircraft's",
+    "pitch_stiffness": "the aircraft's",
+    "lift_slope": "the aircraft's",
+    "mass": "the aircraft's",
+    "vertical_gust": "the air's",
+    "force_skew": "the recorder's",
+    "motion_skew": "the recorder's",
+    "mains_hum": "readings are means",
+    "dropped_frames": "a frame late at most; `coupled diagnose`",
+    "crosstalk": "the other control is let go",
+}
+
+
+FULL_rad = math.radians(25.0)
+TABLE = Path(__file__).parents[2] / "docs" / "calibration.md"
+
+
+def failing(effect: str, values: dict[str, float]) -> list[str]:
+    """Return the kinds of check that fail with an effect, and pass on the rig without it."""
+    nominal = bench()
+    named = {f"{effect}.{name}": value for name, value in values.items()}
+    faulty = apply(nominal, "column", [BY_NAME[effect]], named)
+    before, after = (
+        {
+            (c.name, c.pressure_Pa)
+            for c in check_feel(rig, "column", FULL_rad, nominal)
+            if not c.passed
+        }
+        for rig in (nominal, faulty)
+    )
+    kinds = {name.split(",")[0].rstrip(" 123456789") for name, _ in after - before}
+    return sorted(kinds)
+
+
+@pytest.mark.parametrize("effect", FAULTS)
+def test_a_fault_beyond_its_tolerance_fails_the_check_that_the_docs_name(effect: str) -> None:
+    found = failing(effect, FAULTS[effect])
+    assert found
+    assert f"| `{effect}` | {_size(effect)} | {', '.join(found)} |" in TABLE.read_text("utf-8")
+
+
+def test_the_docs_name_every_fault_of_the_library() -> None:
+    text = TABLE.read_text(encoding="utf-8")
+    for effect, why in UNSEEN.items():
+        assert f"| `{effect}` | any | none: {why} |" in text
+    assert {*FAULTS, *UNSEEN} >= set(BY_NAME)
+
+
+def _size(effect: str) -> str:
+    """Return a fault's size as the table has it."""
+    values = [f"{name.format(d='m')} {value:.3g}" for name, value in FAULTS[effect].items()]
+    return ", ".join(values)
