@@ -84,6 +84,9 @@ def stage_budget(
     rig by record and channel, where they are higher.
     """
     outputs = _outputs(stage, case.outputs, settled)
+    if not outputs:  # its effects show in those of a neighbour
+        shown = {at for e in found.effects if e.stage == stage for at in e.shows_in}
+        outputs = [output for output in case.outputs if output.stage in shown]
     if not outputs:
         return None
     players = [e for e in found.effects if touched(outputs, [e])]

@@ -25,6 +25,7 @@ from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.drives import as_driven
 from coupled.gap.effect import Effect
 from coupled.gap.healthy import Baseline
+from coupled.gap.imposed import under_motion
 from coupled.gap.library import EFFECTS
 from coupled.gap.output import Hides, Output, explained_below, stage_gaps, stage_limits
 from coupled.gap.result import StageResult
@@ -76,7 +77,7 @@ def _diagnose(
         case = Case(rig, control, well.outputs)
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
-    rig = as_driven(rig, records.values(), control) if control in rig.controls else rig
+    rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
@@ -92,6 +93,7 @@ def _diagnose(
         file = next(iter(records))
         raise InputError(file, "", "lets no stage be judged; it lacks " + ", ".join(lacking))
     library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()), control)]
+    library = under_motion(library) if readers[0].moved else library
 
     known: list[tuple[Rig, Sequence[Output]]] = []  # the last one asked for: it takes as long again
 
@@ -254,12 +256,16 @@ class _Judge:
     def _without_output(self, name: str) -> StageResult | None:
         """Return a stage that no output judges, None where the rig has none of it."""
         flown = self.rig.flight is not None
-        if name == "loader":
-            return StageResult(name, why="δc is a set point")
-        if name == "schedule":
-            return StageResult(name, why="constant gradient")
-        if name == "surface" and flown:
-            return StageResult(name, why=BY_LAWS)
+        if name == "linkage" and self.readers[0].moved and name in self.blamed:
+            gap = max(o.gap(self.rig) for o in self.outputs if o.stage == "loader")
+            return StageResult(name, gap, guilty=True, shown_in=("loader",))
+        reader = self.readers[0]
+        known = {"schedule": "constant gradient"}
+        known |= {"linkage": "see loader"} if reader.moved else {}
+        known |= {"loader": "δc is a set point"} if reader.set_points else {}
+        known |= {"surface": BY_LAWS} if flown else {}
+        if name in known:
+            return StageResult(name, why=known[name])
         if name == "airframe" and flown:
             lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
             return StageResult(name, missing=tuple(lacking))

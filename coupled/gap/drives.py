@@ -3,11 +3,14 @@
 A digital servo is given set points. In a record of them that is faster than they come, each stands
 for several frames, and they differ by more than one step of a converter: a motion that was measured
 repeats itself so only by its rounding.
+
+Where the grip's motion and force are all there is, nothing says what a loader did with the force:
+the motion is taken as imposed, and the force as its answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 
 import numpy as np
 
@@ -18,13 +21,15 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 
-def as_driven(rig: Rig, records: Iterable[Record], control: ControlName) -> Rig:
+def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
     """Return the rig with what drives it, where all records show what its file does not say."""
-    name = channel(control, "computed")
+    name, grip, force = (channel(control, q) for q in ("computed", "deflection", "force"))
     if rig.controls[control].drive != "force":
         return rig
     if all(name in record and in_set_points(record[name]) for record in records):
         return rig.changed({f"controls.{control}.drive": "setpoint"})
+    if all(name not in one and grip in one and force in one for one in records):
+        return rig.changed({f"controls.{control}.drive": "displacement"})
     return rig
 
 

@@ -11,7 +11,7 @@ from coupled.gap.noise import Noise
 from coupled.gap.output import heard, rounding
 from coupled.gap.quiet import noise_of_input, quiet_noise
 from coupled.gap.smooth import Smoother
-from coupled.gap.thresholds import LEAST_NOISE
+from coupled.gap.thresholds import LEAST_NOISE, LOUDER
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -41,10 +41,11 @@ def input_noise(heard_: Noise, signal: Floats) -> Noise:
 def left_noise(heard_: Noise, signal: Floats, left: Floats) -> Noise:
     """Return a channel's noise by what its stage leaves of it; no less than its rounding.
 
-    `heard_` is what the signal alone says: it stays for a filtered log, and for a short one.
+    `heard_` is what the signal alone says: it stays for a filtered log, and for a short one, and
+    where the rest is far louder: a signal that jumps elsewhere than predicted is a gap.
     """
     found = None if heard_.filtered else quiet_noise(left)
-    if found is None:
+    if found is None or found.rms > LOUDER * heard_.rms:
         return heard_
     return _no_less(found, signal)
 

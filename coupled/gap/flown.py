@@ -145,6 +145,8 @@ def closed_loop(
     `again` is that pilot, where there is one. None where the record lacks the force, or a bench's
     q̄, or where the rig cannot be flown so.
     """
+    if nominal.controls[control].drive != "force":
+        return None
     again = Again.of(nominal, control, record) if again is None else again
     if again is None:
         return None

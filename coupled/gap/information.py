@@ -11,6 +11,8 @@ from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.library import EFFECTS
 from coupled.gap.thresholds import LEAST_GAIN
 
+ORDER = [effect.name for effect in EFFECTS]
+
 
 def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -> list[Candidate]:
     """Return the candidates whose intervals say something, by their gain.
@@ -25,7 +27,7 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     single = [one for one in open_ones if len(one[0].free) == 1]
     others = ranked_by_gain(case.outputs, current, single) if single else ranked
     # Two that are one law differ by rounding alone: the library's order settles it.
-    return sorted(others, key=lambda one: (-round(one.gain, 1), EFFECTS.index(one.effect)))
+    return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
 
 
 def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:

@@ -78,6 +78,13 @@ def noise_of(signal: Floats) -> Noise:
     return Noise(math.sqrt(white / (1.0 - memory**2)), memory)
 
 
+def between_jumps(signal: Floats) -> Noise:
+    """Return the noise of a signal that may jump, by the median of its fourth differences."""
+    known, rough = noise_of(signal), np.abs(np.diff(signal, 4))
+    usual = float(np.median(rough)) / 0.6745 / math.sqrt(70.0) if len(rough) else 0.0
+    return known if known.rms <= usual / JUMPS else Noise(usual)
+
+
 def _bands(rough: Floats) -> tuple[Floats, Floats]:
     """Return the middle frequencies of bands, rad a frame, and the noise's variance in each.
 

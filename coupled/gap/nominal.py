@@ -55,7 +55,7 @@ def fit_nominal(
     the stages that the records judge. The rig's `tolerance` holds half of each one's 95 % interval.
     Raises InputError where a record is of another rig, or no record depends on a key.
     """
-    rig = as_driven(rig, records.values(), control) if control in rig.controls else rig
+    rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
     readers = [

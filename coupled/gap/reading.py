@@ -78,6 +78,10 @@ class Reading:
             "surface": [self.name_of("estimate"), PRESSURE, self.surface],
         }
         lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        if self.moved:
+            loader = [self.name_of("force"), self.name_of(self.imposed), *self._gradient_from()]
+            needs = {"schedule": needs["schedule"], "loader": loader}
+            lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         if self.set_points:  # a bend is not to be seen without the force, but all else
             needless = self.name_of("force")
             lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
@@ -87,6 +91,16 @@ class Reading:
     def set_points(self) -> bool:
         """Whether δc is a number that is commanded, so that there is no loader to judge."""
         return self.rig.controls[self.control].drive == "setpoint"
+
+    @property
+    def moved(self) -> bool:
+        """Whether the motion is imposed, and the force its answer."""
+        return self.rig.controls[self.control].drive == "displacement"
+
+    @property
+    def imposed(self) -> str:
+        """The quantity that is imposed: the grip's motion where the record has it, else δc."""
+        return "deflection" if self.name_of("deflection") in self.record else "computed"
 
     def commanded(self) -> tuple[Floats, Noise]:
         """Return δc as it drives the linkage, and its noise: a set point has none."""
@@ -115,7 +129,9 @@ class Reading:
             return [own]
         if PRESSURE in self.record:
             return [PRESSURE]
-        return [] if one_spring(self.rig, self.control) else [own]
+        table = self.rig.controls[self.control].schedule.total_gradient
+        without = self.moved and not any(table)  # a machine that has no spring
+        return [] if without or one_spring(self.rig, self.control) else [own]
 
     def gradient(self) -> Floats:
         """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""

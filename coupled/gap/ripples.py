@@ -20,7 +20,9 @@ from coupled.rig.rig import Rig
 
 def ripples(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
     """Return amplitude in N, period in d and phase in rad of the ripple that shows most, if any."""
-    ours = [output for output in outputs if output.stage == "loader"]
+    ours = [
+        output for output in outputs if output.stage == "loader" and "force" not in output.channel
+    ]
     if not ours:
         return []
     force = np.concatenate([_missing(output, rig, control) for output in ours])

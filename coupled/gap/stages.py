@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.floors import given_noise, left_noise, noise_in, unsmoothed, with_error
-from coupled.gap.noise import Noise
+from coupled.gap.imposed import Imposed
+from coupled.gap.noise import Noise, between_jumps
 from coupled.gap.openloop import about
 from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
 from coupled.gap.ratchet import passed_noise, unratcheted
@@ -72,6 +73,8 @@ class Reader(Reading):
             "compensation": self._compensation,
             "surface": self._surface,
         }
+        if self.moved:
+            makers = {"schedule": self._schedule, "loader": self._answering}
         if self.set_points:
             del makers["loader"], makers["multiplier"]
         found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
@@ -180,6 +183,15 @@ class Reader(Reading):
         predict = driven(force, smooth)
         made = (self.name_of("computed"), computed, predict, noisy, own, "force")
         return [self._made("loader", *made)]
+
+    def _answering(self) -> list[Output]:
+        """Return the force that answers an imposed motion."""
+        motion, force = Imposed(self), self.signal("force")
+        own = self.heard("force")
+        if between_jumps(force).rms < own.rms:  # at the end of a play it jumps
+            own = between_jumps(force)
+        made = (force, motion.predict(), motion.noisy, own, self.imposed)
+        return [self._made("loader", self.name_of("force"), *made)]
 
     def _drifts(self, gradient: Floats) -> bool:
         """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""

@@ -51,6 +51,7 @@ MOST_LINES = 3  # chosen
 MAINS_Hz = (50.0, 60.0, 400.0)  # of the ground's mains, and of aircraft's
 MAINS_OFF = 0.01  # chosen: relative; a public grid stays within 1 % for 99.5 % of a year (EN 50160)
 JUMPS = 0.5  # chosen: of the rms of fourth differences, under which the usual one shows jumps
+LOUDER = 3.0  # chosen: times a signal's own noise, from which what a stage leaves is none
 LEAST_NOISE = 1e-3  # chosen: of a signal's rms, the noise of a channel whose own was filtered away
 BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the force itself
 FELT_FRAMES = 4  # chosen: to either side, over which an answer says what was felt of a force
@@ -105,6 +106,8 @@ TRIM_SINCE = 4.0  # chosen: twice the log-likelihood by which it must have been 
 UNTRIMMED = 1e3  # chosen: floors by which an aircraft that does not trim is off
 LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is lost; chosen
 STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
+
+JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 
 # Settings of the nominal rig (`case`).
 YIELDS_m = 5e-4  # the contract's: by how much friction may yield before it slips

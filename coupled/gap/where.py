@@ -216,6 +216,8 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
     found: dict[str, Floats] = {}
     for quantity, unit in names.get(stage, ()):
         name = channel(control, quantity)
+        if name not in record and quantity == "computed":
+            name = channel(control, "deflection")  # the motion that was imposed
         if name not in record:
             continue
         smooth = smoothed(record[name])

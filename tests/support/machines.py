@@ -140,3 +140,42 @@ def servo_rig(rate_Hz: float = 50.0, frequency_Hz: float = 6.0, drive: str = "se
     numbers = {"servo_frequency_Hz": frequency_Hz, "servo_damping_ratio": 0.8}
     rig = plain_rig(rate_Hz, numbers)
     return rig.changed({"controls.column.drive": drive})
+
+
+def damper(
+    rate_Hz: float = 100.0,
+    seconds: float = 20.0,
+    damping: float = 2000.0,
+    play_m: float = 1.5e-3,
+    offset_N: float = 0.0,
+    noise: tuple[float, float] = (1.0, 2e-6),
+    grip: bool = False,
+) -> Record:
+    """Return a record of a damper on a bench that imposes its motion, with play in its joints.
+
+    The joints are a dead zone with a stiff elastic end, which the piston follows: Euler's steps at
+    20 kHz. `noise` is added to F in N and to the motion in m.
+    """
+    fine, stiffness, piston = 20_000.0, 1e7, 0.0
+    steps = round(fine / rate_Hz)
+    times = np.arange(round(seconds * fine)) / fine
+    way = 0.02 * np.sin(2.0 * np.pi * 0.7 * times) + 0.008 * np.sin(2.0 * np.pi * 1.9 * times)
+    way *= np.clip(times, 0.0, 1.0)
+    force = np.empty(len(times[::steps]))
+    for k, at in enumerate(way.tolist()):
+        stretched = at - piston
+        touching = max(abs(stretched) - 0.5 * play_m, 0.0)
+        pull = stiffness * touching * (1.0 if stretched > 0.0 else -1.0)
+        if k % steps == 0:
+            force[k // steps] = pull
+        piston += pull / damping / fine
+    hiss = np.random.default_rng(4).normal(size=(2, len(force)))
+    imposed = way[::steps] + noise[1] * hiss[1]
+    channels = {"force_N": force + offset_N + noise[0] * hiss[0]}
+    return recorded(rate_Hz, **channels, **{"deflection_m" if grip else "computed_m": imposed})
+
+
+def damper_rig(damping: float = 2000.0, drive: str = "displacement") -> Rig:
+    """Return the rig of that damper, without play; of next to no mass."""
+    rig = plain_rig(100.0, {"mass_kg": 0.01, "damping_N_s_per_m": damping})
+    return rig.changed({"controls.column.drive": drive})

@@ -1,0 +1,135 @@
+"""The loader with its motion imposed: the force that answers, as on a test bench for dampers.
+
+The loader's own laws, solved for the force instead of the motion:
+
+    F = m·x'' + c·x' + friction + breakout·sgn(x) + springs(x) + F_mod − F_offset + b·(n_z − 1)
+
+Play lies between what is imposed and the loader, which follows once the play is taken up; in the
+gap no force is felt, and the loader goes where its own springs, against its damping, take it.
+
+A friction whose contact is rigid holds a still loader with any force up to its level: which, the
+motion does not say. It is taken to yield by a tenth of a thousandth of the travel, so that the
+tremble of a sensor at rest is no slip. The acceleration is the mean over a frame about the sample:
+the blow at the end of a play lasts no time, and a force that is sampled has no room for it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.rig.compiled import entry, stage
+from coupled.rig.control import ControlParameters
+from coupled.rig.events import sign
+from coupled.rig.frame import set_product
+from coupled.rig.friction import bent_after, more_friction, running_friction
+from coupled.rig.inertia import set_inertia
+from coupled.rig.loader import LoaderState, set_external, start_loader
+from coupled.rig.modification import set_gradients
+from coupled.rig.packing import pack
+from coupled.rig.rig import Rig
+from coupled.rig.springs import elastic, feel, relax
+
+Floats = NDArray[np.float64]
+RIGID = 1e-4  # of the travel, by which a rigid contact yields here
+
+
+def answer_to(
+    rig: Rig,
+    control: str,
+    nodes: Floats,
+    gradient: Floats,
+    load_factor: Floats | None = None,
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the force in N at each frame that a control answers an imposed motion with.
+
+    And whether within half a frame of it a play is taken up or left, where the force jumps.
+
+    `nodes` is the motion on the loader's nodes, d, `rig.substeps` a frame and one more; `gradient`
+    G_T in N/d at each frame, `load_factor` +1 in level flight. In a play it is exactly 0.
+    """
+    packed = pack(rig, only=control)
+    p, s = packed["parameters"].copy(), packed["state"].copy()
+    frames, h = len(gradient), 1.0 / (rig.frame_rate * rig.substeps)
+    level = np.ones(frames) if load_factor is None else load_factor
+    felt, mass = np.zeros((3, len(nodes))), np.zeros(frames)
+    _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, felt, mass)
+    # Of the substep that ends at node n: force but for inertia, mean speed, whether it is felt.
+    force, speed, touched = felt
+    half, last = max(1, rig.substeps // 2), len(nodes) - 1
+    at = np.arange(frames) * rig.substeps
+    sampled = 0.5 * (force[np.maximum(at, 1)] + force[np.minimum(at + 1, last)])
+    before, after = np.maximum(at - half + 1, 1), np.minimum(at + half, last)
+    accelerated = (speed[after] - speed[before]) / ((after - before) * h)
+    share = 0.5 * (touched[np.maximum(at, 1)] + touched[np.minimum(at + 1, last)])
+    return sampled + share * mass * accelerated, touched[before] != touched[after]
+
+
+@stage
+def _left_alone(p: ControlParameters, loader: LoaderState, held: float, h: float) -> float:
+    """Return where a loader that nothing touches goes in h seconds, d; `held` is its springs', N.
+
+    Without damping, beyond any play.
+    """
+    most = p.friction.running
+    net = held - min(max(held, -most), most)
+    if loader.damping > 0.0:
+        return loader.computed - net / loader.damping * h
+    return loader.computed - p.linkage.play * sign(net)
+
+
+@stage
+def _rubbing(p: ControlParameters, loader: LoaderState, dry: float, way: float, h: float) -> float:
+    """Return the friction over a way of h seconds, N, from what it was before; bend its contact."""
+    rate = way / h
+    if p.friction.stiffness > 0.0:
+        loader.bent = bent_after(p.friction, loader.bent, rate, way, loader.load)
+        return p.friction.stiffness * loader.bent
+    if p.friction.dry == 0:
+        return 0.0
+    most = running_friction(p.friction, rate) + more_friction(p.friction, loader.load, rate)
+    return min(max(dry + most * way / (RIGID * p.loader.travel), -most), most)
+
+
+@entry
+def _answer(
+    parameters: Any,
+    states: Any,
+    nodes: Floats,
+    given: Floats,
+    substeps: int,
+    h: float,
+    felt: Floats,
+    mass: Floats,
+) -> None:
+    """Write force but for inertia, N, speed and touch of each substep, and each frame's mass."""
+    p, s = parameters[0], states[0]
+    m, loader = s.modification, s.loader
+    start_loader(p.loader, loader, 0.0)
+    loader.computed, half, dry = nodes[0], 0.5 * p.linkage.play, 0.0
+    for k in range(len(mass)):
+        set_gradients(p.modification, m, given[0, k], given[0, k])
+        set_inertia(p.inertia, s.inertia, p.loader, loader, given[0, k])
+        set_product(p, m, loader.computed, loader.computed)
+        set_external(p.loader, loader, given[1, k])
+        mass[k] = loader.mass
+        for node in range(k * substeps + 1, min((k + 1) * substeps + 1, len(nodes))):
+            if p.loader.held:
+                feel(p.loader, m, loader, loader.computed)
+                feel(p.loader, m, loader, loader.computed)
+            held = elastic(p.loader, m, loader, loader.computed) + loader.relaxed - loader.external
+            alone = loader.computed if half == 0.0 else _left_alone(p, loader, held, h)
+            new = min(max(alone, nodes[node] - half), nodes[node] + half)
+            way, loader.load = new - loader.computed, abs(felt[0, node - 1] + loader.external)
+            dry = _rubbing(p, loader, dry, way, h)
+            if p.loader.relaxing > 0.0:
+                relax(p.loader, loader, way, h)
+            loader.computed = new
+            felt[1, node] = way / h
+            if half == 0.0 or new != alone:  # else it is alone in its play
+                breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
+                felt[2, node] = 1.0
+                force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external
+                felt[0, node] = force + loader.damping * way / h + dry + breakout * sign(new)

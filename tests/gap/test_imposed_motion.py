@@ -1,0 +1,59 @@
+"""A damper on a bench that imposes its motion: the force is the answer. A machine not ours.
+
+What each answer must be was written down before it was run.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from coupled.gap.diagnose import diagnose
+from coupled.gap.drives import as_driven
+from coupled.gap.imposed import under_motion
+from coupled.gap.library import EFFECTS
+from coupled.gap.nominal import fit_nominal
+from tests.support.machines import damper, damper_rig
+
+
+def test_a_damper_beside_its_own_numbers_has_no_gap() -> None:
+    found = diagnose(damper_rig(), {"r": damper(play_m=0.0)})
+    assert found.verdict == "no_gap"
+    assert found.stage("loader").gap == pytest.approx(1.0, abs=0.15)
+    assert found.closed_loop is None  # nobody flies it by its force
+
+
+def test_a_grip_with_its_force_and_nothing_else_is_taken_as_moved() -> None:
+    rig = damper_rig(drive="force")
+    both = [damper(seconds=2.0, grip=True), damper(seconds=2.0)]
+    assert as_driven(rig, both[:1], "column") == damper_rig()
+    assert as_driven(rig, both[1:], "column") == rig  # a δc may be a loader's answer
+    assert as_driven(rig, both, "column") == rig
+
+
+def test_of_the_linkage_play_alone_shows_in_the_force() -> None:
+    moved = [effect for effect in under_motion(EFFECTS) if effect.stage == "linkage"]
+    assert [(effect.name, effect.shows_in) for effect in moved] == [("backlash", ("loader",))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("grip", [False, True])
+def test_play_in_a_dampers_joints_is_named_and_measured(grip: bool) -> None:
+    rig = damper_rig(drive="force" if grip else "displacement")
+    found = diagnose(rig, {"r": damper(grip=grip)})
+    assert found.verdict == "effect"
+    [effect] = found.effects
+    assert (effect.name, effect.stage) == ("backlash", "linkage")
+    assert found.guilty == ("linkage",)
+    assert effect.value == pytest.approx(1.5e-3, rel=0.03)
+
+
+@pytest.mark.slow
+def test_a_damper_without_mass_and_spring_is_as_well_a_gauge_that_is_off() -> None:
+    """F = c·v: scale of the force, of the motion, and damping are one number."""
+    record = damper(play_m=0.0)
+    found = diagnose(damper_rig(damping=1600.0), {"r": record})
+    assert found.verdict == "ambiguous"
+    [group] = found.rivals
+    assert {"viscous_damping", "force_scale", "deflection_scale"} <= set(group)
+    fitted = fit_nominal(damper_rig(damping=1000.0), {"r": record}, ["loader.damping_N_s_per_m"])
+    assert fitted.numbers[0].found == pytest.approx(2000.0, rel=0.005)

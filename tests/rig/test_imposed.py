@@ -1,0 +1,63 @@
+"""The force that answers an imposed motion: the loader's laws, solved for the force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupled.rig.imposed import answer_to
+from coupled.rig.replay import on_nodes
+from tests.support.rigs import K_REPORT, bench, push
+
+RATE_Hz, FRAMES, G = 100.0, 400, 560.0
+TIME = np.arange(FRAMES) / RATE_Hz
+TURN, SIZE = 2.0 * np.pi * 1.3, 0.05
+WAY = SIZE * np.sin(TURN * TIME)
+SPEED, ACCELERATION = TURN * SIZE * np.cos(TURN * TIME), -(TURN**2) * WAY
+MIDDLE = slice(5, -5)  # the acceleration's mean has one side alone at the ends
+
+
+def answered(changes: dict[str, float], way: np.ndarray = WAY) -> np.ndarray:
+    rig = bench(changes)
+    return answer_to(rig, "column", on_nodes(rig, way), np.full(len(way), G))[0]
+
+
+def test_mass_spring_and_damper_answer_as_their_equation_says() -> None:
+    stiffness = G / (1.0 - K_REPORT * G)  # eq. (12)
+    wanted = 4.0 * ACCELERATION + 75.0 * SPEED + stiffness * WAY + 1e5 * WAY**3
+    found = answered({"cubic_N_per_m3": 1e5})
+    assert found[MIDDLE] == pytest.approx(wanted[MIDDLE], abs=2e-3 * np.ptp(wanted))
+
+
+def test_friction_goes_with_the_side_of_the_motion_and_an_offset_stays() -> None:
+    more = answered({"friction_N": 6.0, "offset_N": 2.0}) - answered({})
+    moving = np.abs(SPEED) > 0.1 * SPEED.max()
+    assert more[moving] == pytest.approx(6.0 * np.sign(SPEED[moving]) - 2.0, abs=1e-6)
+
+
+def test_in_its_play_a_damper_is_not_felt() -> None:
+    """By hand: after each turn the imposed end goes the whole play before the loader follows."""
+    play = 0.02
+    damper = {"mass_kg": 1e-3, "basic_gradient_N_per_m": 0.0, "play_m": play}
+    rig = bench({**damper, "controls.column.schedule.total_gradient_N_per_m": [0.0, 0.0]})
+    found = answer_to(rig, "column", on_nodes(rig, WAY), np.zeros(FRAMES))[0]
+    turned = np.maximum.accumulate(np.where(np.abs(np.diff(np.sign(SPEED), prepend=1)) > 1, 1, 0))
+    after_top = (0.25 * 2 * np.pi / TURN < TIME) & (0.75 * 2 * np.pi / TURN > TIME)
+    taken_up = SIZE - play > WAY
+    free, held = after_top & ~taken_up, after_top & taken_up
+    assert turned.any() and free.sum() > 5 and held.sum() > 20
+    assert found[free][1:-1] == pytest.approx(0.0, abs=1e-9)
+    assert found[held][1:-1] == pytest.approx(75.0 * SPEED[held][1:-1], rel=2e-3, abs=0.05)
+
+
+def test_it_undoes_what_the_loader_does_with_a_force() -> None:
+    rig = bench({"friction_N": 3.0, "friction_stiffness_N_per_m": 3e4, "breakout_N": 0.0})
+
+    def pull(t: np.ndarray) -> np.ndarray:
+        return np.asarray(25.0 * np.sin(4.0 * t) * np.minimum(t, 1.0) + 8.0 * np.sin(11.0 * t))
+
+    fine = push(rig, pull, 4.0)  # δc at 2 kHz
+    nodes = fine[: (FRAMES - 1) * rig.substeps + 1]
+    found = answer_to(rig, "column", nodes, np.full(FRAMES, G))[0]
+    assert found[MIDDLE] == pytest.approx(pull(TIME)[MIDDLE], abs=0.8)
+    assert np.std(found[MIDDLE] - pull(TIME)[MIDDLE]) < 0.2
