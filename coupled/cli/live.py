@@ -66,6 +66,9 @@ def live(
     flightgear: Annotated[
         str, typer.Option(metavar="HOST:PORT", help="Send the view to FlightGear.")
     ] = "",
+    xplane: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="Send the view to X-Plane, by UDP.")
+    ] = "",
     force_limit: Annotated[
         float, typer.Option(metavar="N", help="The most that a real loader is asked for.")
     ] = 600.0,
@@ -110,8 +113,7 @@ def live(
         keys = Keys()
         ending.callback(keys.close)
         watchers: list[Watcher] = [keys]
-        if flightgear:
-            watchers.append(_flightgear(flightgear))
+        watchers += _views(flightgear, xplane)
         page = _page(flown, bind, port, ending) if dashboard else None
         if page is not None:
             watchers.append(page)
@@ -211,14 +213,20 @@ def _inputs(flown: Manoeuvre) -> list[Path]:
     return input_files(flown)
 
 
-def _flightgear(address: str) -> Watcher:
-    """Return the view, and print the line that starts FlightGear."""
-    from coupled.live.flightgear import FlightGear, start_line
-    from coupled.live.link import split_address
+def _views(in_flightgear: str, in_xplane: str) -> list[Watcher]:
+    """Return the views asked for, and print the line that starts FlightGear."""
+    from coupled.live.flightgear import flightgear, start_line
+    from coupled.live.link import split_place
+    from coupled.live.xplane import xplane
 
-    _, host, port = split_address(f"--flightgear://{address}")
-    say(f"start FlightGear by: {start_line(port)}")
-    return FlightGear(host, port)
+    views: list[Watcher] = []
+    if in_flightgear:
+        host, port = split_place(in_flightgear, "--flightgear")
+        say(f"start FlightGear by: {start_line(port)}")
+        views.append(flightgear(host, port))
+    if in_xplane:
+        views.append(xplane(*split_place(in_xplane, "--xplane")))
+    return views
 
 
 def _print(flight: LiveFlight, path: Path) -> None:

@@ -97,10 +97,17 @@ RUN, FADING, OFF = 1, 2, 3  # modes
 def split_address(url: str) -> tuple[str, str, int]:
     """Return scheme, host and port of `scheme://host:port`; raises InputError."""
     scheme, found, rest = url.partition("://")
-    host, colon, port = rest.rpartition(":")
-    host = host.strip("[]")  # of an IPv6 address
-    if not found or not colon or not host:
+    if not found:
         raise InputError("--loader", "", f"is {url!r}; give sim, udp://HOST:PORT or cls2sim://…")
+    return scheme, *split_place(rest, "--loader")
+
+
+def split_place(place: str, option: str) -> tuple[str, int]:
+    """Return host and port of `host:port`, as an option gives it; raises InputError."""
+    host, colon, port = place.rpartition(":")
+    host = host.strip("[]")  # of an IPv6 address
+    if not colon or not host:
+        raise InputError(option, "", f"is {place!r}; give HOST:PORT")
     if not port.isdecimal() or not 1 <= int(port) <= 65535:
-        raise InputError("--loader", "", f"{port!r} is no port; one is from 1 to 65535")
-    return scheme, host, int(port)
+        raise InputError(option, "", f"{port!r} is no port; one is from 1 to 65535")
+    return host, int(port)

@@ -8,9 +8,10 @@ import struct
 import pytest
 
 from coupled.flight.runfile import read_run
-from coupled.live.flightgear import FlightGear, Picture, pack, start_line
+from coupled.live.flightgear import flightgear, pack, start_line
 from coupled.live.host import Plan
 from coupled.live.session import fly_live
+from coupled.live.view import Picture
 
 # FGNetFDM of net_fdm.hxx, version 24: each member, its type and how many of it.
 LAYOUT = """
@@ -59,7 +60,7 @@ def test_a_flight_is_seen_as_it_is_flown() -> None:
         view.settimeout(5.0)
         port = view.getsockname()[1]
         manoeuvre = read_run("capture")[0]
-        plan = Plan(paced=False, watchers=[FlightGear("127.0.0.1", port)])
+        plan = Plan(paced=False, watchers=[flightgear("127.0.0.1", port)])
         record = fly_live(manoeuvre, plan).record
         first = fields(view.recv(1024))
     assert first["theta"] == pytest.approx(record["pitch_rad"][0], rel=1e-6)
