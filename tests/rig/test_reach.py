@@ -56,6 +56,31 @@ def test_at_the_reach_the_surface_gets_the_closed_form(
     assert felt == pytest.approx(force * G_STIFF * REACH, rel=1e-9)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_at_the_reach_a_rigid_control_gives_the_closed_form(side: float) -> None:
+    """F = (G·r + F_c)/(1 − μ) with friction that grows by μ·|F|; a play leaves G·r, δc past it."""
+    hand = {"kind": "step", "force_N": 600.0 * side, "reach_m": REACH}
+    for changes, force, past in (
+        ({"friction_N": 4.0, "friction_by_load": 0.1}, (G_STIFF * REACH + 4.0) / 0.9, 0.0),
+        ({"play_m": 0.002}, G_STIFF * REACH, 0.001),
+    ):
+        record = pushed(configure(bench(changes), "rigid"), hand)
+        assert side * record["column_force_N"][-1] == pytest.approx(force, rel=1e-9)
+        assert side * record["column_deflection_m"][-1] == pytest.approx(REACH, rel=1e-9)
+        assert side * record["column_computed_m"][-1] == pytest.approx(REACH + past, rel=1e-9)
+
+
+def test_the_reach_is_the_same_on_both_sides() -> None:
+    """Into it and back, through play and a servo that overshoots: the mirrored flight, exactly."""
+    changes = {"play_m": 0.004, "servo_frequency_Hz": 2.0, "servo_damping_ratio": 0.2}
+    rig = configure(bench({**changes, "friction_N": 3.0}), "uncompensated")
+    hand = {"kind": "doublet", "half_period_s": 0.8, "rise_s": 0.1, "reach_m": 0.06}
+    one, other = (pushed(rig, {**hand, "force_N": force}) for force in (400.0, -400.0))
+    for name in ("force_N", "computed_m", "deflection_m", "estimate_m"):
+        assert np.array_equal(one[f"column_{name}"], -other[f"column_{name}"])
+    assert np.abs(one["column_deflection_m"]).max() == pytest.approx(0.06)
+
+
 @pytest.mark.parametrize("hand", ["step", "clamp"])
 def test_a_hand_that_does_not_come_to_its_reach_is_no_other(hand: str) -> None:
     settings = {"step": {"force_N": 100.0, "rise_s": 0.5}, "clamp": {"deflection_m": 0.05}}[hand]

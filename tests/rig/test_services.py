@@ -173,9 +173,10 @@ def test_a_jam_of_the_other_side_is_broken_by_the_disconnect_and_half_the_surfac
 
 
 def test_a_disconnect_lets_each_side_go_its_way() -> None:
-    record = flown(OTHER, {"open": {"service": "disconnected"}}, seconds=8.0)
-    assert at(record, "computed_m", 7.9) == pytest.approx(20.0 / G, rel=1e-3)
-    assert at(record, "other_m", 7.9) == pytest.approx(0.0, abs=1e-4)
+    for to in (1.0, 0.51):  # a switch is on above one half
+        record = flown(OTHER, {"open": {"service": "disconnected", "to": to}}, seconds=8.0)
+        assert at(record, "computed_m", 7.9) == pytest.approx(20.0 / G, rel=1e-3)
+        assert at(record, "other_m", 7.9) == pytest.approx(0.0, abs=1e-4)
 
 
 BENT = {"bend_m_per_N": 9e-5, f"{PLACE}.compensation.bend_m_per_N": 9e-5}
@@ -282,6 +283,7 @@ def test_services_that_rest_change_no_byte_of_the_record() -> None:
     services = {**DRIVEN, "shaker_N": 10.0, "pusher_N": 50.0, "soft_stop_m": 0.17}
     services |= {"jam_breaks_N": 5.0, "soft_stop_stiffness_N_per_m": 1e4, "envelope_above_g": 2.0}
     services |= {"envelope_below_g": 0.5, "envelope_push_N_per_g": 20.0}
+    services |= {"shaker_alpha_rad": 0.2, "pusher_alpha_rad": 0.3}
     given = flown({**services, "envelope_N_per_g": 20.0})
     assert given.channels[: len(plain.channels)] == plain.channels
     assert given.channels[len(plain.channels) :] == service_channels("column")
