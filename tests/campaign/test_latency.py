@@ -5,21 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from coupled.authority.compare import fly_and_judge
 from coupled.campaign.check import check_run
 from coupled.campaign.latency import AT_ONCE, FRAMES_LATE, fly_undelayed, latency_s
 from coupled.campaign.standards import judge_standard
 from coupled.campaign.unjudged import UnjudgedError
+from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Manoeuvre
 from coupled.flight.pilot import Clamp, Step
 from coupled.flight.runfile import read_run
 from coupled.flight.weather import Turbulence
-from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
+from coupled.record.channels import CONTROL_NAMES, RATE, ControlName, unit_of
 from coupled.rig import parameters
 from coupled.schema import Section, build, file_keys
 
+Floats = NDArray[np.float64]
 AXES = dict(zip(("pitch", "roll", "yaw"), CONTROL_NAMES, strict=True))
 FRAME_s = 1.0 / 120.0
 
@@ -74,6 +78,34 @@ def test_a_smaller_answer_is_not_a_later_one() -> None:
     run = next(each for each in read_run("latency") if each.label == "pitch")
     bent, rigid = (latency(run.configured(name)) for name in CONFIGURATIONS[1::-1])
     assert bent == pytest.approx(rigid, abs=5e-4)
+
+
+@pytest.mark.parametrize(("axis", "read_s"), [("pitch", 0.177), ("yaw", 0.149)])
+def test_what_the_structure_bends_is_not_late_with_the_loader(axis: str, read_s: float) -> None:
+    """A late loader's answer is that of K·F at once and that of δc late, one upon the other.
+
+    The grip is further by K·F as soon as it is pushed, and the host's K̂·F says so. A loader
+    too heavy to move gives the answer to K·F alone. Two parts have no one delay: the 5 % are
+    met later than by the delay, or sooner, as the first part has it.
+    """
+    delay_s, control = 0.15, AXES[axis]
+    run = next(each for each in read_run("latency") if each.label == axis)
+    run = run.configured("compensated")
+
+    def answer(changes: dict[str, float]) -> Floats:
+        here = {f"controls.{control}.loader.{key}": value for key, value in changes.items()}
+        rate = fly(replace(run, rig=run.rig.changed(here)))[RATE[control]]
+        return np.asarray(rate - rate[0])
+
+    bent, prompt = answer({"mass_kg": 1e7}), answer({})
+    frames = round(delay_s / FRAME_s)
+    waits = np.concatenate((np.zeros(frames), (prompt - bent)[:-frames]))
+    late = answer({"delay_s": delay_s})
+    assert np.max(np.abs(late - (bent + waits))) < 1e-4 * np.max(np.abs(late))
+    key = f"controls.{control}.loader.delay_s"
+    slow = replace(run, rig=run.rig.changed({key: delay_s}))
+    read = latency_s(control, fly_and_judge(slow), fly_undelayed(slow))
+    assert read == pytest.approx(read_s, abs=1e-3)
 
 
 @pytest.mark.parametrize("axis", AXES)
