@@ -58,6 +58,7 @@ def test_a_host_adds_a_frame_and_a_half(axis: str) -> None:
         ({"sensing.computed_skew_s": 0.006}, 0.006),
         ({"loader.delay_s": 0.07, "sensing.gauge_delay_s": 0.04}, 0.11),
         ({"loader.servo_frequency_Hz": 3.0}, 0.0),  # δc goes to the host ahead of the servo
+        ({"loader.servo_delay_s": 0.05}, 0.0),
     ],
 )
 def test_a_delay_in_the_chain_is_read_out(
@@ -157,7 +158,7 @@ def test_latency_is_not_measured_in_moving_air() -> None:
 
 # Of the grip alone; a lead, where the list leaves none; a spring's memory, which is feel; and the
 # recorder's stamps, which are in the reference's record as well.
-NOT_LATE = {"loader.servo_frequency_Hz", "compensation.force_lead_lag_s"}
+NOT_LATE = {"loader.servo_frequency_Hz", "loader.servo_delay_s", "compensation.force_lead_lag_s"}
 NOT_LATE |= {"loader.relaxing_time_s", "sensing.force_stamp_s", "sensing.hum_frequency_Hz"}
 
 
