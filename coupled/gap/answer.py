@@ -10,8 +10,10 @@ import numpy as np
 from coupled.gap.budget import StageBudget
 from coupled.gap.case import Case
 from coupled.gap.choose import Choice, Found
+from coupled.gap.courses import course_in
 from coupled.gap.credibility import credibility
 from coupled.gap.effect import Effect, Parameter, field_of
+from coupled.gap.lines import other_side
 from coupled.gap.result import (
     EffectResult,
     ParameterEstimate,
@@ -99,7 +101,8 @@ def effects_of(
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
         probability = step.probability * sure
-        return EffectResult(effect.name, effect.stage, probability, numbers, known)
+        course = course_in(effect, case, choice.fit, records)
+        return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
 
     return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
 
@@ -112,6 +115,9 @@ def _estimate(
     if scatter > 0.0:  # the records meet a sample of it
         low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
         high = value + math.hypot(high - value, 1.96 * scatter * value)
+    twin = other_side(value, case.nominal.frame_rate) if p.folds else None
+    if twin is not None:  # the records do not say on which side of the fold it is
+        low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
     bounds = [None if end is None else float(p.entered(filed, end)) for end in ends]

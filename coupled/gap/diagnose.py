@@ -188,7 +188,7 @@ class _Judge:
 
         def closes(effect: Effect) -> bool:
             seen = [out for out in effect.shows_in if out in settled]
-            return any(self.last[out] < (1.0 - MOST) * settled[out] for out in seen)
+            return any(self.last[o] - 1.0 < (1.0 - MOST) * (settled[o] - 1.0) for o in seen)
 
         effects = [step.effect for step in self.choice.steps]
         return {e.stage for e in effects if e.stage in e.shows_in or closes(e)}

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.output import Output
+from coupled.gap.output import Floats, Output
 from coupled.gap.thresholds import MODEL_ERROR
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
@@ -38,9 +38,9 @@ class Parameter:
     How its size is scanned: not at all where not `scanned`; `shape` is held at its start when
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
-    its own number for it, which is then to be set. `model_error` is how
-    well, relative, the physics of a right effect gives it, `unsure` by how much it is off at most
-    for what a record does not say.
+    its own number for it, which is then to be set. A frequency `folds` about half of the frame
+    rate. `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
+    how much it is off at most for what a record does not say.
     """
 
     name: str
@@ -58,6 +58,7 @@ class Parameter:
     model_error: float = MODEL_ERROR
     unsure: float = 0.0
     host: str = ""
+    folds: bool = False
 
     def named(self, control: str) -> str:
         """Return its name with its unit on this control."""
@@ -152,6 +153,8 @@ class Effect:
     `swallows`     settings, by the effects that free the same numbers, that are the same law
     `even`         two effects, friction and a force, that together are the same law
     `sample_error` relative standard error of its number, from what little of it a record meets
+    `gradual`      its first number is a rate: it grows from the first on
+    `events`       when the events were that it consists of, in s from the record's start
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
     `reserve`      it passes for others: only tried where without it a stage stays unexplained
     """
@@ -170,6 +173,8 @@ class Effect:
     swallows: tuple[str, ...] = ()
     even: tuple[str, str] | None = None
     sample_error: Callable[[Record, float], float] | None = None
+    gradual: bool = False
+    events: Callable[[Record], Floats] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
     reserve: bool = False
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from coupled.gap.effect import Effect, Parameter, Signature
 from coupled.gap.entries import added, exact, factor, one, value
 from coupled.gap.hums import hums
-from coupled.gap.missed import shares_missed, spread_of_missed
+from coupled.gap.missed import shares_missed, spread_of_missed, times_missed
 from coupled.gap.thresholds import CLOCK_s
 
 
@@ -27,6 +27,7 @@ COMPENSATION: tuple[Effect, ...] = (
         outputs=("schedule", "multiplier", "compensation"),
         sample_error=spread_of_missed,
         seen=shares_missed,
+        events=times_missed,
     ),
 )
 SENSING: tuple[Effect, ...] = (
@@ -55,11 +56,14 @@ SENSING: tuple[Effect, ...] = (
         ),
         outputs=("linkage",),
     ),
-    one(
-        "sensing",
-        "scale_drift",
-        added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
-        *("computed", "computed_left", "loop", 1e4),
+    replace(
+        one(
+            "sensing",
+            "scale_drift",
+            added("per_s", "sensing.scale_drift_per_s", -0.05, 0.05, 1e-3),
+            *("computed", "computed_left", "loop", 1e4),
+        ),
+        gradual=True,
     ),
     Effect(
         "mains_hum",
@@ -67,7 +71,9 @@ SENSING: tuple[Effect, ...] = (
         (
             added("amplitude_{d}", "sensing.hum_{d}", 0, 0.1, 1e-4),
             # Its starts are its scale: so fine is a frequency known.
-            exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)),
+            replace(
+                exact(value("frequency_Hz", "sensing.hum_frequency_Hz", 5, 1000, 0.1)), folds=True
+            ),
             exact(value("phase_rad", "sensing.hum_phase_rad", -7, 7, 1.0)),
         ),
         Signature("", "computed_left", "time", 0.2),

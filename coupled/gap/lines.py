@@ -109,6 +109,17 @@ def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
     return replace(seen, amplitude=seen.amplitude * floor)
 
 
+def other_side(tone_Hz: float, rate_Hz: float) -> float | None:
+    """Return the tone of the same mains that sampling shows at the same place, if there is one."""
+    other = math.ceil(2.0 * tone_Hz / rate_Hz) * rate_Hz - tone_Hz
+    below = math.floor(2.0 * tone_Hz / rate_Hz) * rate_Hz - tone_Hz
+    for mains in MAINS_Hz:
+        for one in (other, below):
+            if max(abs(one - mains), abs(tone_Hz - mains)) <= MAINS_OFF * mains:
+                return one
+    return None
+
+
 def tone_of(seen_Hz: float, rate_Hz: float) -> float:
     """Return the frequency of the mains that is folded to a line's, else the line's own."""
     for mains in (seen_Hz, *MAINS_Hz):

@@ -80,6 +80,11 @@ def shares_missed(
     return [{"share": float(np.mean(seen))}] if seen.any() else []
 
 
+def times_missed(record: Record) -> Floats:
+    """Return when the frames were missed, in s from the record's start."""
+    return np.asarray((record.time_s - record.time_s[0])[missed_in(record).seen])
+
+
 def spread_of_missed(record: Record, frame_s: float) -> float:
     """Return the relative standard error of the share, from how few frames were missed.
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from coupled.gap.budget import StageBudget
+from coupled.gap.course import Course
 from coupled.gap.credibility import Credibility
 from coupled.gap.output import Hides, explained_below
 from coupled.gap.thresholds import GUILTY_FROM
@@ -123,6 +124,7 @@ class EffectResult:
     probability: float
     parameters: tuple[ParameterEstimate, ...]
     credibility: Credibility | None = None
+    course: Course | None = None
 
     @property
     def value(self) -> float | None:
@@ -131,12 +133,14 @@ class EffectResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
-        found = {
+        found: dict[str, Any] = {
             "name": self.name,
             "stage": self.stage,
             "probability": self.probability,
             "parameters": {p.name: p.as_dict() for p in self.parameters},
         }
+        if self.course is not None:
+            found["course"] = self.course.as_dict()
         known = self.credibility
         return found | ({} if known is None else {"credibility": known.as_dict()})
 

@@ -10,8 +10,8 @@ from coupled.gap.budget import StageBudget
 from coupled.gap.lines import SeenLine
 from coupled.gap.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.shrink import Shrink
-from coupled.gap.thresholds import FREE_LEAST, ONSET_s
-from coupled.gap.where import Remains
+from coupled.gap.thresholds import FREE_LEAST
+from coupled.gap.where import Remains, Where
 
 OF_SIGNAL = {
     "computed": "the deflection",
@@ -61,7 +61,13 @@ def summary(found: Findings, shrink: Shrink, in_flight: str, filtered: str, next
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
-        said += [_since(found), _sure(found), _closes(shrink), in_flight]
+        said += [
+            *map(in_time, found.effects),
+            _since(found),
+            _sure(found),
+            _closes(shrink),
+            in_flight,
+        ]
     said += [filtered, next_test]
     return " ".join(sentence for sentence in said if sentence)
 
@@ -156,13 +162,46 @@ def _since(found: Findings) -> str:
     for stage in found.stages:
         if stage.where is None:
             continue
-        if stage.where.onset_s is not None and stage.where.onset_s > ONSET_s:
-            said.append(f"In the {stage.name} it is first seen at {stage.where.onset_s:.1f} s.")
+        if not any(e.course is not None and e.course.onset_s for e in found.effects):
+            said += _between(stage.name, stage.where)
         if stage.where.line is not None:
             said.append(_line(stage.where.channel, stage.where.line))
         if stage.remains is not None:
             said.append(_remains(stage.name, stage.remains))
     return " ".join(said)
+
+
+def _between(stage: str, where: Where) -> list[str]:
+    """Return from when to when a stage's gap is there, where it is not there all the time."""
+    begins, ends = (f"{span.at_s:.1f} s" if span else "" for span in (where.begins, where.ends))
+    if begins and ends:
+        return [f"The gap in the {stage} is there from {begins} to {ends}."]
+    if begins:
+        return [f"The gap in the {stage} is there from {begins} on."]
+    return [f"The gap in the {stage} is there until {ends}."] if ends else []
+
+
+def in_time(effect: EffectResult) -> str:
+    """Return since when an effect is there and how fast it grows; nothing where it always is."""
+    course = effect.course
+    if course is None or course.kind == "constant":
+        return ""
+    onset, rate, said = course.onset_s, course.rate_per_s, []
+    if onset is not None:
+        said.append(f"from {onset.value:.1f} s on ({onset.low:.1f} to {onset.high:.1f})")
+    if course.kind == "from":
+        p = effect.parameters[0]
+        filed = p.filed or 0.0
+        said.append(f"then {figure(filed + course.then * (p.found - filed))} {p.unit}".rstrip())
+    if rate is not None:
+        share = rate.times(60.0)
+        first = effect.parameters[0]
+        unit = " of them" if course.kind == "events" else f" {first.unit}".rstrip()
+        if course.kind != "events" and (first.relative or first.name == "per_s"):
+            share, unit = share.times(100.0), " %"
+        ends = f"{share.low:.3g} to {share.high:.3g}"
+        said.append(f"at {share.value:.3g}{unit} a minute ({ends})")
+    return f"{_capital(plain(effect.name))}: {', '.join(said)}."
 
 
 def _line(channel: str, line: SeenLine) -> str:

@@ -164,6 +164,12 @@ MOST = 0.5  # of a guilty stage's gap, that certain effects must hold; the contr
 
 # Where a gap lies (`where`).
 WHERE_WINDOW_s = 0.5  # chosen: windows whose rms gives the onset
+ONSET_CHANCE = 1e-3  # chosen: of excitation alone leaving all quiet before, from which it began
+ONSET_LIKELY = 0.5  # chosen: from which a quiet window would surely have been loud
+COURSE_WINDOW_s = 0.5  # chosen: windows in which an effect has a size
+COURSE_POWER = 0.01  # chosen: of a window's mean action, under which it has none
+COURSE_GAIN = 8.0  # chosen: log-likelihood by which a course must beat one that is the same always
+COURSE_CHANGES = 0.3  # chosen: of its size, by which what changes must do so in the record
 WHERE_LOUD = 2.0  # chosen: floors from which a window shows the gap
 WHERE_SHARE = 0.05  # chosen: least share of the variance that is worth saying
 NO_SIGN = 0.05  # chosen: of a signal's rms, under which its sign is not sure
@@ -198,7 +204,6 @@ PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄
 IN_FLIGHT_LEAST = 0.01  # chosen: of a channel's motion, from which an effect shows in flight
 
 # What the summary says (`summary`).
-ONSET_s = 5.0  # chosen: a gap that begins later has a beginning
 FREE_LEAST = 5  # chosen: %, under which a model free in form explains nothing
 
 # Whether an effect is the cause (`credibility`).

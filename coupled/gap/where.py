@@ -1,8 +1,8 @@
 """Where inside a stage the gap lies: what it follows, at which frequency, since when.
 
 The residual of the nominal rig is held against the stage's own signals, each alone: the share of
-its variance that a straight line on that signal takes, and its slope. Onset is the first half
-second whose residual stands clear of the floor and is followed by more.
+its variance that a straight line on that signal takes, and its slope. Its beginning and its end are
+sought by windows at the same excitation (`onset`).
 """
 
 from __future__ import annotations
@@ -17,18 +17,17 @@ from scipy.signal import bilinear, welch
 
 from coupled.gap.flexible import free_share
 from coupled.gap.lines import SeenLine, widest_line
+from coupled.gap.onset import Span, in_time
 from coupled.gap.output import Output
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.thresholds import (
     NEAR_DENSER,
     NEAR_SHARE,
     NO_SIGN,
-    WHERE_LOUD,
     WHERE_MOST,
     WHERE_SHARE,
     NEAR_s,
     SPECTRUM_s,
-    WHERE_WINDOW_s,
 )
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record
@@ -70,15 +69,17 @@ class PressureBand:
 class Where:
     """Where in a stage its gap lies, by the channel where it is widest.
 
-    `loud` is the share of time that shows it; `onset_s` None where no half second does;
-    `by_pressure` is empty where q̄ stays; `line` None where no tone stands out of the spectrum.
+    `loud` is the share of time that shows it; `begins` and `ends` None where it may be there all
+    the time, as the excitation lets it; `by_pressure` is empty where q̄ stays; `line` None where no
+    tone stands out of the spectrum.
     """
 
     channel: str
     follows: tuple[Follows, ...]
     peak_Hz: float
     loud: float
-    onset_s: float | None = None
+    begins: Span | None = None
+    ends: Span | None = None
     by_pressure: tuple[PressureBand, ...] = ()
     line: SeenLine | None = None
 
@@ -87,8 +88,9 @@ class Where:
         found: dict[str, Any] = {"channel": self.channel}
         found["follows"] = [item.as_dict() for item in self.follows]
         found |= {"peak_Hz": self.peak_Hz, "loud": self.loud}
-        if self.onset_s is not None:
-            found["onset_s"] = self.onset_s
+        for name, span in (("onset", self.begins), ("end", self.ends)):
+            if span is not None:
+                found |= {f"{name}_s": span.at_s, f"{name}_95_s": [span.low_s, span.high_s]}
         if self.by_pressure:
             found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
         if self.line is not None:
@@ -138,15 +140,18 @@ class Remains:
 def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Where:
     """Return where the gap of an output lies, by the residual that this rig leaves."""
     left, rate_Hz = output.residual(rig), output.frame_rate_Hz
-    loud, onset_s = _in_time(left, record.time_s, rate_Hz)
+    known = signals(output.stage, record, control, rate_Hz)
+    drives = {name: x for name, x in known.items() if not name.endswith(("sign", "3", "time_s"))}
+    times = in_time(left, drives, rate_Hz)
     pressure = "dynamic_pressure_Pa"
     varies = pressure in record and np.ptp(record[pressure]) > 0.0
     return Where(
         channel=output.channel,
         follows=_follows(output, left, record, control),
         peak_Hz=_peak(left, rate_Hz),
-        loud=loud,
-        onset_s=onset_s,
+        loud=times.loud,
+        begins=times.begins,
+        ends=times.ends,
         by_pressure=_by(left, smoothed(record[pressure])) if varies else (),
         line=widest_line(left, output.floor, rate_Hz),
     )
@@ -266,16 +271,6 @@ def _follows(
         found.append(Follows(name, share, slope * output.floor))
     found.sort(key=lambda item: -item.share)
     return tuple(item for item in found if item.share >= WHERE_SHARE)[:WHERE_MOST]
-
-
-def _in_time(left: Floats, time_s: Floats, rate_Hz: float) -> tuple[float, float | None]:
-    """Return the share of windows that show the gap, and when the first of them begins, s."""
-    window = max(1, round(WHERE_WINDOW_s * rate_Hz))
-    count = len(left) // window
-    rms = np.sqrt(np.mean(left[: count * window].reshape(count, window) ** 2, axis=1))
-    loud = rms > WHERE_LOUD
-    onset_s = float(time_s[int(np.argmax(loud)) * window]) if loud.any() else None
-    return float(np.mean(loud)), onset_s
 
 
 def _peak(left: Floats, rate_Hz: float) -> float:

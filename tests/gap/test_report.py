@@ -57,7 +57,10 @@ def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
     late[:2400, at] = clean["column_deflection_m"][:2400]
     again = diagnose(nominal, {"a": Record(record.channels, late)}).stage("linkage").where
     assert again is not None
-    assert again.onset_s == pytest.approx(20.0, abs=2.5)
+    assert found.begins is None
+    assert again.begins is not None
+    assert again.begins.at_s == pytest.approx(20.0, abs=2.5)
+    assert again.begins.low_s <= 20.0 <= again.begins.high_s
 
 
 @pytest.mark.parametrize("flown", [False, True])
