@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from coupled.errors import InputError
 from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.likeness import Likeness
 from coupled.gap.output import Floats, Output
 from coupled.gap.thresholds import MODEL_ERROR
 from coupled.record.channels import ControlName, channel, unit_of
@@ -125,18 +126,6 @@ class Signature:
     y: str
     drawing: Drawing = "law"
     zoom_s: float = 2.5
-
-
-@dataclass(frozen=True)
-class Likeness:
-    """An effect that passes for a plainer one in a faint gap, and by which values it then does.
-
-    `values` takes the plainer one's values and what the nominal rig has under `base`.
-    """
-
-    plainer: str
-    base: str
-    values: Callable[[Mapping[str, float], float], dict[str, float]]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from coupled.gap.effect import Effect, Likeness, Parameter, Signature
+from coupled.gap.effect import Effect, Parameter, Signature
+from coupled.gap.likeness import Likeness
 from coupled.gap.thresholds import YIELDING_ERROR, FAINT_STRIBECK_d_per_s
 
 _DRAWN = Signature("speed", "missing")

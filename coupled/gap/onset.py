@@ -1,4 +1,4 @@
-"""Since when a gap is there: told from amplitude by windows at the same excitation.
+"""Since when a gap is there, by windows at the same excitation: amplitude is no onset.
 
 A gap that grows with the motion is quiet while the motion is small, and that is no onset. So a
 quiet window counts as evidence only by the loud ones that were excited no more than it, in every

@@ -217,8 +217,7 @@ def _loader(
 ) -> None:
     """Run the loader on what is `given`, shape (10, frames).
 
-    G_T twice, misread δc, load factor, restarts' δc and its rate; x₀, force and jams of services;
-    whether the host missed the frame.
+    G_T twice, misread δc, load factor, restarts' δc and its rate, and `Hosted.rows`.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
