@@ -51,3 +51,19 @@ def test_a_cessna_damped_by_half_is_diagnosed_as_that(
     factor = effect(found, "pitch_damping")
     assert factor["low"] < 0.53 < factor["high"]
     assert factor["value"] == pytest.approx(0.53, abs=0.02)
+
+
+@pytest.mark.slow
+def test_a_cessna_that_is_less_stable_and_trims_elsewhere_is_diagnosed_as_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """C_mα × 0.8: its elevator stands 0.008 rad off the nominal trim."""
+    full = read_rig(shipped_rigs()["c172p"])
+    rig = full.changed({"controls": {"column": full.controls["column"]}})
+    record = flown_by(tmp_path, monkeypatch, rig, {"/Cmalpha": 0.8})
+    assert not record.manifest["ended_early"]
+    found = diagnose(rig, {"aft.csv": record}, "column").as_dict()
+    assert found["verdict"] == "effect"
+    factor = effect(found, "pitch_stiffness")
+    assert factor["low"] < 0.8 < factor["high"]
+    assert factor["value"] == pytest.approx(0.8, abs=0.01)
