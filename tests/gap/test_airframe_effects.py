@@ -62,8 +62,9 @@ def test_a_cessna_that_is_less_stable_and_trims_elsewhere_is_diagnosed_as_that(
     rig = full.changed({"controls": {"column": full.controls["column"]}})
     record = flown_by(tmp_path, monkeypatch, rig, {"/Cmalpha": 0.8})
     assert not record.manifest["ended_early"]
-    found = diagnose(rig, {"aft.csv": record}, "column").as_dict()
-    assert found["verdict"] == "effect"
-    factor = effect(found, "pitch_stiffness")
+    whole = diagnose(rig, {"aft.csv": record}, "column")
+    airframe = whole.stage("airframe")
+    assert airframe.guilty and not airframe.unexplained
+    factor = effect(whole.as_dict(), "pitch_stiffness")
     assert factor["low"] < 0.8 < factor["high"]
     assert factor["value"] == pytest.approx(0.8, abs=0.01)
