@@ -52,7 +52,7 @@ CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
 LEAST_N = 1e-9  # friction of bristles that carry none at this load
 FADED = 6.0  # times the speed over which it fades, from which contacts do not damp
-SOLVED = 1e-7  # of the speeds at hand; another step would be a thousandth of this one
+SOLVED = 1e-7  # of the speeds at hand: what a step may still change
 
 
 def _stiffness(given: Given) -> float:
@@ -164,17 +164,19 @@ def yielding_speed(
     inertia: float,
     span: float,
     load: float,
-) -> float:
+) -> tuple[float, float]:
     """Return the speed u at the middle of a step of `span` seconds, in d/s, of a yielding contact.
+
+    And how far its bristles are bent at the end, d.
 
     inertia·(u − v) + force over the way u·span = push, with `v` the speed at its start. The force
     rises with the way, ever less: from the speed that its slope at the start would let, Newton's
-    steps run up to u from one side.
+    steps run up to u from one side, each a smaller part of the last.
     """
     spring = p.stiffness * (0.5 * span)
     free = inertia * v + push - p.stiffness * bent
     bends = _bending(p, _slipping(p, load, v), bent, free)
-    u = free / (inertia + bends * (spring + p.contact_damping))
+    u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = 0.0
@@ -183,14 +185,18 @@ def yielding_speed(
         way = u * span
         after, mean = yielded(p, level, bent, way)
         force = p.stiffness * mean + damping * (after - bent) / span
-        slope = inertia + damping * _bending(p, level, after, way)
+        bends = _bending(p, level, after, way)
+        slope = inertia + damping * bends
         if way != 0.0:
             slope += max(p.stiffness * (after - mean) / way * span, 0.0)
         change = (push - force - inertia * (u - v)) / slope
         u += change
-        if abs(change) <= SOLVED * (abs(u) + abs(v)):
+        after += bends * (change * span)
+        near, step = SOLVED * (abs(u) + abs(v)), abs(change)
+        if step <= near or step * step <= near * last:  # this one, or the next by their ratio
             break
-    return u
+        last = step
+    return u, after
 
 
 @stage
@@ -203,18 +209,20 @@ def rubbing_speed(
     inertia: float,
     span: float,
     load: float,
-) -> float:
+) -> tuple[float, float]:
     """Return the speed at the middle of a step of `span` seconds, of any friction, in d/s.
+
+    And how far bristles are bent after it, d.
 
     `push` is the force but for friction, N, `inertia` what it has to move, N·s/d, `direction` the
     side to which a rigid contact slides, `load` the force carried, N.
     """
     if p.dry == 0:
-        return v + push / inertia
+        return v + push / inertia, 0.0
     if p.stiffness > 0.0:
         return yielding_speed(p, bent, v, push, inertia, span, load)
     push -= more_friction(p, load, direction) * direction
     halfway = v + (push - running_friction(p, v) * direction) / inertia
     if p.breakaway > p.running:  # Stribeck: once more with the speed just found
         halfway = v + (push - running_friction(p, halfway) * direction) / inertia
-    return halfway
+    return halfway, 0.0

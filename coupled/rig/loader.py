@@ -144,9 +144,10 @@ def _midpoint(
     push: float,
     direction: float,
     span: float,
-) -> float:
+) -> tuple[float, float]:
     """Return δc' at the middle of a step of `span` seconds in which nothing happens, d/s.
 
+    And how far a friction's contact has yielded after it, d.
     `push` is the force that does not depend on the motion, N.
     """
     v = s.rate
@@ -254,14 +255,15 @@ def _move(
         net = pull - breakout * sign(x - neutral)
         if x == neutral:
             net -= breakout * direction
-        halfway = _midpoint(p, friction, m, s, net, direction, left)
+        halfway, bent = _midpoint(p, friction, m, s, net, direction, left)
         about = (ends[0] - neutral, ends[1] - neutral)
         dry = friction.rigid != 0
         span, event = first_event(x - neutral, v, dry, breakout, halfway, left, about)
         acceleration = 2.0 * (halfway - v) / left
         s.computed = x + span * (v + 0.5 * acceleration * span)
         s.rate = v + acceleration * span
-        s.bent = bent_after(friction, s.bent, halfway, s.computed - x, s.load)
+        way = s.computed - x
+        s.bent = bent if event == NOTHING else bent_after(friction, s.bent, halfway, way, s.load)
         if p.relaxing > 0.0:
             relax(p, s, s.computed - x, span)
         if event == NOTHING:

@@ -8,6 +8,7 @@ nobody. Signals are given at the frames; between them what is continuous in the 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -190,10 +191,20 @@ def _one(rig: Rig, control: str) -> tuple[Any, Any]:
 
 
 def on_nodes(rig: Rig, samples: Floats) -> Floats:
-    """Return a signal on the loader's nodes: `rig.substeps` a frame, and the last."""
-    frames = np.arange(len(samples))
-    nodes = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
-    return np.asarray(CubicSpline(frames, samples)(nodes))
+    """Return a signal on the loader's nodes: `rig.substeps` a frame, and the last.
+
+    Not to be written to: who asks for the same again has the same array.
+    """
+    return _on_nodes(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), rig.substeps)
+
+
+@lru_cache(maxsize=8)
+def _on_nodes(samples: bytes, substeps: int) -> Floats:
+    values = np.frombuffer(samples)
+    cubic, square, slope, start = CubicSpline(np.arange(len(values)), values).c[:, :, None]
+    share = np.arange(substeps) / substeps
+    inner = ((cubic * share + square) * share + slope) * share + start
+    return np.append(inner, values[-1])
 
 
 @long_entry
