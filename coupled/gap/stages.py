@@ -24,7 +24,7 @@ from coupled.gap.floors import given_noise, left_noise, noise_in, unsmoothed, wi
 from coupled.gap.imposed import Imposed
 from coupled.gap.noise import Noise, between_jumps
 from coupled.gap.openloop import about
-from coupled.gap.output import Hides, Output, Predict, echoed, felt, spread, white
+from coupled.gap.output import Hides, Output, Predict, echoed, felt, heard, spread
 from coupled.gap.ratchet import passed_noise, unratcheted
 from coupled.gap.reading import Reading
 from coupled.gap.served import asked, left, neutral, services
@@ -293,5 +293,6 @@ class Reader(Reading):
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
         left = measured - position(np.concatenate(([0.0], command[:-1])))
-        floor = float(np.hypot(white(left), SURFACE_KNOWN * np.ptp(measured)))
+        own = left_noise(heard(left), measured, left)
+        floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]

@@ -1,7 +1,8 @@
 """Other readings of a trial's truth: the same law by other names, and what its record cannot tell.
 
-A reading that is the same law whatever is recorded may be named with confidence. One that this
-record does not tell from the truth may only be named beside it.
+A reading that is the same law whatever is recorded may be named with confidence, and so may a
+plainer law that this record does not tell from the truth. Another that it does not tell from the
+truth may only be named beside it.
 """
 
 from __future__ import annotations
@@ -38,6 +39,15 @@ NEAR = (
     ("backlash", "soft_backlash"),
     ("mass", "lift_slope"),
 )
+# Laws that are the plainer one beside them where a record shows nothing of what they add: a mode
+# far above what the pilot excites is a bend. The plainer one is then named, and rightly.
+PLAINER = (
+    ("structural_mode", "bend"),
+    ("stiffening_bend", "bend"),
+    ("bend_hysteresis", "bend"),
+    ("soft_backlash", "backlash"),
+    ("stribeck_friction", PLAIN),
+)
 
 
 def same_law(effects: Sequence[str]) -> Iterator[Reading]:
@@ -54,18 +64,18 @@ def not_told_apart(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator
 
     What is left with the other effect fitted is likelier by less than a diagnosis asks for.
     """
-    for pair in NEAR:
-        for name, other in (pair, pair[::-1]):
-            if name not in effects or other in effects:
-                continue
-            shown = {*BY_NAME[name].shows_in, *BY_NAME[other].shows_in}
-            here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
-            outputs = outputs_of(rig, record, "airframe" in shown)
-            case = Case(rig, "column", [o for o in outputs if o.stage in shown])
-            right = case.fit([BY_NAME[n] for n in here])
-            wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
-            if _gain(case.outputs, right, wrong) < RIVAL_GAIN:
-                yield reading({other, *effects} - {name}, sure=False)
+    both_ways = [(pair, False) for one in NEAR for pair in (one, one[::-1])]
+    for (name, other), sure in (*both_ways, *((pair, True) for pair in PLAINER)):
+        if name not in effects or other in effects:
+            continue
+        shown = {*BY_NAME[name].shows_in, *BY_NAME[other].shows_in}
+        here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
+        outputs = outputs_of(rig, record, "airframe" in shown)
+        case = Case(rig, "column", [o for o in outputs if o.stage in shown])
+        right = case.fit([BY_NAME[n] for n in here])
+        wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
+        if _gain(case.outputs, right, wrong) < RIVAL_GAIN:
+            yield reading({other, *effects} - {name}, sure=sure)
 
 
 def reading(names: Iterable[str], *, sure: bool) -> Reading:
