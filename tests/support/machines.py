@@ -179,3 +179,41 @@ def damper_rig(damping: float = 2000.0, drive: str = "displacement") -> Rig:
     """Return the rig of that damper, without play; of next to no mass."""
     rig = plain_rig(100.0, {"mass_kg": 0.01, "damping_N_s_per_m": damping})
     return rig.changed({"controls.column.drive": drive})
+
+
+def axis(
+    rate_Hz: float = 25.0,
+    seconds: float = 60.0,
+    friction_N: float = 20.0,
+    noise: tuple[float, float] = (0.3, 2e-6),
+    seed: int = 3,
+) -> Record:
+    """Return a record of a slide without a spring, positioned by a controller, with LuGre friction.
+
+    95 kg and 200 N·s/m; bristles of 1e6 N/m; Euler's steps at 20 kHz. The force is its motor's.
+    """
+    fine, mass, damping, bristles, creep = 20_000.0, 95.0, 200.0, 1e6, 1e3
+    way = speed = bent = 0.0
+    steps, rng = round(fine / rate_Hz), np.random.default_rng(seed)
+    frames = round(seconds * rate_Hz)
+    times = np.arange(frames * steps) / fine
+    wanted = 0.1 * np.sin(0.9 * times) + 0.05 * np.sin(2.3 * times + 1.0) - 0.05 * np.sin(1.0)
+    read = np.empty((2, frames))
+    for k, at in enumerate(wanted.tolist()):
+        force = 9000.0 * (at - way) - 1200.0 * speed
+        if k % steps == 0:
+            read[:, k // steps] = force, way
+        slip = speed - bristles * abs(speed) / max(friction_N, 1e-9) * bent
+        bent += slip / fine
+        rubbing = bristles * bent + creep * slip if friction_N else 0.0
+        speed += (force - damping * speed - rubbing) / mass / fine
+        way += speed / fine
+    read += np.array(noise)[:, None] * rng.normal(size=read.shape)
+    still = np.zeros(frames)
+    return recorded(rate_Hz, force_N=read[0], computed_m=read[1], gradient_N_per_m=still)
+
+
+def axis_rig(rate_Hz: float = 25.0, friction_N: float = 0.0) -> Rig:
+    """Return the rig of that slide."""
+    numbers = {"mass_kg": 95.0, "damping_N_s_per_m": 200.0, "friction_N": friction_N}
+    return plain_rig(rate_Hz, numbers)

@@ -1,0 +1,16 @@
+"""A slide without a spring, logged at 25 Hz, with bristles for friction: not our physics."""
+
+from __future__ import annotations
+
+import pytest
+
+from coupled.gap.diagnose import diagnose
+from tests.support.machines import axis, axis_rig
+
+
+@pytest.mark.slow
+def test_a_slide_logged_at_25_hz_has_no_gap_beside_its_own_numbers() -> None:
+    """Its friction is filed, and how its contact yields is a setting."""
+    found = diagnose(axis_rig(friction_N=20.0), {"r": axis()})
+    assert found.verdict == "no_gap"
+    assert found.effects == ()
