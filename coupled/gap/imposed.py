@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from coupled.gap.effect import Effect
 from coupled.gap.floors import with_error
 from coupled.gap.noise import Noise
-from coupled.gap.output import Floats, Predict
+from coupled.gap.output import Floats, Output, Predict
 from coupled.gap.reading import Reading
 from coupled.gap.smooth import smoothed
-from coupled.gap.thresholds import JUMP_COUNTED
+from coupled.gap.thresholds import JUMP_COUNTED, PLAY_LEAST, PLAYS
+from coupled.record.channels import ControlName, unit_of
 from coupled.rig.imposed import answer_to
 from coupled.rig.recorder import stamped
 from coupled.rig.replay import on_nodes
@@ -79,5 +80,23 @@ def under_motion(library: Sequence[Effect]) -> list[Effect]:
         if effect.stage != "linkage":
             found.append(effect)
         elif [p.key for p in effect.parameters] == [PLAY]:
-            found.append(replace(effect, outputs=("loader",)))
+            found.append(replace(effect, outputs=("loader",), seen=_plays))
     return found
+
+
+def _plays(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return the play that leaves least of the force, where a fit starts: by two scans.
+
+    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
+    """
+    ours = [output for output in outputs if output.stage == "loader"]
+    key = f"controls.{control}.{PLAY.format(d=unit_of(control))}"
+    filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
+
+    def left(play: float) -> float:
+        other = rig.changed({key: filed + play})
+        return sum(float(np.sum(output.residual(other) ** 2)) for output in ours)
+
+    best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
+    best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
+    return [{"play_{d}": best}]

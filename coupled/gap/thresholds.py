@@ -107,6 +107,8 @@ UNTRIMMED = 1e3  # chosen: floors by which an aircraft that does not trim is off
 LOST_MOTION = 20.0  # rad/s of pitch rate, from which a model flown open loop is lost; chosen
 STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations lose their digits
 
+PLAYS = 40  # chosen: plays of a scan before an imposed motion's are fitted,
+PLAY_LEAST = 1e-5  # chosen: of the travel, from which on
 JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 
 # Settings of the nominal rig (`case`).

@@ -14,3 +14,12 @@ def test_a_slide_logged_at_25_hz_has_no_gap_beside_its_own_numbers() -> None:
     found = diagnose(axis_rig(friction_N=20.0), {"r": axis()})
     assert found.verdict == "no_gap"
     assert found.effects == ()
+
+
+@pytest.mark.slow
+def test_its_friction_is_found_where_none_is_filed() -> None:
+    found = diagnose(axis_rig(), {"r": axis(seconds=40.0)})
+    assert found.verdict == "effect"
+    [effect] = found.effects
+    assert effect.name == "coulomb_friction"
+    assert effect.value == pytest.approx(20.0, rel=0.03)

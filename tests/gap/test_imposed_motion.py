@@ -48,6 +48,16 @@ def test_play_in_a_dampers_joints_is_named_and_measured(grip: bool) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("play_m", "damping"), [(0.8e-3, 900.0), (3e-3, 2000.0)])
+def test_other_plays_are_measured_as_well(play_m: float, damping: float) -> None:
+    found = diagnose(damper_rig(damping), {"r": damper(play_m=play_m, damping=damping)})
+    [number] = found.effects[0].parameters
+    assert found.effects[0].name == "backlash"
+    assert number.low is not None and number.high is not None
+    assert number.low < play_m < number.high
+
+
+@pytest.mark.slow
 def test_a_damper_without_mass_and_spring_is_as_well_a_gauge_that_is_off() -> None:
     """F = c·v: scale of the force, of the motion, and damping are one number."""
     record = damper(play_m=0.0)
