@@ -21,8 +21,8 @@ from coupled.gap.smooth import smoothed
 from coupled.gap.thresholds import JUMP_COUNTED, PLAY_LEAST, PLAYS
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.imposed import answer_to
+from coupled.rig.nodes import on_nodes
 from coupled.rig.recorder import stamped
-from coupled.rig.replay import on_nodes
 from coupled.rig.rig import Rig
 
 PLAY = "loader.play_{d}"

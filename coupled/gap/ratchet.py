@@ -19,7 +19,7 @@ from coupled.gap.output import Floats
 from coupled.gap.smooth import Smoother
 from coupled.gap.thresholds import RATCHET
 from coupled.record.channels import ControlName
-from coupled.rig.replay import on_nodes
+from coupled.rig.nodes import on_nodes
 from coupled.rig.rig import Rig
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from coupled.gap.lines import projected
 from coupled.gap.output import Floats
 from coupled.record.channels import ControlName
+from coupled.rig.nodes import on_nodes
 from coupled.rig.parameters import Sensing
 from coupled.rig.recorder import stamped
-from coupled.rig.replay import on_nodes
 from coupled.rig.rig import Rig
 
 

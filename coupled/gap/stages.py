@@ -44,10 +44,10 @@ from coupled.gap.thresholds import (
 )
 from coupled.gap.trim import trim_of
 from coupled.rig.hosted import Hosted
+from coupled.rig.nodes import on_nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
-    on_nodes,
     replay_compensation,
     replay_product,
     replay_schedule,

@@ -30,9 +30,7 @@ PIECE = 64  # chosen: frames of a piece of a residual whose spectrum is taken (`
 QUIET_FROM = 5  # chosen: the first of its frequencies that may be noise alone, 9 Hz of 120
 QUIET_SHARE = 0.3  # of the pieces, quieter; 0.5 let a sticking loader through, seed 101
 QUIET_FOLLOWS_ON = 3.0  # chosen: standard deviations by which the next frequency may stand out
-BESIDE_FROM = (
-    0.15  # of the highest frequency, from which an input's noise and signal are told apart
-)
+BESIDE_FROM = 0.15  # of the highest frequency, from which noise and signal are separated
 # Of χ², that a colour or a signal beside white noise must lessen; of 22 coloured forces and
 # pressures, seed 101, the density at low frequencies is 0.7 to 2.0 of the true, not 0.3 to 4.
 BESIDE_BY = 6.0

@@ -2,18 +2,16 @@
 
 The chain is cut at every measured signal, so that a fault upstream is inherited by
 nobody. Signals are given at the frames; between them what is continuous in the rig
-(force, δc) runs along the cubic spline through its samples.
+(force, δc) runs along the cubic spline through its samples (`nodes`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from coupled.rig.command import start_command, take_set_point
 from coupled.rig.compensation import estimate
@@ -24,6 +22,7 @@ from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import carry, deflection, move_linkage, start_bend, transducer
 from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import set_gradients
+from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
@@ -188,23 +187,6 @@ def _one(rig: Rig, control: str) -> tuple[Any, Any]:
     """Return parameters and state of one control at rest, each of shape (1,)."""
     packed = pack(rig, only=control)
     return packed["parameters"].copy(), packed["state"].copy()
-
-
-def on_nodes(rig: Rig, samples: Floats) -> Floats:
-    """Return a signal on the loader's nodes: `rig.substeps` a frame, and the last.
-
-    Not to be written to: who asks for the same again has the same array.
-    """
-    return _on_nodes(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), rig.substeps)
-
-
-@lru_cache(maxsize=8)
-def _on_nodes(samples: bytes, substeps: int) -> Floats:
-    values = np.frombuffer(samples)
-    cubic, square, slope, start = CubicSpline(np.arange(len(values)), values).c[:, :, None]
-    share = np.arange(substeps) / substeps
-    inner = ((cubic * share + square) * share + slope) * share + start
-    return np.append(inner, values[-1])
 
 
 @long_entry

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coupled.rig.imposed import answer_to
-from coupled.rig.replay import on_nodes
+from coupled.rig.nodes import on_nodes
 from tests.support.rigs import K_REPORT, bench, push
 
 RATE_Hz, FRAMES, G = 100.0, 400, 560.0

@@ -26,8 +26,9 @@ from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.equations import felt_gradient, total_to_computed
 from coupled.rig.modification import modifying_force, set_gradients
+from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
-from coupled.rig.replay import drive_loader, on_nodes, replay_product
+from coupled.rig.replay import drive_loader, replay_product
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.statics import static_line
