@@ -49,6 +49,7 @@ CLOSED = b"error: standard output: --json: is closed; give a file\n"
         ("coupled runs 2>&- >&-", 0, b""),
         ("coupled nothing 2>&-", 2, b""),
         ("coupled runs | true; exit ${PIPESTATUS[0]}", 141, b""),
+        ("coupled --help | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("coupled runs --json - | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("mkdir gone; cd gone; rmdir ../gone; coupled runs", 2, b"working folder: is gone"),
     ],

@@ -88,7 +88,7 @@ def _run() -> int:
         return code if isinstance(code, int) else 0
     except (typer.Abort, KeyboardInterrupt):
         return INTERRUPTED
-    except (ReaderGoneError, BrokenPipeError):
+    except (ReaderGoneError, BrokenPipeError, SystemExit):  # the last is the help's, in a pipe
         return PIPE_CLOSED
     except InputError as error:
         line = _lines_of(error)

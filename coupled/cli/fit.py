@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, app
+from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
+from coupled.cli.rigs import ControlOption
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
-from coupled.errors import InputError, shown
-from coupled.files import check_target, write_text
+from coupled.errors import shown
+from coupled.files import write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import control_named
 from coupled.resources import find, shipped_rigs
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 def fit(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="Records of the healthy machine, CSV or Parquet."),
+        typer.Argument(metavar="LOG...", help=f"Records of the healthy machine, {RECORDS}."),
     ],
     rig: Annotated[str, typer.Option(help="The rig file to start from, or a shipped one.")],
     free: Annotated[
@@ -38,7 +40,7 @@ def fit(
             "  [default: those that the records judge]",
         ),
     ] = None,
-    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    control: ControlOption = "column",
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="NEW.toml", help="Write the fitted rig there."),
@@ -47,23 +49,14 @@ def fit(
 ) -> None:
     """Fit a nominal rig to records of a healthy machine, and say what they do not tell."""
     from coupled.gap.nominal import fit_nominal
-    from coupled.record.record import manifest_path, read_record
     from coupled.rig.rigfile import read_rig
 
     name = control_named(control, logs[0])
     rig_file = find(rig, shipped_rigs(), "rig")
-    inputs = [*logs, *map(manifest_path, logs), rig_file]
-    if output is not None:
-        if output.suffix != ".toml":
-            raise InputError(output, "--output", "is a rig file: its name ends in .toml")
-        check_target(output, inputs)
-    check_json(json_file, [*inputs, *([output] if output else [])])
+    inputs = files_read(logs, rig_file)
+    check_json(json_file, [*inputs, *check_rig_target(output, "--output", inputs)])
     start = read_rig(rig_file)
-    records = {}
-    for file in logs:
-        if str(file) in records:
-            raise InputError(file, "", "is a duplicate: give each record once")
-        records[str(file)] = read_record(file)
+    records = read_each(logs)
     with progress() as advance:
         fitted = fit_nominal(start, records, free or (), name, advance)
     with Outputs() as outputs:

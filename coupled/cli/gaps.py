@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
+from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
+from coupled.cli.rigs import ControlOption
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
@@ -33,11 +35,11 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORD...",
-            help="Records of one rig, CSV or Parquet; or a folder whose records.toml names each's.",
+            help=f"Records of one rig, {RECORDS}; or a folder whose records.toml names each's.",
         ),
     ],
     rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")] = "",
-    control: Annotated[str, typer.Option(help="column, wheel or pedals.")] = "column",
+    control: ControlOption = "column",
     healthy: Annotated[
         list[Path] | None,
         typer.Option(
@@ -77,8 +79,6 @@ def diagnose(
 ) -> None:
     """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
     name = control_named(control, records[0])
-    from coupled.record.record import manifest_path
-
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
         _refuse_for_folders(records, asked | {"--json": json_file, "--report": report})
@@ -92,17 +92,14 @@ def diagnose(
     if not rig:
         raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
     rig_file = find(rig, shipped_rigs(), "rig")
-    read_too = [*records, *(healthy or [])]
-    inputs = [*read_too, *map(manifest_path, read_too), rig_file]
-    if improve is not None and improve.suffix != ".toml":
-        raise InputError(improve, "--improve", "is a rig file: its name ends in .toml")
+    inputs = files_read([*records, *(healthy or [])], rig_file)
     drawn = _plot_targets(plots)
-    targets = [*drawn, *([improve] if improve else [])]
-    for target in targets:
+    for target in drawn:
         check_target(target, inputs, made=plots)
+    targets = [*drawn, *check_rig_target(improve, "--improve", inputs, plots)]
     if improve in drawn:
         raise InputError(plots or "", "--plots", f"would write {improve}, as does --improve")
-    targets += check_report(report, [*inputs, *targets])
+    targets += check_report(report, [*inputs, *targets], plots)
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [])
     worse = improve is not None and not whole.improves
@@ -132,15 +129,10 @@ def _diagnose(
     files: list[Path], rig_file: Path, control: ControlName, healthy: list[Path]
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
-    from coupled.record.record import read_record
     from coupled.rig.rigfile import read_rig
 
     nominal = read_rig(rig_file)
-    read: dict[str, Record] = {}
-    for file in [*files, *healthy]:
-        if str(file) in read:
-            raise InputError(file, "", "is a duplicate: give each record once")
-        read[str(file)] = read_record(file)
+    read = read_each([*files, *healthy])
     well = {str(file): read.pop(str(file)) for file in healthy}
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance, well)

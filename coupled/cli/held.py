@@ -1,0 +1,46 @@
+"""What diagnose and fit share, which hold records against a rig: their files, and how they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coupled.errors import InputError
+from coupled.files import check_target
+
+if TYPE_CHECKING:
+    from coupled.record.record import Record
+
+RECORDS = "CSV or Parquet"  # what a record's file is, for help texts
+
+
+def files_read(records: Sequence[Path], rig_file: Path) -> list[Path]:
+    """Return the files that are read: records, their manifests, the rig's."""
+    from coupled.record.record import manifest_path
+
+    return [*records, *map(manifest_path, records), rig_file]
+
+
+def check_rig_target(
+    path: Path | None, option: str, inputs: Sequence[Path], made: Path | None = None
+) -> list[Path]:
+    """Refuse a rig file that could not be written; return it where asked for."""
+    if path is None:
+        return []
+    if path.suffix != ".toml":
+        raise InputError(path, option, "is a rig file: its name ends in .toml")
+    check_target(path, inputs, made=made)
+    return [path]
+
+
+def read_each(files: Sequence[Path]) -> dict[str, Record]:
+    """Return the records by their files' names; raise InputError for one given twice."""
+    from coupled.record.record import read_record
+
+    read: dict[str, Record] = {}
+    for file in files:
+        if str(file) in read:
+            raise InputError(file, "", "is a duplicate: give each record once")
+        read[str(file)] = read_record(file)
+    return read
