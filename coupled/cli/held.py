@@ -1,4 +1,4 @@
-"""What diagnose and fit share, which hold records against a rig: their files, and how they are read."""
+"""What diagnose and fit share, which hold records against a rig: files, and how they are read."""
 
 from __future__ import annotations
 

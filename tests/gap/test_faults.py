@@ -117,10 +117,12 @@ def test_a_record_whose_diagnosis_fails_leaves_the_others_theirs(
 ) -> None:
     todo = jobs(folder_of(tmp_path, clean, "a", "b"), tmp_path / "out")
 
-    def fails_on_the_first(rig: Rig, records: dict[str, Record], control: ControlName) -> Diagnosis:
+    def fails_on_the_first(
+        rig: Rig, records: dict[str, Record], control: ControlName, workers: int
+    ) -> Diagnosis:
         if next(iter(records)).endswith("a.csv"):
             raise ZeroDivisionError("division by zero")
-        return diagnose(rig, records, control)
+        return diagnose(rig, records, control, workers=workers)
 
     with monkeypatch.context() as patched:
         patched.setattr(batch, "diagnose", fails_on_the_first)
