@@ -9,8 +9,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -20,9 +19,10 @@ from typing import Any, Literal
 import numpy as np
 
 from coupled.campaign.entry import Columns
-from coupled.campaign.points import grid_size, points
-from coupled.campaign.sweepfile import MOST_FLIGHTS, Survive, SweepFile, Vary
-from coupled.errors import MISSING, InputError, collected, nearest, together
+from coupled.campaign.points import points
+from coupled.campaign.sweepcheck import flight_count, read_sections
+from coupled.campaign.sweepfile import SweepFile, Vary
+from coupled.errors import InputError, collected, nearest, together
 from coupled.files import sha256
 from coupled.flight.loop import make_airframe
 from coupled.flight.manifest import input_files
@@ -30,9 +30,7 @@ from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import manoeuvres_from_table
 from coupled.resources import find, shipped_runs
 from coupled.rig.rigfile import change
-from coupled.schema import Section, build, file_keys, known_keys, load_toml
-
-_NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_properties")
+from coupled.schema import load_toml
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,7 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
 
     A run that is named by a relative path is sought beside it first.
     """
-    sweep = _sections(given, file)
-    if faults := list(_faults(sweep, file)):
-        raise together(faults)
+    sweep = read_sections(given, file)
     run_file = find(sweep.run, shipped_runs(), "run", beside=file.parent)
     run_table = load_toml(run_file)
     try_changes = partial(_changed, run_table, run_file, sweep.case)
@@ -97,7 +93,7 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
         if sweep.case not in labels:
             raise InputError(file, "case", f"no {sweep.case!r}; {nearest(sweep.case, labels)}")
     base = try_changes({})
-    files = set(input_files(base))
+    files, faults = set(input_files(base)), list[InputError]()
     with collected(faults):
         files |= _check_keys(sweep, file, try_changes)
     named = [("extremes", channel) for channel in sweep.extremes]
@@ -109,36 +105,6 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
     if faults:
         raise together(faults)
     return SweepPlan(sweep, file, run_file, run_table, _identity(sweep, files), frozenset(files))
-
-
-def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
-    """Return a sweep file's tables, checked by themselves; all their faults are raised together."""
-    table, faults = dict(given), list[InputError]()
-    with collected(faults):
-        known_keys(table, file_keys(SweepFile, "m"), file, "")
-    kinds: dict[str, type[Section]] = {"vary": Vary, "survive": Survive}
-    for key, kind in kinds.items():
-        listed = table.get(key, [])
-        if not isinstance(listed, list):
-            faults.append(InputError(file, key, f"each is written [[{key}]]"))
-            del table[key]
-            continue
-        built = []
-        for i, item in enumerate(listed):
-            with collected(faults):
-                built.append(build(kind, item, file, f"{key}[{i}]"))
-        if built:
-            table[key] = built
-        elif listed:
-            del table[key]
-    known = {key: value for key, value in table.items() if key in file_keys(SweepFile, "m")}
-    sweep: SweepFile | None = None
-    with collected(faults):
-        sweep = build(SweepFile, known, file, "")
-    if faults or sweep is None:
-        there = [key for key in kinds if key in given]  # but with faults of their own
-        raise together([f for f in faults if f.problem != MISSING or f.key not in there])
-    return sweep
 
 
 def planned_flights(plan: SweepPlan) -> list[PlannedFlight]:
@@ -179,62 +145,9 @@ def _changed(
     return manoeuvres_from_table(tables, file)[0]
 
 
-def _faults(sweep: SweepFile, file: Path) -> Iterator[InputError]:
-    """Yield what of a sweep's values does not go together."""
-    keys: list[Any] = [key for vary in sweep.vary for key in (vary.key, *vary.also)]
-    lists: dict[str, list[Any]] = {"vary": keys, "keep": sweep.keep, "extremes": sweep.extremes}
-    lists["configurations"] = sweep.configurations
-    for name, words in lists.items():
-        for word in dict.fromkeys(words):
-            if words.count(word) > 1:
-                yield InputError(file, name, f"duplicate {word}")
-    for key in keys:
-        if key.partition(".")[0] in _NO_CONDITION:
-            yield InputError(file, "vary", f"{key} changes no flight")
-    ranges = [fault for i in range(len(sweep.vary)) for fault in _range_faults(sweep, i, file)]
-    yield from ranges
-    yield from _size_faults(sweep, file, countable=not ranges)
-    for i, each in enumerate(sweep.survive):
-        if each.least is None and each.most is None:
-            yield InputError(file, f"survive[{i}]", "has no bound: give least or most")
-
-
-def _size_faults(sweep: SweepFile, file: Path, countable: bool) -> Iterator[InputError]:
-    if (sweep.method != "grid") != (sweep.samples is not None):
-        problem = "is given with sobol, random and sensitivity, and not with grid"
-        yield InputError(file, "samples", problem)
-        return
-    samples = sweep.samples or 0
-    if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
-        near = 2 ** max(3, round(math.log2(samples)))
-        yield InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
-    if countable and (flights := flight_count(sweep)) > MOST_FLIGHTS:
-        yield InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
-
-
-def flight_count(sweep: SweepFile) -> int:
-    """Return how many flights a sweep has."""
-    flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
-    return flights * (len(sweep.vary) + 2) if sweep.method == "sensitivity" else flights
-
-
 def extreme_names(channels: Sequence[str]) -> list[str]:
     """Return the figures that the least and greatest values of channels are kept as."""
     return [f"{which}_{name}" for name in channels for which in ("least", "greatest")]
-
-
-def _range_faults(sweep: SweepFile, index: int, file: Path) -> Iterator[InputError]:
-    vary, place = sweep.vary[index], f"vary[{index}]"
-    ranged = vary.low is not None and vary.high is not None
-    if (vary.values is None) != ranged or (vary.low is None) != (vary.high is None):
-        yield InputError(file, place, "give values, or low and high")
-        return
-    if ranged and (sweep.method == "grid") != (vary.steps is not None):
-        yield InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
-    low, high = vary.low or 0.0, vary.high or 0.0
-    if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
-        problem = "must be above low, and low above 0 where the spread is log"
-        yield InputError(file, f"{place}.high", problem)
 
 
 def _check_keys(
