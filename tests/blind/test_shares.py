@@ -41,6 +41,6 @@ def test_a_force_read_with_a_zero_is_an_offset_where_nothing_bends() -> None:
     for names, other in ((["force_zero"], "force_offset"), (["inertia"], None)):
         plan = Plan("single", tuple(names))
         truth = draw_trial(np.random.default_rng(5), plan, deck, rigid).truth
-        assert truth.not_told_apart == ({other} if other else set())
+        assert truth.not_distinguished == ({other} if other else set())
         [shares] = truth.budget.values()
         assert 0.0 < shares[names[0]] < 1.0

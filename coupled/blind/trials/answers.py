@@ -73,7 +73,7 @@ class Answer:
         """
         if self.verdict in NAMING:
             return self.names_right
-        alike = frozenset(self.truth.alike) | self.truth.not_told_apart
+        alike = frozenset(self.truth.alike) | self.truth.not_distinguished
         return bool(alike) and self.contains and self.possible <= self._known | alike
 
     @property

@@ -59,7 +59,7 @@ def same_law(effects: Sequence[str]) -> Iterator[Reading]:
                 yield reading(rest | set(other), sure=True)
 
 
-def not_told_apart(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator[Reading]:
+def not_distinguished(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator[Reading]:
     """Yield the readings of a rig's effects that this record does not tell from them.
 
     What is left with the other effect fitted is likelier by less than a diagnosis asks for.

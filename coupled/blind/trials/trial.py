@@ -10,7 +10,7 @@ import numpy as np
 
 from coupled.blind.trials.deck import Deck
 from coupled.blind.trials.measure import alike, stage_gaps
-from coupled.blind.trials.readings import not_told_apart, same_law
+from coupled.blind.trials.readings import not_distinguished, same_law
 from coupled.blind.trials.rigs import DRAWN
 from coupled.blind.trials.shares import true_shares
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
@@ -192,7 +192,7 @@ def _read_otherwise(
         records |= {frozenset([part.put.kind.name]): part.record for part in parts}
     return replace(
         truth,
-        readings=(*same_law(names), *not_told_apart(setting.rig, record, names)),
+        readings=(*same_law(names), *not_distinguished(setting.rig, record, names)),
         budget=true_shares(setting.rig, records, truth.stages),
     )
 

@@ -101,7 +101,7 @@ class Truth:
         return frozenset(effect.name for effect in self.effects)
 
     @property
-    def not_told_apart(self) -> frozenset[str]:
+    def not_distinguished(self) -> frozenset[str]:
         """The names of the effects that this record does not tell from the truth's."""
         others = (one.names for one in self.readings if not one.sure)
         return frozenset(name for names in others for name in names) - self.names
