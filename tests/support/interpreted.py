@@ -108,9 +108,9 @@ def interpret() -> None:
     bound = compiled.bound
 
     def plain_or(compiler: Function) -> Function:
-        def chosen(function: Function) -> Function:
+        def chosen(function: Function, **options: bool) -> Function:
             of_the_rig = function.__module__.startswith("coupled.rig.")
-            return plain(function) if of_the_rig else compiler(function)
+            return plain(function) if of_the_rig else compiler(function, **options)
 
         return chosen
 
