@@ -10,7 +10,8 @@ makes mutants of your own.
 
 The tests run once without a mutant. Each run is a fork of this process, which has imported all;
 it imports the changed module, and what depends on it, anew. No file is changed, so a test that
-starts another process does not see the mutant. A mutant that ends the process is killed, too.
+starts another process does not see the mutant. A mutant that ends the process counts as killed
+and is printed, since something else may have ended it: try it again by `--change`.
 
 For a module of the rig all stages are compiled once; each fork compiles the changed one and what
 calls it, which takes two to eight seconds. `--plain` runs them as plain Python instead: nothing is
@@ -287,7 +288,7 @@ def killer(name: str, source: bytes, stale: set[str], tests: list[str], limit_s:
             return f"no end within {limit_s:.0f} s"
         if said := os.read(reading, 4096):
             return "" if said == PASSED.encode() else said.decode()
-        return "the process ended before its tests did"
+        return "process ended before its tests did"
     finally:
         os.close(reading)
         os.waitpid(child, 0)
@@ -342,7 +343,7 @@ def main() -> None:
     for mutant in chosen:
         test = killer(name, mutant.applied(source), stale, tests, limit_s)
         survived += not test
-        if given.verbose or not test or test.startswith("no end"):
+        if given.verbose or not test or test.startswith(("no end", "process")):
             place = f"{given.module}:{mutant.line}: {mutant.old} → {mutant.new}"
             print(f"{test or 'SURVIVED'}: {place}", flush=True)
     taken = time.perf_counter() - start_s

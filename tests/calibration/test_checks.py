@@ -14,6 +14,7 @@ from coupled.calibration.checks import (
     swing_of,
 )
 from coupled.calibration.documentation import check_feel
+from coupled.calibration.specification import specified_legs
 from coupled.calibration.sweeps import Release, release
 from coupled.flight.manoeuvre import configure
 from coupled.rig.equations import bend_loss
@@ -238,3 +239,17 @@ def test_the_gradients_compensation_quickens_a_release() -> None:
         for name in ("compensated", "rigid")
     ]
     assert periods[0] / periods[1] == pytest.approx(math.sqrt(1.0 - K_REPORT * G_STIFF), rel=0.01)
+
+
+def test_a_specified_leg_is_the_schedules_line_with_friction_against_the_motion() -> None:
+    """F = G_T·δ and the friction with the motion, from neutral to the stop and back, both sides."""
+    friction = 3.0
+    rig = bench({"friction_N": friction})
+    travel = rig.controls["column"].travel
+    signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)]  # of δ and of the motion
+    for leg, (side, motion) in zip(specified_legs(rig, "column", 3000.0), signs, strict=True):
+        share = np.linspace(0.0, 1.0, 401)
+        assert leg.deflection == pytest.approx(side * share * travel, abs=1e-9)
+        assert leg.force == pytest.approx(G_STIFF * leg.deflection + motion * friction, abs=1e-5)
+        assert leg.surface == pytest.approx(side * share, abs=1e-8)
+        assert not leg.read

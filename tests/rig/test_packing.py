@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields, replace
 from typing import Any, get_type_hints
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.rig import control as controls
-from coupled.rig.declaration import Hand
+from coupled.rig.declaration import Hand, first_order_gain
 from coupled.rig.growth import _growing
 from coupled.rig.packing import pack
 from coupled.rig.parameters import Control
@@ -134,3 +135,15 @@ def test_pack_takes_one_control_alone() -> None:
     assert len(pack(RIG, only="column")) == 1
     with pytest.raises(KeyError):
         pack(RIG, only="wheel")
+
+
+def test_a_hand_that_is_given_nothing_only_pushes() -> None:
+    """All its numbers are 0: no impedance, no lag, no limit and no reach."""
+    assert {name: value for name, value in vars(Hand()).items() if value != 0.0} == {}
+
+
+def test_a_first_order_lag_takes_its_share_of_a_step() -> None:
+    """1 − exp(−h/τ) of a step within h; all of it where nothing lags."""
+    assert first_order_gain(0.2, 0.1) == pytest.approx(1.0 - math.exp(-0.5), rel=1e-12)
+    assert first_order_gain(0.05, 0.2) == pytest.approx(1.0 - math.exp(-4.0), rel=1e-12)
+    assert first_order_gain(0.0, 0.1) == 1.0
