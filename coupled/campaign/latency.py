@@ -34,7 +34,8 @@ REFERENCE_Hz = 2000.0
 FRAMES_LATE = 1.5  # of a host and JSBSim; the reference's own are taken into account
 BEGUN = 0.05  # of the greatest rate
 WITHIN_s = 1.0  # of the beginning: where the greatest rate is looked for
-_ROUNDS = 6
+_ROUNDS = 100  # at most; an answer of two parts takes some ten
+_SETTLED_s = 1e-6
 
 # What takes time between hand and surface, and what it is where nothing does.
 AT_ONCE: dict[str, Any] = {
@@ -90,7 +91,9 @@ def latency_s(control: ControlName, flight: Flight, reference: Flight) -> float:
     own = _answer(reference.record, control, begun_s)
     late = 0.0
     for _ in range(_ROUNDS):  # the second in which the greatest rate is looked for comes late, too
-        late = _answer(flight.record, control, begun_s + late) - own
+        before, late = late, _answer(flight.record, control, begun_s + late) - own
+        if abs(late - before) <= _SETTLED_s:
+            break
     return late + FRAMES_LATE / REFERENCE_Hz
 
 

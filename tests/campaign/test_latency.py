@@ -81,13 +81,14 @@ def test_a_smaller_answer_is_not_a_later_one() -> None:
     assert bent == pytest.approx(rigid, abs=5e-4)
 
 
-@pytest.mark.parametrize(("axis", "read_s"), [("pitch", 0.177), ("yaw", 0.149)])
+@pytest.mark.parametrize(("axis", "read_s"), [("pitch", 0.177), ("yaw", 0.158)])
 def test_what_the_structure_bends_is_not_late_with_the_loader(axis: str, read_s: float) -> None:
     """A late loader's answer is that of K·F at once and that of δc late, one upon the other.
 
     The grip is further by K·F as soon as it is pushed, and the host's K̂·F says so. A loader
     too heavy to move gives the answer to K·F alone. Two parts have no one delay: the 5 % are
-    met later than by the delay, or sooner, as the first part has it.
+    met later than by the delay, or sooner, as the first part has it. In yaw six rounds of looking
+    for the answer's own second are not enough: they read 149 ms, which would pass.
     """
     delay_s, control = 0.15, AXES[axis]
     run = next(each for each in read_run("latency") if each.label == axis)
