@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -71,6 +72,11 @@ def named(key: str, default: Any = ..., **bounds: Any) -> Any:
 
 def file_keys(section: type[Section], d: str) -> dict[str, str]:
     """Return {key in a file: field} of a section, for deflections in unit `d`."""
+    return dict(_file_keys(section, d))
+
+
+@cache
+def _file_keys(section: type[Section], d: str) -> dict[str, str]:
     keys = {}
     for name, info in section.model_fields.items():
         extra = info.json_schema_extra

@@ -7,6 +7,7 @@ which changes nothing in a linear rig, and the scale is added to the growth.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,7 @@ def _size(s: ControlState, rate: float) -> float:
     return math.sqrt(moved + rate * rate * away)
 
 
+@cache
 def _growing() -> NDArray[np.bool_]:
     """Return which of a control's numbers, eight bytes each, grow with its motion."""
     marks = np.zeros(1, CONTROL)

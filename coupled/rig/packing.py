@@ -51,7 +51,7 @@ def pack(
             *(joined, bends, assumed, leaks(name, control.loader.crosstalk, list(found))),
         )
         for stage, declared in STAGES.items():
-            for parameter in declared.parameters.names or ():
-                p[stage][parameter] = declared.value(parameter, given)
+            names = declared.parameters.names or ()
+            p[stage] = tuple(declared.value(name, given) for name in names)
     packed["state"]["services"]["on"] = packed["parameters"]["services"]["present"]
     return packed

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -114,6 +114,10 @@ def linear_rig(
     The rig may be one that cannot be built: a gradient stiffer than the structure is what some
     questions are about. Each value is checked against its own bounds only.
     """
+    return _asked(_linear(rig, name, gradient), name, question)
+
+
+def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
     d, control = unit_of(name), rig.controls[name]
     linear: dict[str, Any] = {
         f"travel_{d}": _FAR,
@@ -130,30 +134,39 @@ def linear_rig(
         "loader.multiplier_offset_N": 0.0,
         "loader.multiplier_drift_N_per_s": 0.0,
         **_inertia_there(control, gradient, d),
-        "loader.multiplier": question.multiplier,
-        "loader.servo_frequency_Hz": question.servo_frequency_Hz,
         "schedule.dynamic_pressure_Pa": [0.0, 1.0],
         f"schedule.total_gradient_N_per_{d}": [gradient, gradient],
         f"schedule.break_deflection_{d}": 0.0,
         "schedule.slope": 1.0,
         "compensation.breakout_N": 0.0,
+        "sensing.word_length_bits": 0,
+        f"schedule.second_gradient_N_per_{d}": None,
+        "compensation.mass_factor": None,
+        "compensation.damping_factor": None,
+        f"loader.bend_push_{d}_per_N": None,
+    }
+    alone = {name: changed(control, linear, rig.name, f"controls.{name}", d)}
+    whole = {"controls": alone, "flight": None, "noise": {}, "structure": Structure()}
+    return changed(rig, whole, rig.name)
+
+
+def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
+    """Return a linear rig with what a question puts in place of its own."""
+    d = unit_of(name)
+    own = {
+        "loader.multiplier": question.multiplier,
+        "loader.servo_frequency_Hz": question.servo_frequency_Hz,
         f"compensation.bend_{d}_per_N": question.host_bend,
         "compensation.gradient": question.host_gradient,
-        "sensing.word_length_bits": 0,
         "sensing.gauge_frequency_Hz": question.gauge_frequency_Hz,
         "sensing.gauge_mass_kg": question.gauge_mass,
     }
-    given = {key: value for key, value in linear.items() if value is not None}
-    given[f"schedule.second_gradient_N_per_{d}"] = None
-    for key in ("mass_factor", "damping_factor"):
-        given[f"compensation.{key}"] = None
-    given[f"loader.bend_push_{d}_per_N"] = None
-    alone = {name: changed(control, given, rig.name, f"controls.{name}", d)}
-    whole: dict[str, Any] = {"controls": alone, "flight": None, "noise": {}}
-    whole["structure"] = Structure()
+    given = {key: value for key, value in own.items() if value is not None}
+    control = changed(linear.controls[name], given, linear.name, f"controls.{name}", d)
+    whole: dict[str, Any] = {"controls": {name: control}}
     if question.frame_s is not None:
         whole["frame_rate_Hz"] = 1.0 / question.frame_s
-    return changed(rig, whole, rig.name)
+    return changed(linear, whole, linear.name)
 
 
 def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
@@ -175,26 +188,46 @@ def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
     }
 
 
-def posed(
-    rig: Rig, name: ControlName, kind: Kind, gradient: float, value: float
-) -> tuple[Rig, Hand]:
-    """Return the linear rig and hand of a plane's question at one gradient and value."""
-    bend, hand = rig.controls[name].loader.bend, Hand()
-    if kind == "assumed":
-        question = Question(host_bend=value * bend, host_gradient=True)
-    elif kind == "frame":
-        question = Question("digital", frame_s=value)
-    elif kind == "servo":
-        question, hand = Question("hybrid", servo_frequency_Hz=value), Hand(HELD_FAST / bend)
-    elif kind == "gauge":
-        question, hand = Question("hybrid", gauge_frequency_Hz=value), Hand(FIRM / bend)
-    elif kind == "mass":
-        loader, own_Hz = rig.controls[name].loader, rig.controls[name].sensing.gauge_frequency
-        mass = value * loader.mass
-        question = Question("hybrid", gauge_frequency_Hz=own_Hz or GAUGE_Hz, gauge_mass=mass)
-    else:
-        question, hand = Question("hybrid"), Hand(value / bend)
-    return linear_rig(rig, name, gradient, question), hand
+@dataclass(frozen=True)
+class Along:
+    """What a plane asks at one gradient, in N/d. The linear rig there is made once."""
+
+    rig: Rig
+    name: ControlName
+    kind: Kind
+    gradient: float
+
+    @cached_property
+    def linear(self) -> Rig:
+        """The linear rig, before it is asked anything."""
+        return _linear(self.rig, self.name, self.gradient)
+
+    def posed(self, value: float) -> tuple[Rig, Hand]:
+        """Return the linear rig and hand at a value of the second quantity."""
+        control, hand = self.rig.controls[self.name], Hand()
+        bend, loader = control.loader.bend, control.loader
+        if self.kind == "assumed":
+            question = Question(host_bend=value * bend, host_gradient=True)
+        elif self.kind == "frame":
+            question = Question("digital", frame_s=value)
+        elif self.kind == "servo":
+            question, hand = Question("hybrid", servo_frequency_Hz=value), Hand(HELD_FAST / bend)
+        elif self.kind == "gauge":
+            question, hand = Question("hybrid", gauge_frequency_Hz=value), Hand(FIRM / bend)
+        elif self.kind == "mass":
+            own_Hz, mass = control.sensing.gauge_frequency, value * loader.mass
+            question = Question("hybrid", gauge_frequency_Hz=own_Hz or GAUGE_Hz, gauge_mass=mass)
+        else:
+            question, hand = Question("hybrid"), Hand(value / bend)
+        return _asked(self.linear, self.name, question), hand
+
+    def simulated(self, value: float) -> float:
+        """Return the growth found in simulation, 1/s."""
+        return simulated_growth(*self.posed(value), _SIMULATED_s)
+
+    def theory(self, value: float) -> float:
+        """Return the growth by linear theory, 1/s."""
+        return linear_growth(*self.posed(value))
 
 
 def axis(kind: Kind, points: int) -> Floats:
@@ -214,40 +247,40 @@ def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
     for i, share in enumerate(shares.tolist()):
         simulated[i] = simulated_along(rig, name, kind, share / bend, values)
         found += crossings(rig, name, kind, share / bend, values, simulated[i])
-    theory, fine = (
-        np.array([[_theory(rig, name, kind, x / bend, y) for y in ys] for x in xs])
-        for xs, ys in (
-            (shares.tolist(), values.tolist()),
-            (fine_shares.tolist(), fine_values.tolist()),
-        )
-    )
+    theory = _by_theory(rig, name, kind, shares / bend, values)
+    fine = _by_theory(rig, name, kind, fine_shares / bend, fine_values)
     return Plane(
         name, kind, shares, values, simulated, theory, fine_shares, fine_values, fine, tuple(found)
     )
+
+
+def _by_theory(rig: Rig, name: ControlName, kind: Kind, gradients: Floats, ys: Floats) -> Floats:
+    along = [Along(rig, name, kind, gradient) for gradient in gradients.tolist()]
+    return np.array([[at.theory(y) for y in ys.tolist()] for at in along])
 
 
 def simulated_along(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, values: Floats
 ) -> Floats:
     """Return the simulated growth at each value of a plane's second quantity, 1/s."""
-    return np.array([_simulated(rig, name, kind, gradient, v) for v in values.tolist()])
+    at = Along(rig, name, kind, gradient)
+    return np.array([at.simulated(value) for value in values.tolist()])
 
 
 def crossings(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, values: Floats, simulated: Floats
 ) -> list[Crossing]:
     """Return where the growth changes its sign along `values`, given it there as simulated."""
-    found = []
+    found, along = [], Along(rig, name, kind, gradient)
     share = gradient * rig.controls[name].loader.bend
     last = len(values) - 1
     for j in np.flatnonzero((simulated[:-1] > 0.0) != (simulated[1:] > 0.0)).tolist():
-        asked = rig, name, kind, gradient
-        at = _bisected(partial(_simulated, *asked), values[j], values[j + 1])
+        at = _bisected(along.simulated, values[j], values[j + 1])
         assert at is not None
         theory = None
         for before, beyond in ((0, 1), (1, 1), (0, 2), (1, 2)):  # in the same cell, or beside it
             near = values[max(0, j - before)], values[min(last, j + beyond)]
-            theory = theory or _bisected(partial(_theory, *asked), *near)
+            theory = theory or _bisected(along.theory, *near)
         found.append(Crossing(share, at, theory))
     return found
 
@@ -262,11 +295,3 @@ def _bisected(growth: Callable[[float], float], low: float, high: float) -> floa
         middle = math.sqrt(low * high)
         low, high = (low, middle) if (growth(middle) > 0.0) == rising else (middle, high)
     return math.sqrt(low * high)
-
-
-def _simulated(rig: Rig, name: ControlName, kind: Kind, gradient: float, value: float) -> float:
-    return simulated_growth(*posed(rig, name, kind, gradient, value), _SIMULATED_s)
-
-
-def _theory(rig: Rig, name: ControlName, kind: Kind, gradient: float, value: float) -> float:
-    return linear_growth(*posed(rig, name, kind, gradient, value))

@@ -15,8 +15,8 @@ from coupled.authority.stability.linear import (
     growth,
 )
 from coupled.authority.stability.planes import (
+    Along,
     plane,
-    posed,
 )
 from coupled.cli import app
 from coupled.errors import InputError
@@ -39,7 +39,8 @@ def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
     assert found.crossings
     for crossing in found.crossings:
         assert crossing.difference < 0.01
-        rig, hand = posed(bench(), "column", "frame", crossing.share / K_REPORT, crossing.simulated)
+        along = Along(bench(), "column", "frame", crossing.share / K_REPORT)
+        rig, hand = along.posed(crossing.simulated)
         assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
 
 
