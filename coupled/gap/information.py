@@ -33,11 +33,12 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
 def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     """Tell whether an effect's interval holds the size at which it does nothing.
 
-    By its first number, the level; the others shape it. Of a limit, none is no size.
+    By its first number, the level; the others shape it. Of a limit, none is no size. A number that
+    counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed.
     """
-    if not effect.free or effect.free[0].inverse:
+    level = next((p for p in effect.free if not p.above), None)
+    if level is None or level.inverse:
         return False
-    level = effect.free[0]
     key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
     if key not in fitted.low:
         return False

@@ -11,8 +11,9 @@ from scipy.stats import t as student
 from coupled.gap import choose
 from coupled.gap.case import Case
 from coupled.gap.choose import searched
-from coupled.gap.fit import _half_width, fit
+from coupled.gap.fit import Fit, _half_width, fit
 from coupled.gap.gain import Candidate
+from coupled.gap.information import says_nothing
 from coupled.gap.library import BY_NAME
 from coupled.gap.output import Output
 from coupled.rig.rig import Rig
@@ -60,3 +61,17 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     assert half[0] == pytest.approx(wanted, rel=0.15)
     alone = _half_width(SimpleNamespace(jac=same[:, :1], fun=left), 1, groups, np.zeros(1))
     assert alone[0] < half[0]
+
+
+@pytest.mark.parametrize(("share", "silent"), [((0.66, 0.81), False), ((-0.1, 0.4), True)])
+def test_a_loop_may_leave_the_bend_as_it_is_filed(share: tuple[float, float], silent: bool) -> None:
+    """The interval of a hysteresis' bend holds what is filed: its share says that it is there."""
+    rig = bench({"bend_m_per_N": 2.6e-5})
+    loop = BY_NAME["bend_hysteresis"]
+    bend, part, width = (loop.value_key(p) for p in loop.free)
+    low = {bend: 2.55e-5, part: share[0], width: 9.0}
+    high = {bend: 2.65e-5, part: share[1], width: 12.0}
+    found = Fit(
+        (loop,), {key: 0.5 * (low[key] + high[key]) for key in low}, low, high, (), rig, 1.0
+    )
+    assert says_nothing(Case(rig, "column", []), loop, found) is silent
