@@ -54,7 +54,7 @@ def other(value: Any) -> Any:
         return not value
     if isinstance(value, str):
         others = ("hybrid", "digital", "exact", "printed", "elevator", "aileron", "", "today")
-        more = ("first", "second")
+        more = ("first", "second", "force", "setpoint")
         return more[more.index(value) ^ 1] if value in more else others[others.index(value) ^ 1]
     if isinstance(value, list):
         return [*value[:-1], 1.01 * value[-1] + 1.0]
