@@ -14,6 +14,7 @@ A wrong scale S₁ cannot be driven alone: it shows in all three of loader, mult
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -37,6 +38,7 @@ from coupled.gap.thresholds import (
     HALF_FELT,
     NOISE_TRIES,
     PRELOAD_UNSURE,
+    REPLAY_KNOWN,
     ROUNDING_SPAN,
     SURFACE_KNOWN,
     RESTART_s,
@@ -98,7 +100,7 @@ class Reader(Reading):
         own = left_noise(own, measured, measured - base)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
-        floor = float(np.hypot(own.rms, carried))
+        floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made

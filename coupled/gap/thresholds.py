@@ -82,6 +82,9 @@ HELD_STEPS = 3.0  # chosen: least steps that the usual change has; of a slow sen
 # Inputs of the stages (`stages`, `airframe`, `surfaces`).
 ECHO_SHARE = 0.1  # of G_T's noise that echoes q̄'s, from which the host made it of q̄ as recorded
 PRELOAD_UNSURE = 8.0  # chosen: of a channel's noise about neutral, where the preload's side is open
+# Of an output's span, to which a replay along splines gives it, and no transducer reads closer: a
+# record without noise stands at 1e-6.
+REPLAY_KNOWN = 1e-5
 SURFACE_KNOWN = 1e-4  # chosen: of its span, to which the model's map of commands gives a position
 FLIGHT_KNOWN = 1e-4  # chosen: of its span, to which measured surfaces replay the motion
 SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axis has no spring

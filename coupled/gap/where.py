@@ -258,6 +258,8 @@ def _follows(
 ) -> tuple[Follows, ...]:
     """Return what the residual follows, the largest share first; `constant` is its mean."""
     power = float(np.mean(left**2))
+    if power == 0.0:
+        return ()
     mean = float(np.mean(left))
     found = [Follows("constant", mean**2 / power, mean * output.floor)]
     spread = left - mean
