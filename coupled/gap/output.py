@@ -17,6 +17,7 @@ from coupled.gap.thresholds import (
     FLOOR_SHARE,
     GUILTY_FROM,
     MISMATCH,
+    NOISE_ALONE,
     NOISE_SIGMAS,
     ROUNDED,
     SMOOTHING_LOST,
@@ -50,13 +51,22 @@ class Hides:
         return self.share > FLOOR_SHARE
 
     @property
+    def still(self) -> bool:
+        """Whether the channel shows little but its own noise: breakout and friction held it."""
+        return self.noisiest == self.channel and self.share > NOISE_ALONE
+
+    @property
     def words(self) -> str:
         """What hides how much."""
+        if self.still:
+            return f"{self.channel} shows little but noise"
         return f"noise of {self.noisiest} is {100 * self.share:.0f} % of what {self.channel} does"
 
     @property
     def wanted(self) -> str:
         """What to record instead."""
+        if self.still:
+            return f"a push that moves {self.channel}, or {self.noisiest} with less noise"
         times = math.ceil(self.share / FLOOR_SHARE)
         return f"a motion {times} times as large, or {self.noisiest} with less noise"
 

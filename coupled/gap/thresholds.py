@@ -67,6 +67,7 @@ GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at 
 NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
 # Of what a channel does, rms over rms: the floors of 77 records of the rig's own stand under 0.02.
 FLOOR_SHARE = 0.1  # chosen: from which a stage within its floor is not judged
+NOISE_ALONE = 0.9  # chosen: of the same, from which a channel shows little but its own noise
 SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps stands at 1.15
 
 # Records of the healthy machine (`healthy`).

@@ -32,8 +32,8 @@ def noisy(rig: Rig) -> Rig:
     return rig.changed({"noise": levels})
 
 
-def pushes(rig: Rig) -> dict[ControlName, NDArray[np.float64]]:
-    """Return bell-shaped pushes of each control in turn, N."""
+def pushes(rig: Rig, **size_N: float) -> dict[ControlName, NDArray[np.float64]]:
+    """Return bell-shaped pushes of each control in turn, N; `size_N` gives those of some."""
     t = np.arange(round(LONG_s * rig.frame_rate)) / rig.frame_rate
     made = {}
     for i, control in enumerate(rig.controls):
@@ -41,7 +41,7 @@ def pushes(rig: Rig) -> dict[ControlName, NDArray[np.float64]]:
         sizes = rng.uniform(0.3, 1.0, 8) * np.where(np.arange(8) % 2, 1.0, -1.0)
         at = 2.0 + 0.7 * i + 3.2 * np.arange(8)
         bells = np.exp(-(((t[:, None] - at) / 0.35) ** 2))
-        made[control] = PUSH_N[control] * bells @ sizes
+        made[control] = size_N.get(control, PUSH_N[control]) * bells @ sizes
     return made
 
 
@@ -93,8 +93,22 @@ def test_a_damped_rudder_is_not_judged_by_its_command() -> None:
     jet = noisy(read_rig(aircraft_folder() / "737" / "737.toml"))
     assert surface_points(jet, "pedals") is None  # the yaw damper moves it
     assert surface_points(jet, "wheel") is not None
-    found = diagnose(jet, {"r": fly_force(jet, pushes(jet), seed=3)}, "pedals")
+    pushed = fly_force(jet, pushes(jet, pedals=160.0), seed=3)
+    found = diagnose(jet, {"r": pushed}, "pedals")
     assert found.verdict == "no_gap"
+    assert found.stage("loader").judged
     assert not found.stage("surface").judged
     airframe = found.stage("airframe").gap
     assert airframe is not None and airframe < 1.1
+
+
+def test_pedals_held_by_their_breakout_show_nothing_of_their_loader() -> None:
+    """80 N does not overcome 67 N of breakout with 15 N of friction: δc is noise alone."""
+    jet = noisy(read_rig(aircraft_folder() / "737" / "737.toml"))
+    found = diagnose(jet, {"r": fly_force(jet, pushes(jet, pedals=80.0), seed=3)}, "pedals")
+    assert found.verdict == "ambiguous"
+    loader = found.stage("loader")
+    assert not loader.judged
+    assert loader.why == "pedals_computed_m shows little but noise"
+    assert "a push that moves pedals_computed_m" in found.next_test
+    assert found.stage("airframe").judged
