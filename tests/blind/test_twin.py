@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from coupled.blind.trials.measure import stage_gaps
 from coupled.blind.trials.rigs import random_rig
@@ -32,7 +33,7 @@ from coupled.gap.library import BY_NAME
 from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from tests.support.twin import POOL, STEP_N, alone, plain, stepped
+from tests.support.twin import POOL, STEP_N, alone, nodes, plain, stepped
 
 ALL_EFFECTS = (*EFFECTS, *REVISION_2)
 
@@ -93,6 +94,20 @@ def test_a_late_force_is_late() -> None:
     twin.set(delay=6 / 120)
     late = alone(rig, twin, stepped(2.0))["column_computed_m"]
     np.testing.assert_allclose(late[6:], prompt[:-6], atol=1e-9)
+
+
+@pytest.mark.parametrize("late_s", [6 / 120, 6.5 / 120])
+def test_a_servo_with_a_dead_time_moves_as_it_would_but_later(late_s: float) -> None:
+    """δ is that of a prompt servo the dead time ago; δc, ahead of the servo, is the same."""
+    rig, twin = plain()
+    rise = np.minimum(nodes(2.0) / 1.5, 1.0) ** 3 * STEP_N
+    prompt = alone(rig, twin, rise)
+    twin.set(servo_delay=late_s)
+    late = alone(rig, twin, rise)
+    np.testing.assert_array_equal(late["column_computed_m"], prompt["column_computed_m"])
+    ago = CubicSpline(prompt.time_s, prompt["column_deflection_m"])(prompt.time_s - late_s)
+    expected = np.where(prompt.time_s > late_s, ago, 0.0)
+    np.testing.assert_allclose(late["column_deflection_m"], expected, atol=2e-8)
 
 
 def test_the_gust_has_its_strength_and_its_length() -> None:

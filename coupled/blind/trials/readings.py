@@ -40,13 +40,15 @@ NEAR = (
     ("mass", "lift_slope"),
 )
 # Laws that are the plainer one beside them where a record shows nothing of what they add: a mode
-# far above what the pilot excites is a bend. The plainer one is then named, and rightly.
+# far above what the pilot excites is a bend, and a short dead time is a slower servo. The plainer
+# one is then named, and rightly.
 PLAINER = (
     ("structural_mode", "bend"),
     ("stiffening_bend", "bend"),
     ("bend_hysteresis", "bend"),
     ("soft_backlash", "backlash"),
     ("stribeck_friction", PLAIN),
+    ("servo_delay", "servo_lag"),
 )
 
 

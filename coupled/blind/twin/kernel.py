@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.blind.twin.mechanism import (
+    heard,
     mean_sign,
     product,
     step_loader,
@@ -162,12 +163,12 @@ def twin_frame(
     constant = p.offset - p.bob_weight * (load_factor - 1.0)
     for step in range(STEPS):
         at = k * NODES + (step + 0.5) * NODES / STEPS
-        before = s.x
         pull = _force(nodes, at - late) + constant
         if p.crosstalk != 0.0:
             pull += p.crosstalk * _force(others, at - late)
         step_loader(p, s, pull, time + (step + 0.5) * h, h)
-        step_servo(p, s, before, s.x, h)
+        before, s.heard = s.heard, heard(p, s, h)
+        step_servo(p, s, before, s.heard, h)
         half = 0.5 * NODES / STEPS
         step_structure(p, s, _force(nodes, at - half), _force(nodes, at + half), h)
         step_loop(p, s, _force(nodes, at + half))

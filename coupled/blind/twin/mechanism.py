@@ -6,7 +6,8 @@ friction  LuGre (Canudas de Wit, Olsson, Åström and Lischinsky, IEEE TAC 40, 1
 whose ODE is solved exactly over a step, and damping that fades with speed; or
 elastoplastic (Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002): bristles
 that bend a share of their length before any of it slips, exactly too
-servo     fourth-order Runge–Kutta, and so the structure's mode
+servo     fourth-order Runge–Kutta, and so the structure's mode; its dead time is a look into the
+          δc of steps past, straight between two
 preload   a steep spring about neutral
 relaxing  a spring in series with a damper, exact over a step
 """
@@ -17,7 +18,7 @@ import math
 
 import numpy as np
 
-from coupled.blind.twin.numbers import TwinParameters, TwinState
+from coupled.blind.twin.numbers import KEPT, TwinParameters, TwinState
 from coupled.rig.compiled import stage
 
 ROUNDS = 6  # of the implicit step's fixed point, which shrinks the error tenfold or more each
@@ -163,6 +164,23 @@ def step_loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: fl
     s.x, s.v = min(max(x1, -p.travel), p.travel), v1
     if s.x != x1:
         s.v = 0.0
+
+
+@stage
+def heard(p: TwinParameters, s: TwinState, h: float) -> float:
+    """Keep δc after a step of h seconds; return that of the servo's dead time ago, m.
+
+    Before the start δc stood at neutral.
+    """
+    if p.servo_delay <= 0.0:
+        return s.x
+    s.kept[s.stepped % KEPT] = s.x
+    back = s.stepped - p.servo_delay / h
+    earlier = math.floor(back)
+    share = back - earlier
+    s.stepped += 1
+    before, after = s.kept[earlier % KEPT], s.kept[(earlier + 1) % KEPT]
+    return float(before + share * (after - before))
 
 
 @stage

@@ -11,6 +11,7 @@ from coupled.rig.compiled import layout
 
 Floats = NDArray[np.float64]
 KNOTS = 32  # of the schedule's table
+KEPT = 8192  # of the latest δc, one a step: half a second at 120 Hz
 
 
 class TwinParameters(Protocol):
@@ -83,6 +84,7 @@ class TwinParameters(Protocol):
     servo_rate: float  # ω, rad/s
     servo_ratio: float
     servo_limit: float
+    servo_delay: float  # dead time, s
     play: float
     bend: float
     bend_limit: float
@@ -133,6 +135,9 @@ class TwinState(Protocol):
     second_v: float
     servo: float
     servo_v: float
+    heard: float  # δc as the servo has it, m
+    stepped: int  # steps since the start
+    kept: Floats  # the latest δc, m
     grip: float
     loop: float
     last_force: float
@@ -153,4 +158,4 @@ class TwinState(Protocol):
 TWIN_PARAMETERS = layout(
     TwinParameters, **dict.fromkeys(("pressures", "first", "second"), (KNOTS,))
 )
-TWIN_STATE = layout(TwinState)
+TWIN_STATE = layout(TwinState, kept=(KEPT,))

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 
 from coupled.blind.twin.effects import in_air
+from coupled.blind.twin.kernel import STEPS
 from coupled.blind.twin.kinds import Clean, Draw, Kind
+from coupled.blind.twin.numbers import KEPT
 from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
 Found = dict[str, float]
@@ -65,6 +67,13 @@ def _force_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 def _crosstalk(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     twin.set(crosstalk=draw.side * size)
     return {"factor": draw.side * size}
+
+
+def _servo_delay(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Let δc reach the servo late; the servo itself is as filed, so its frequency's factor is 1."""
+    assert size < (KEPT - 2) / STEPS * twin.get("frame_s")
+    twin.set(servo_delay=size)
+    return {"delay_s": size, "factor": 1.0}
 
 
 def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -145,6 +154,7 @@ REVISION_2 = (
     Kind("force_limit", "loader", 0.05, 2.5, _force_limit),
     Kind("crosstalk", "loader", 5e-4, 0.5, _crosstalk, other=True),
     Kind("structural_mode", "linkage", 0.03, 0.7, _mode),
+    Kind("servo_delay", "linkage", 0.001, 0.3, _servo_delay),
     Kind("bend_hysteresis", "linkage", 0.01, 0.8, _bend_hysteresis),
     Kind("soft_backlash", "linkage", 2e-5, 4e-3, _soft_backlash),
     Kind("force_scale", "sensing", 0.0005, 0.15, _force_scale),
