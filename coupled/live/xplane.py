@@ -1,8 +1,9 @@
 """A view in X-Plane 11 or later: its UDP message VEHX, 45 bytes, little-endian.
 
-The layout is Laminar Research's own, "Exchanging Data with X-Plane", in the folder Instructions of
-every X-Plane: which aircraft, latitude, longitude and elevation, true heading, pitch and roll. With
-the first of them X-Plane stops its own flight model of that aircraft.
+The layout is as XPPython3's documentation describes it ("VEHX - Drive X-Planes Visuals"), and as
+libXPlane-UDP-Client's issue 3 packs it: which aircraft, latitude, longitude and elevation, true
+heading, pitch and roll. By the former X-Plane then no longer flies that aircraft itself. Laminar
+Research's own text was not read, and this was not tried with X-Plane.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""X-Plane's VEHX message against its published layout, field by field."""
+"""X-Plane's VEHX message against the layout that others' documentation gives, field by field."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from coupled.live.view import Picture
 from coupled.live.xplane import pack, xplane
 from tests.support.commands import coupled
 
-# The message's fields: where each begins, its type, and what it is.
+# Where each field begins, and its type; names as in XPPython3's documentation.
 LAYOUT = {
     "p": (5, "<i"),
     "dat_lat": (9, "<d"),

@@ -128,8 +128,10 @@ def test_a_stop_is_recorded_while_it_is_pressed_and_not_where_friction_holds(sid
         "time_s": [0.0, 0.5, 3.0, 3.1, 6.0],
         "force_N": [0.0, side * 150.0, side * 150.0, side * eased, side * eased],
     }
-    changes = {"friction_N": friction, "bend_m_per_N": 0.0}
+    # Without the gradient's correction: it would pull the control off its stop as the hand eases.
+    changes = {"friction_N": friction, "controls.column.compensation.gradient": False}
     record = run(hand, changes, q=0.0)
+    assert not record["column_modifying_force_N"].any()
     stop, leaning = record["column_stop"], slice(200, 300)
     assert np.all(record["column_computed_m"][200:] == side * 0.1778)
     assert np.all(stop[leaning] == side)
