@@ -59,8 +59,8 @@ UNSEEN = {
     "pressure_lag": "q̄ is held",
     "transport_delay": "a release is timed from its own 90 %; in flight `Part 60 4.a latency`,"
     " `coupled diagnose`",
-    "servo_delay": "a release is timed from its own 90 %; in flight `Part 60 4.a latency`,"
-    " `coupled diagnose`",
+    "servo_delay": "a release is timed from its own 90 %, and δc goes to the host ahead of the"
+    " servo; `coupled diagnose`",
     "digital_multiplier": "steps of force; `coupled compare` shows them",
     "bob_weight": "nz is 1",
     "arc_geometry": "0.7 % at this column's 11°, within its tolerance",

@@ -157,6 +157,13 @@ def test_latency_is_not_measured_in_moving_air() -> None:
         latency(run)
 
 
+SECTIONS: dict[str, type[Section]] = {
+    "loader": parameters.Loader,
+    "schedule": parameters.Schedule,
+    "compensation": parameters.Compensation,
+    "sensing": parameters.Sensing,
+    "rigging": parameters.Rigging,
+}
 # Of the grip alone; a lead, where the list leaves none; a spring's memory, which is feel; and the
 # recorder's stamps, which are in the reference's record as well.
 NOT_LATE = {"loader.servo_frequency_Hz", "loader.servo_delay_s", "compensation.force_lead_lag_s"}
@@ -166,15 +173,18 @@ NOT_LATE |= {"loader.relaxing_time_s", "sensing.force_stamp_s", "sensing.hum_fre
 @pytest.mark.parametrize("control", CONTROL_NAMES)
 def test_the_reference_leaves_out_whatever_takes_time(control: ControlName) -> None:
     """Each key of a control in seconds or hertz is in the list, or known to make nothing late."""
-    sections: dict[str, type[Section]] = {
-        "loader": parameters.Loader,
-        "schedule": parameters.Schedule,
-        "compensation": parameters.Compensation,
-        "sensing": parameters.Sensing,
-        "rigging": parameters.Rigging,
-    }
-    for name, section in sections.items():
+    for name, section in SECTIONS.items():
         for key in file_keys(section, "{d}"):
             takes_time = key.endswith(("_Hz", "_s")) and not key.endswith("per_s")
             if takes_time and f"{name}.{key}" not in NOT_LATE:
                 assert f"{name}.{key}" in AT_ONCE, key
+
+
+@pytest.mark.parametrize("control", CONTROL_NAMES)
+def test_the_reference_is_a_rig_that_says_nothing_of_it(control: ControlName) -> None:
+    """Where nothing takes time, a key has the value that it has where the file leaves it out."""
+    d = unit_of(control)
+    for place, at_once in AT_ONCE.items():
+        name, key = place.format(d=d).split(".")
+        section = SECTIONS[name]
+        assert section.model_fields[file_keys(section, d)[key]].default == at_once, key

@@ -13,8 +13,9 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
 from coupled.record.record import Record
+from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.growth import growth
-from coupled.rig.packing import Hand
+from coupled.rig.packing import Hand, pack
 from coupled.schema import build
 from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
@@ -224,3 +225,22 @@ def test_noise_is_of_the_level_asked_and_of_the_seed() -> None:
     assert not np.array_equal(one.data, other.data)
     assert np.std(one["column_force_N"]) == pytest.approx(0.5, rel=0.05)
     assert np.std(one["column_estimate_m"]) == pytest.approx(0.5 * K_REPORT, rel=0.05)
+
+
+def test_a_hand_is_on_its_grip_from_the_first_row_on() -> None:
+    """The script's first force, or what holds the first place: k·h = (1 + k·K)·F at δc = 0."""
+    rig = bench({"servo_frequency_Hz": 18.0})
+    first, held, stiffness = 40.0, 0.01, 3000.0
+    for hand, force in (
+        (Hand(), first),
+        (Hand(stiffness=stiffness), (first + stiffness * held) / (1.0 + stiffness * K_REPORT)),
+    ):
+        script = np.zeros((1, 2, rig.substeps + 1))
+        script[0, 0] = first + np.arange(rig.substeps + 1)
+        script[0, 1] = held + 0.01 * np.arange(rig.substeps + 1)
+        record = np.zeros((1, 2 + CHANNELS_PER_CONTROL))
+        step_frame(pack(rig, {"column": hand}), script, record, 0, (3000.0,), 1.0)
+        channels = record[0, 1:-1]
+        assert channels[9] == pytest.approx(force, rel=1e-9)  # the hand's own force
+        assert channels[0] == channels[9]
+        assert channels[2] == pytest.approx(K_REPORT * force, rel=1e-9)

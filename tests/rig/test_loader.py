@@ -216,3 +216,18 @@ def test_released_it_never_gains_energy_nor_leaves_its_stops(
     )
     peak = np.maximum.accumulate(energy[::-1])[::-1]
     assert peak[0] <= energy[0] * (1 + 2e-2) + 1e-6
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_control_comes_to_rest_at_neutral_where_the_breakout_holds_it(side: float) -> None:
+    """On its way back it has bent a relaxing spring, which takes part of the 8 N that pull on.
+
+    The breakout of 10 N holds the rest. Added to the pull, the spring's 9 N were more than that.
+    """
+    spring = {"relaxing_stiffness_N_per_m": 200.0, "relaxing_time_s": 1.0}
+    rig = bench({**PLAIN, "breakout_N": 10.0, "damping_N_s_per_m": 300.0, **spring})
+    x = side * push(rig, lambda t: side * np.where(t < 3.0, 38.0, -8.0), 5.0)
+    assert x[5999] > 0.04
+    reached = int(np.argmax(x[6000:] <= 0.0)) + 6000
+    assert reached < 8000
+    assert np.all(x[reached + 400 :] == 0.0)

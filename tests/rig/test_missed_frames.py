@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from coupled.rig.compensation import SEED, misses
 from coupled.rig.hosted import Hosted, held_over
+from coupled.rig.packing import pack
 from coupled.rig.replay import (
     drive_loader,
     replay_compensation,
@@ -42,6 +44,25 @@ def test_so_many_frames_are_missed_each_by_chance() -> None:
     np.testing.assert_array_equal(held, np.diff(found.gradient) == 0.0)
     # Geometric runs: after a missed frame the next is missed as often as any.
     assert np.mean(held[1:][held[:-1]]) == pytest.approx(SHARE, abs=0.05)
+
+
+def test_the_numbers_are_those_of_park_and_miller() -> None:
+    """From 1 the ten-thousandth is 399268537, as ISO C++ prints it for `minstd_rand`."""
+    control = pack(rig_with(SHARE))[0]
+    state = control["state"]["compensation"]
+    state["drawn"] = 1
+    for _ in range(10_000):
+        misses(control["parameters"]["compensation"], state)
+    assert state["drawn"] == 399268537
+
+
+def test_a_frame_is_missed_where_the_next_number_is_under_the_share() -> None:
+    found, _ = run(rig_with(SHARE))
+    number, missed = SEED * 48271 % (2**31 - 1), [False]  # of the first frame, never missed
+    for _ in range(FRAMES - 1):
+        number = number * 48271 % (2**31 - 1)
+        missed.append(number < SHARE * (2**31 - 1))
+    np.testing.assert_array_equal(np.diff(found.estimate) == 0.0, missed[1:])
 
 
 @pytest.mark.parametrize("multiplier", ["hybrid", "digital"])

@@ -277,6 +277,19 @@ def test_a_feel_that_fails_leaves_its_share_of_the_gradient() -> None:
     assert at(record, "computed_m", 8.9) == pytest.approx(10.0 / (0.4 * G), rel=1e-3)
 
 
+def test_a_feel_that_fails_leaves_its_share_of_both_segments() -> None:
+    """0.4·(G₁·δ₁ + G₂·(δ − δ₁)) = F beyond the break."""
+    second, at_m = 900.0, 0.01
+    segments = {
+        f"{PLACE}.schedule.second_gradient_N_per_m": [second, second],
+        f"{PLACE}.schedule.break_deflection_m": at_m,
+    }
+    fails = {"fail": {"service": "feel_lost", "to": 0.6, "over_s": 0.5}}
+    record = flown({}, fails, 10.0, 9.0, segments)
+    beyond = (10.0 / 0.4 - G * at_m) / second
+    assert at(record, "computed_m", 8.9) == pytest.approx(at_m + beyond, rel=1e-3)
+
+
 def test_services_that_rest_change_no_byte_of_the_record() -> None:
     """Every number of the section given, and nothing led or reached: the same flight."""
     plain = flown(force_N=20.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,12 @@ import pytest
 
 import coupled
 from coupled.errors import InputError
+from coupled.flight import loop
+from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import configure
+from coupled.flight.runfile import read_run
 from coupled.rig import linkage
+from coupled.rig.control import ControlArray
 from coupled.rig.declaration import Hand
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.packing import pack
@@ -77,6 +82,29 @@ def test_a_structure_without_terms_changes_no_bit() -> None:
     )
     plain = rig.changed({"controls.column.compensation.deflection": False})
     assert np.array_equal(settled(plain, 150.0, 60.0), settled(assumed, 150.0, 60.0))
+
+
+def test_a_flight_is_the_same_node_by_node_together_or_control_by_control(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What takes controls together only where a structure or crosstalk joins them saves time."""
+    run = replace(read_run("three-controls")[0], duration_s=10.0)
+    rig = run.rig.changed({f"controls.{name}.loader.friction_N": 3.0 for name in run.rig.controls})
+    run = replace(run, rig=rig)
+
+    def joining(*given: Any) -> ControlArray:
+        packed = pack(*given)
+        assert not packed["parameters"]["crossing"]["joined"].any()
+        packed["parameters"]["crossing"]["joined"] = 1
+        return packed
+
+    apart = fly(run)
+    monkeypatch.setattr(loop, "pack", joining)
+    together = fly(run)
+    for name in rig.controls:
+        assert np.ptp(apart[f"{name}_hand_force_N"]) > 10.0
+    assert together.channels == apart.channels
+    np.testing.assert_array_equal(together.data, apart.data)
 
 
 @pytest.mark.parametrize(
