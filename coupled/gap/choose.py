@@ -18,7 +18,7 @@ from coupled.gap.case import Case
 from coupled.gap.effect import Effect, apply
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
-from coupled.gap.information import says_nothing
+from coupled.gap.information import may_be_plainer, says_nothing
 from coupled.gap.library import BY_NAME, EFFECTS
 from coupled.gap.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
@@ -189,7 +189,9 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
     """Return the best candidate, or one with fewer numbers that is as good.
 
     Where the one with fewer closes a gap of the loader, the other must beat it by more than the
-    physics of a right effect may leave: no law of dry friction is exact.
+    physics of a right effect may leave: no law of dry friction is exact. And the richer of two laws
+    must say by its own interval that it is not the plainer one: its other numbers, and the contact
+    beside it, also take up what noise has moved of a contact that yields.
     """
     best = ranked[0]
     first, limits = stage_gaps(case.outputs, settled.rig), stage_limits(case.outputs)
@@ -203,6 +205,9 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
             if stage in left
         )
         doubtful = closes and best.effect.stage == "loader"
+        if doubtful and may_be_plainer(case, best.effect, best.fit, other.effect):
+            best = other
+            continue
         share = SIMPLER_SHARE * ranked[0].gain
         margin = max(SIMPLER_GAIN, share) if doubtful else RIVAL_GAIN
         if other.gain > ranked[0].gain - margin:

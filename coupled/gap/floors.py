@@ -38,16 +38,21 @@ def input_noise(heard_: Noise, signal: Floats) -> Noise:
     return heard_ if found is None else _no_less(found, signal)
 
 
-def left_noise(heard_: Noise, signal: Floats, left: Floats) -> Noise:
+def left_noise(
+    heard_: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
+) -> Noise:
     """Return a channel's noise by what its stage leaves of it; no less than its rounding.
 
     `heard_` is what the signal alone says: it stays for a filtered log, and for a short one, and
     where the rest is far louder: a signal that jumps elsewhere than predicted is a gap.
+    Frames that are not `judged` have nothing left, and would be heard as silence: the noise is that
+    of the others, and its rms that over all frames.
     """
-    found = None if heard_.filtered else quiet_noise(left)
-    if found is None or found.rms > LOUDER * heard_.rms:
-        return heard_
-    return _no_less(found, signal)
+    rows = np.ones(len(left), dtype=bool) if judged is None else judged
+    found = None if heard_.filtered else quiet_noise(left[rows])
+    if found is not None and found.rms <= LOUDER * heard_.rms:
+        heard_ = _no_less(found, signal)
+    return replace(heard_, rms=heard_.rms * float(np.sqrt(np.mean(rows))))
 
 
 def _no_less(found: Noise, signal: Floats) -> Noise:

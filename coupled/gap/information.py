@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coupled.gap.case import Case
-from coupled.gap.effect import Effect
+from coupled.gap.effect import Effect, value_of
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.library import EFFECTS
@@ -43,3 +43,18 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     if key not in fitted.low:
         return False
     return fitted.low[key] <= nothing <= fitted.high[key]
+
+
+def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
+    """Tell whether the interval of the richer of two laws holds the plainer one.
+
+    There its number stands above another of the rig by nothing: a breakaway no larger than the
+    running friction.
+    """
+    if richer.alike is None or richer.alike.plainer != plainer.name:
+        return False
+    return any(
+        fitted.low[richer.value_key(p)] <= value_of(fitted.rig, case.control, p.above)
+        for p in richer.free
+        if p.above
+    )

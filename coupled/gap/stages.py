@@ -91,13 +91,15 @@ class Reader(Reading):
         noisy: Callable[[Rig, int], Floats],
         own: Noise,
         driven_by: str = "",
+        judged: NDArray[np.bool_] | None = None,
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, carried through.
 
+        Where it is not `judged`, the prediction is the measurement.
         Of one that is `driven_by` a quantity of the control, it is known what the floor hides.
         """
         base = predict(self.rig)
-        own = left_noise(own, measured, measured - base)
+        own = left_noise(own, measured, measured - base, judged)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
         floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
@@ -231,7 +233,7 @@ class Reader(Reading):
             return predict(rig, with_error(smooth, k, level))
 
         name = self.name_of("modifying_force")
-        return [self._made("multiplier", name, product, predict, noisy, own)]
+        return [self._made("multiplier", name, product, predict, noisy, own, judged=~unsure)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
