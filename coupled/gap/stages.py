@@ -95,8 +95,8 @@ class Reader(Reading):
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, carried through.
 
-        Where it is not `judged`, the prediction is the measurement.
-        Of one that is `driven_by` a quantity of the control, it is known what the floor hides.
+        Where it is not `judged`, the prediction is the measurement. Of one that is `driven_by` a
+        quantity of the control, it is known what the floor hides.
         """
         base = predict(self.rig)
         own = left_noise(own, measured, measured - base, judged)
@@ -184,16 +184,14 @@ class Reader(Reading):
                 level = given_noise(self.rig, self.name_of("force"), noisy_force)
             if share > HALF_FELT:
                 force, wandering = noisy_force, unsmoothed
-        predict = driven(force, smooth)
-        made = (self.name_of("computed"), computed, predict, noisy, own, "force")
+        made = (self.name_of("computed"), computed, driven(force, smooth), noisy, own, "force")
         return [self._made("loader", *made)]
 
     def _answering(self) -> list[Output]:
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
-        own = self.heard("force")
-        if between_jumps(force).rms < own.rms:  # at the end of a play it jumps
-            own = between_jumps(force)
+        # At the end of a play it jumps.
+        own = min(self.heard("force"), between_jumps(force), key=lambda noise: noise.rms)
         made = (force, motion.predict(), motion.noisy, own, self.imposed)
         return [self._made("loader", self.name_of("force"), *made)]
 
@@ -232,8 +230,8 @@ class Reader(Reading):
         def noisy(rig: Rig, k: int) -> Floats:
             return predict(rig, with_error(smooth, k, level))
 
-        name = self.name_of("modifying_force")
-        return [self._made("multiplier", name, product, predict, noisy, own, judged=~unsure)]
+        made_of = (self.name_of("modifying_force"), product, predict, noisy, own)
+        return [self._made("multiplier", *made_of, judged=~unsure)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")

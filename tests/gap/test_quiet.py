@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from coupled.gap.floors import left_noise
 from coupled.gap.noise import Noise, noise_of
 from coupled.gap.quiet import noise_of_input, quiet_noise
 
@@ -62,3 +63,14 @@ def test_a_line_and_a_short_or_silent_signal() -> None:
     assert quiet_noise(white[:200]) is None
     assert quiet_noise(np.zeros(FRAMES)) is None
     assert noise_of_input(np.zeros(FRAMES)) is None
+
+
+@pytest.mark.parametrize("share", [0.2, 0.4, 0.7])
+def test_frames_that_are_not_judged_are_not_heard_as_silence(share: float) -> None:
+    """Half seconds here and there have no residual: noise alone leaves a gap of one floor."""
+    rng = np.random.default_rng(6)
+    judged = np.repeat(rng.random(FRAMES // 60) >= share, 60)
+    left = np.where(judged, Noise(0.05).sample(FRAMES, rng), 0.0)
+    found = left_noise(Noise(0.1), 20.0 * sticking(), left, judged)
+    assert np.sqrt(np.mean(left**2)) / found.rms == pytest.approx(1.0, abs=0.06)
+    assert found.memory == 0.0

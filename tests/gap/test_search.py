@@ -13,7 +13,7 @@ from coupled.gap.case import Case
 from coupled.gap.choose import searched
 from coupled.gap.fit import Fit, _half_width, fit
 from coupled.gap.gain import Candidate
-from coupled.gap.information import says_nothing
+from coupled.gap.information import may_be_plainer, says_nothing
 from coupled.gap.library import BY_NAME
 from coupled.gap.output import Output
 from coupled.rig.rig import Rig
@@ -75,3 +75,23 @@ def test_a_loop_may_leave_the_bend_as_it_is_filed(share: tuple[float, float], si
         (loop,), {key: 0.5 * (low[key] + high[key]) for key in low}, low, high, (), rig, 1.0
     )
     assert says_nothing(Case(rig, "column", []), loop, found) is silent
+
+
+@pytest.mark.parametrize(("breakaway_N", "plain"), [((-7.9, 25.1), True), ((4.2, 5.0), False)])
+def test_a_breakaway_no_larger_than_running_friction_is_plain_friction(
+    breakaway_N: tuple[float, float], plain: bool
+) -> None:
+    """Another law's number is never taken for the plainer one's."""
+    [richer] = [effect for effect in BY_NAME.values() if effect.alike is not None]
+    assert richer.alike is not None
+    running, breakaway, fading = (richer.value_key(p) for p in richer.free)
+    low = {running: 3.9, breakaway: breakaway_N[0], fading: 1e-4}
+    high = {running: 4.1, breakaway: breakaway_N[1], fading: 1e-3}
+    rig = bench(
+        {"controls.column.loader.friction_N": 4.0, "controls.column.loader.breakaway_N": 8.0}
+    )
+    found = Fit((richer,), low, low, high, (), rig, 1.0)
+    case = Case(rig, "column", [])
+    assert may_be_plainer(case, richer, found, BY_NAME[richer.alike.plainer]) is plain
+    assert not may_be_plainer(case, richer, found, BY_NAME["inertia"])
+    assert not may_be_plainer(case, BY_NAME["inertia"], found, BY_NAME[richer.alike.plainer])
