@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,13 +47,14 @@ def left_noise(
     `heard_` is what the signal alone says: it stays for a filtered log, and for a short one, and
     where the rest is far louder: a signal that jumps elsewhere than predicted is a gap.
     Frames that are not `judged` have nothing left, and would be heard as silence: the noise is that
-    of the others, and its rms that over all frames.
+    of the others, and its rms that over all frames. Where none is judged, `heard_` stays.
     """
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
     found = None if heard_.filtered else quiet_noise(left[rows])
     if found is not None and found.rms <= LOUDER * heard_.rms:
         heard_ = _no_less(found, signal)
-    return replace(heard_, rms=heard_.rms * float(np.sqrt(np.mean(rows))))
+    share = float(np.mean(rows)) or 1.0
+    return replace(heard_, rms=heard_.rms * math.sqrt(share))
 
 
 def _no_less(found: Noise, signal: Floats) -> Noise:

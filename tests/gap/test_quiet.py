@@ -74,3 +74,5 @@ def test_frames_that_are_not_judged_are_not_heard_as_silence(share: float) -> No
     found = left_noise(Noise(0.1), 20.0 * sticking(), left, judged)
     assert np.sqrt(np.mean(left**2)) / found.rms == pytest.approx(1.0, abs=0.06)
     assert found.memory == 0.0
+    nowhere = np.zeros(FRAMES, dtype=bool)
+    assert left_noise(Noise(0.1), sticking(), 0.0 * left, nowhere) == Noise(0.1)
