@@ -90,7 +90,9 @@ def test_a_flight_is_the_same_node_by_node_together_or_control_by_control(
     """What takes controls together only where a structure or crosstalk joins them saves time."""
     run = replace(read_run("three-controls")[0], duration_s=10.0)
     rig = run.rig.changed({f"controls.{name}.loader.friction_N": 3.0 for name in run.rig.controls})
-    run = replace(run, rig=rig)
+    # The column's grip comes to its reach.
+    pilots = {**run.pilots, "column": run.pilots["column"].model_copy(update={"reach_m": 0.01})}
+    run = replace(run, rig=rig, pilots=pilots)
 
     def joining(*given: Any) -> ControlArray:
         packed = pack(*given)
@@ -103,6 +105,7 @@ def test_a_flight_is_the_same_node_by_node_together_or_control_by_control(
     together = fly(run)
     for name in rig.controls:
         assert np.ptp(apart[f"{name}_hand_force_N"]) > 10.0
+    assert np.ptp(apart["column_deflection_m"]) == pytest.approx(0.02, rel=1e-9)
     assert together.channels == apart.channels
     np.testing.assert_array_equal(together.data, apart.data)
 
