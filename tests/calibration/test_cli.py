@@ -193,6 +193,7 @@ def test_a_document_has_its_pages_and_checks(folder: Path) -> None:
     assert all(c["passed"] == (c["margin"] >= 0.0) for c in checks)
 
 
+@pytest.mark.slow
 def test_a_documents_pages_are_the_same_bytes_again(tmp_path: Path) -> None:
     found = document(bench_rig(), "column", 0.3)
     for name in ("one", "two"):

@@ -82,7 +82,7 @@ LONG |= {"asymmetric_friction", "load_friction", "relaxation", "friction_ripple"
 LONG |= {"force_scale", "force_zero", "scale_drift", "force_skew", "motion_skew"}
 LONG |= {"soft_backlash", "bend_hysteresis", "structural_mode", "force_limit"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
-LONG |= {"pitch_stiffness", "lift_slope"}
+LONG |= {"pitch_stiffness", "lift_slope", "mass", "inertia", "modifying_lag", "presliding_friction"}
 
 # Forty seconds meet few gusts. The noise of F walks a contact that yields, smoothed as it is.
 ROUGHLY = {
@@ -122,6 +122,7 @@ def test_a_single_effect_is_named_at_its_stage_and_size(
     json.dumps(found.as_dict(), allow_nan=False)
 
 
+@pytest.mark.slow
 def test_two_effects_at_two_stages_are_both_named(tmp_path: Path) -> None:
     pair = {"inertia": {"factor": 1.4}, "backlash": {"play_{d}": 1e-3}}
     found = diagnosed(tmp_path, False, pair)

@@ -127,6 +127,7 @@ def test_the_library_draws_by_every_signal_and_no_other() -> None:
     assert used == set(SIGNALS)
 
 
+@pytest.mark.slow
 def test_the_files_differ_as_the_diagnoses_do(cases: Mapping[bool, Case], tmp_path: Path) -> None:
     case = cases[False]
     pair = ("coulomb_friction", "backlash")

@@ -102,6 +102,7 @@ def test_a_lag_of_a_few_frames_is_told_by_the_noise_it_holds_back(tmp_path: Path
     assert schedule.gap is not None and schedule.gap > 300.0  # else 10
 
 
+@pytest.mark.slow
 def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> None:
     """Its product follows the replay: that of the measured deflection would not hold it."""
     nominal = loader(basic_gradient_N_per_m=140.0, friction_N=2.0, breakout_N=2.0)
@@ -114,7 +115,9 @@ def test_a_digital_product_on_a_weak_spring_does_not_drift(tmp_path: Path) -> No
     assert left is not None and left < 1.1
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.015, "no_gap"), (1.03, "effect")])
+@pytest.mark.parametrize(
+    ("factor", "verdict"), [(1.015, "no_gap"), pytest.param(1.03, "effect", marks=pytest.mark.slow)]
+)
 def test_a_setting_is_no_effect_until_it_is_off_by_more(
     tmp_path: Path, factor: float, verdict: str
 ) -> None:

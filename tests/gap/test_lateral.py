@@ -56,6 +56,7 @@ def flown(rig: Rig, control: ControlName, name: str, value: float) -> Record:
     return fly_force(real, pushes(rig), seed=3)
 
 
+@pytest.mark.slow
 def test_three_moving_controls_are_no_gap(cessna: Rig) -> None:
     record = fly_force(cessna, pushes(cessna), seed=3)
     assert max(abs(record["roll_rad"])) > 0.1  # it does roll, which pitches it, too

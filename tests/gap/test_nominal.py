@@ -73,6 +73,7 @@ def test_motion_at_one_speed_does_not_tell_friction_from_damping() -> None:
     assert numbers["loader.mass_kg"] == pytest.approx(MASS_kg, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_loader_and_a_servo_are_found_and_kept_for_a_diagnosis(
     tmp_path: Path,
 ) -> None:

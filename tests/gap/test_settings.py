@@ -50,6 +50,7 @@ def test_the_length_over_which_friction_yields_sets_its_contact() -> None:
         assert found.controls["column"].loader.friction_stiffness == pytest.approx(stiffness)
 
 
+@pytest.mark.slow
 def test_a_filed_friction_that_yields_before_it_slips_is_no_gap(tmp_path: Path) -> None:
     rough = nominal_rig(False).changed({LOADER + "friction_N": 1.5})
     real = rough.changed({LOADER + "friction_stiffness_N_per_m": 1e4})
