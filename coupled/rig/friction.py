@@ -112,7 +112,7 @@ def more_friction(p: FrictionParameters, load: float, direction: float) -> float
 def _slipping(p: FrictionParameters, load: float, rate: float) -> float:
     """Return the friction at which bristles slip at a rate, N."""
     level = running_friction(p, rate) + more_friction(p, load, rate)
-    return max(level, LEAST_N) if p.varies else level
+    return max(level, LEAST_N)  # of breakaway alone nothing is left at speed
 
 
 @stage
