@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, Known, fit
 from coupled.gap.output import Output, Part, stage_gaps
 from coupled.gap.settings import contact, is_dry, settings
-from coupled.gap.thresholds import SETTLE_FROM
+from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -71,6 +71,27 @@ class Case:
             return gaps
         own = stage_gaps(self.refloored(rig), rig)
         return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
+
+    def heard_anew(self, rig: Rig) -> Case | None:
+        """Return the case with the noise that a rig's residuals have; None where none is lower.
+
+        Noise is the same whatever the rig, and a gap adds to it what passes for coloured noise:
+        the least that any rig leaves is the nearest.
+        """
+        if self.refloored is None:
+            return None
+        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        anew = [made.get((one.record, one.channel), one) for one in self.outputs]
+        pairs = list(zip(self.outputs, anew, strict=True))
+        if not any(new.own < HEARD_ANEW * old.own for old, new in pairs):
+            return None
+        outputs = [
+            replace(old, floor=new.floor, spread=new.spread, smoothed=new.smoothed, _known=[])
+            if new.own < HEARD_ANEW * old.own
+            else old
+            for old, new in pairs
+        ]
+        return replace(self, outputs=outputs, _known={})
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the settings whose number none of these effects frees, nor is the same law as.

@@ -106,7 +106,8 @@ def _diagnose(
         return known[0][1]
 
     case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
-    choice = search(case, library)
+    case, choice = search(case, library)
+    outputs = list(case.outputs)
     stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
     fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values)
     floors = floors_of(case, choice)

@@ -106,6 +106,11 @@ class Output:
         return left if part == "all" else left[self.rows(part)]
 
     @property
+    def own(self) -> float:
+        """The part of the floor that is the channel's own noise, not its input's."""
+        return self.floor * math.sqrt(1.0 - self.smoothed**2)
+
+    @property
     def stretches(self) -> NDArray[np.intp]:
         """The number of the stretch that each frame lies in."""
         frames = max(1, round(STRETCH_s * self.frame_rate_Hz))

@@ -11,8 +11,22 @@ from coupled.gap.library import EFFECTS
 from coupled.gap.output import explained_below, stage_gaps, stage_limits
 
 
-def search(case: Case, library: Sequence[Effect] = EFFECTS) -> Choice:
-    """Return the effects that explain a record's gap.
+def search(case: Case, library: Sequence[Effect] = EFFECTS) -> tuple[Case, Choice]:
+    """Return the effects that explain a record's gap, and the case with the floors they leave.
+
+    What a gap does passes for noise. Where a rig with the effects found leaves less of it, the
+    search is made again over that, as long as less comes out.
+    """
+    while True:
+        found = _search(case, library)
+        anew = case.heard_anew(found.fit.rig) if found.steps else None
+        if anew is None:
+            return case, found
+        case = anew
+
+
+def _search(case: Case, library: Sequence[Effect]) -> Choice:
+    """Return the effects that explain a case's gap.
 
     An effect in reserve passes for others, and takes part in a second search alone, where the
     first leaves its stage unexplained. The one that leaves less is the answer.

@@ -51,6 +51,7 @@ MAINS_OFF = 0.01  # chosen: relative; a public grid stays within 1 % for 99.5 % 
 JUMPS = 0.5  # chosen: of the rms of fourth differences, under which the usual one shows jumps
 LOUDER = 3.0  # chosen: times a signal's own noise, from which what a stage leaves is none
 LEAST_NOISE = 1e-3  # chosen: of a signal's rms, the noise of a channel whose own was filtered away
+HEARD_ANEW = 0.8  # chosen: of a noise, under which another rig's residual says that it was a gap
 BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the force itself
 FELT_FRAMES = 4  # chosen: to either side, over which an answer says what was felt of a force
 FELT = 0.9  # chosen: share of a force's roughness in its answer, from which it is no noise

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,3 +97,18 @@ def test_a_breakaway_no_larger_than_running_friction_is_plain_friction(
     assert may_be_plainer(case, richer, found, BY_NAME[richer.alike.plainer]) is plain
     assert not may_be_plainer(case, richer, found, BY_NAME["inertia"])
     assert not may_be_plainer(case, BY_NAME["inertia"], found, BY_NAME[richer.alike.plainer])
+
+
+@pytest.mark.parametrize(("quiet", "floor"), [(0.3, 0.5), (0.45, 1.0)])
+def test_noise_is_the_least_that_a_rig_leaves(quiet: float, floor: float) -> None:
+    """Noise of 1 by a rig with a gap, of which 0.87 is its input's: its own part is 0.5."""
+    rig: Rig = bench({})
+    first = replace(output("linkage", 2.0), smoothed=0.75**0.5)
+    ours = math.hypot(quiet, 0.4)
+    anew = replace(first, floor=ours, smoothed=0.4 / ours)
+    case = Case(rig, "column", [first], refloored=lambda other: [anew])
+    assert first.own == pytest.approx(0.5)
+    assert anew.own == pytest.approx(quiet)
+    again = case.heard_anew(rig)
+    assert (again or case).outputs[0].floor == pytest.approx(floor)
+    assert again is None or again.gaps(rig)["linkage"] == pytest.approx(2.0 / floor, rel=0.05)
