@@ -10,6 +10,7 @@ import pytest
 from coupled.calibration.readingsfile import read_readings
 from coupled.campaign.plan import read_plan
 from coupled.errors import InputError
+from coupled.flight.runfile import read_run
 from coupled.gap.batch import jobs
 from coupled.record.importing.mapping import read_map
 from tests.support.commands import coupled
@@ -114,6 +115,15 @@ def test_a_calibrations_readings(tmp_path: Path) -> None:
     assert set(found) == rows
     done = coupled(tmp_path, "calibrate", "r.csv")
     assert (done.returncode, done.stderr.count("error: r.csv: row")) == (2, 5)
+
+
+@pytest.mark.parametrize("rig", ["", 'rig = ""', "rig = 3"], ids=["none", "empty", "number"])
+def test_a_runs_without_its_rig(tmp_path: Path, rig: str) -> None:
+    """What is no name of a rig is said once, and not looked for among the shipped ones."""
+    (tmp_path / "r.toml").write_text(f'{rig}\nname = "r"\ncard = "c"\nduration_s = "long"\n')
+    with pytest.raises(InputError) as fault:
+        read_run(str(tmp_path / "r.toml"))
+    assert sorted(one.key for one in fault.value.every) == ["duration_s", "rig"]
 
 
 def test_a_folders_records(tmp_path: Path) -> None:

@@ -97,9 +97,10 @@ def _checked_run(table: dict[str, Any], keys: dict[str, str], pilots: Any, file:
     plain = {key: value for key, value in table.items() if key in keys and key not in sections}
     with collected(faults):
         build(RunFile, plain, file, "")
-    with collected(faults):
-        rig = read_rig(find(str(table.get("rig", "")), shipped_rigs(), "rig", beside=file.parent))
-        _pilots(pilots, rig, file)
+    named = table.get("rig")
+    if isinstance(named, str) and named:  # that it lacks, or is no name, is said above
+        with collected(faults):
+            _pilots(pilots, read_rig(find(named, shipped_rigs(), "rig", beside=file.parent)), file)
     raise together(faults)
 
 

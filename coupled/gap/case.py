@@ -31,7 +31,8 @@ class Case:
     refloored: Callable[[Rig], Sequence[Output]] | None = None
     # A model with an error of its own strains its settings: only a stage over its limit is guilty.
     only_wide: bool = False
-    _known: Known = field(default_factory=dict, repr=False, compare=False)  # fits
+    # Its fits: a case of other outputs, made by `replace`, begins with none.
+    _known: Known = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> dict[str, Effect]:

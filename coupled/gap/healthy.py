@@ -54,7 +54,8 @@ class ModelError:
             [_by_stretch(o, left) for o, left in zip(outputs, lefts, strict=True)]
         )
         few = HEALTHY_ALONE / math.sqrt(len(each))
-        scatter = float(np.std(each, ddof=1) / np.mean(each)) if len(each) > 1 else 0.0
+        several = len(each) > 1 and power > 0.0  # a channel of the host's own may leave nothing
+        scatter = float(np.std(each, ddof=1) / np.mean(each)) if several else 0.0
         return cls(
             rms=math.sqrt(max(power - noise, 0.0)),
             moves=math.sqrt(float(np.mean([np.var(output.measured) for output in outputs]))),

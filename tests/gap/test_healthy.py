@@ -15,9 +15,13 @@ from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.setting import Installed, draw_setting, fly_clean
 from coupled.blind.twin.twin import Twin
-from coupled.gap.healthy import ModelError
+from coupled.gap.case import Case
+from coupled.gap.healthy import ModelError, tolerances
+from coupled.gap.library import BY_NAME
 from coupled.gap.output import Floats, Output, Predict
+from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.record.record import Record, read_record
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.rigs import bench
 
@@ -99,3 +103,35 @@ def test_the_error_of_a_model_is_what_it_leaves_beside_noise() -> None:
     assert error.raised(larger).floor > 2.0 * raised.floor
     scattered = ModelError.of(outputs([0.1, 0.4, 0.8]), rig)
     assert scattered.by_record > 0.6
+
+
+def test_an_effects_tolerance_is_its_scatter_from_record_to_record() -> None:
+    """Three records of damping 1.1, 1.2 and 1.4 times the filed: each is fitted by itself."""
+    rate, rng = np.cos(np.arange(3000) / 40.0), np.random.default_rng(3)
+
+    def predict(rig: Rig) -> Floats:
+        return np.asarray(rig.controls["column"].loader.damping * rate)
+
+    rig = bench()
+    seen = [k * predict(rig) + 0.01 * rng.normal(size=3000) for k in (1.1, 1.2, 1.4)]
+    case = Case(
+        *(rig, "column"),
+        [Output("loader", "x", one, predict, 0.01, 100.0, record=i) for i, one in enumerate(seen)],
+    )
+    damping = BY_NAME["viscous_damping"]
+    found = case.fit((damping,))
+    [wide] = tolerances(case, found).values()
+    filed = rig.controls["column"].loader.damping
+    assert wide == pytest.approx(HEALTHY_SIGMAS * np.std([1.1, 1.2, 1.4], ddof=1) * filed, rel=0.01)
+
+
+def test_a_channel_that_the_rig_repeats_to_the_last_digit_has_no_error() -> None:
+    """What the host works out itself may leave nothing of any record."""
+    motion = np.sin(np.arange(3000) / 40.0)
+    exact = [
+        Output("compensation", "x", motion, predicts(motion), 0.1, 100.0, record=i)
+        for i in range(2)
+    ]
+    error = ModelError.of(exact, bench())
+    assert (error.rms, error.by_stretch) == (0.0, 0.0)
+    assert error.by_record == pytest.approx(HEALTHY_ALONE / np.sqrt(2.0))
