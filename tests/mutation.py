@@ -39,6 +39,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, NoReturn
 
+import numba
 import numpy as np
 import pytest
 
@@ -238,7 +239,7 @@ def uncached() -> None:
     """Let no kernel come from disk, where it was compiled from the file as it is."""
 
     def entry(function: Any, **_: bool) -> Any:
-        return compiled.stage(function)
+        return numba.njit(function)
 
     vars(compiled)["entry"] = entry
 
