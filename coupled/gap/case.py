@@ -8,7 +8,7 @@ from functools import cached_property
 
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, Known, fit
-from coupled.gap.output import Output, Part, stage_gaps
+from coupled.gap.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.settings import contact, is_dry, settings
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.record.channels import ControlName
@@ -66,9 +66,13 @@ class Case:
         return None if setting is None else (setting.free[0].low, setting.free[0].high)
 
     def gaps(self, rig: Rig) -> dict[str, float]:
-        """Return each stage's gap, by the floors of this rig where they are higher."""
-        gaps = stage_gaps(self.outputs, rig)
-        if self.refloored is None or rig == self.nominal:
+        """Return each stage's gap, by the floors of this rig where they are higher.
+
+        As where a contact that yields lets noise pass that the filed friction would hold.
+        """
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
+        if self.refloored is None or rig == self.nominal or narrow:
             return gaps
         own = stage_gaps(self.refloored(rig), rig)
         return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}

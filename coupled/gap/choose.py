@@ -15,7 +15,7 @@ import numpy as np
 
 from coupled.gap.candidates import fitted_candidates, imitating
 from coupled.gap.case import Case
-from coupled.gap.effect import Effect, apply
+from coupled.gap.effect import Effect, apply, possible
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.information import may_be_plainer, says_nothing
@@ -224,7 +224,7 @@ def _round(
     for another. One where nothing gains is `idle`, and not tried again until it changes.
     """
     first = stage_gaps(case.outputs, settled.rig)
-    now = case.gaps(current.rig) if current.effects else first
+    now = case.gaps(current.rig)
     limits = stage_limits(case.outputs)
     wide = {at for at, gap in now.items() if gap > explained_below(first[at], limits[at])}
     tried: list[Candidate] = []
@@ -234,10 +234,30 @@ def _round(
         if ranked and ranked[0].gain >= LEAST_GAIN:
             return ranked
         idle.add(output)
-    if wide:
-        return tried
+    marked = _marked(case, current, library)
+    if wide or marked:
+        return marked or tried
     ranked = fitted_candidates(case, current, library, _strained(case, current))
     return ranked if _surely_beyond(case, ranked) else []
+
+
+def _marked(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
+    """Return the candidate that an output shows by its mark, though it is within its limit.
+
+    Its gain is what that output says alone: there the mark is known, and has no number to fit.
+    """
+    for effect in library:
+        ours = [output for output in case.outputs if output.stage == effect.mark]
+        if not ours or effect in current.effects:
+            continue
+        effects = (*current.effects, effect)
+        beside = (*effects, *case.nuisances(effects))
+        rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
+        shown = [] if rig is None else [(effect, replace(current, rig=rig))]
+        if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
+            fitted = [(effect, case.fit(effects, "fitted", current.values, effect))]
+            return ranked_by_gain(ours, current, fitted)
+    return []
 
 
 def _strained(case: Case, current: Fit) -> set[str]:

@@ -145,6 +145,7 @@ class Effect:
     `gradual`      its first number is a rate: it grows from the first on
     `events`       when the events were that it consists of, in s from the record's start
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
+    `mark`         the output that shows it by what it repeats, be it within its limit
     `reserve`      it passes for others: only tried where without it a stage stays unexplained
     """
 
@@ -165,6 +166,7 @@ class Effect:
     gradual: bool = False
     events: Callable[[Record], Floats] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
+    mark: str = ""
     reserve: bool = False
 
     @property

@@ -57,6 +57,16 @@ def left_noise(
     return replace(heard_, rms=heard_.rms * math.sqrt(share))
 
 
+def without_echo(left: Floats, echo: Floats | None) -> Floats:
+    """Return what a stage leaves without what repeats another channel's noise, same shape.
+
+    A product that a host makes of δc as read repeats the noise of that reading: that says how it is
+    made, and to take it for the channel's own noise would hide it.
+    """
+    power = 0.0 if echo is None else float(echo @ echo)
+    return left if echo is None or power == 0.0 else left - float(left @ echo) / power * echo
+
+
 def _no_less(found: Noise, signal: Floats) -> Noise:
     """Return a noise that is no less than a signal's rounding."""
     rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))

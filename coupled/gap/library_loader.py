@@ -68,6 +68,7 @@ LOADER: tuple[Effect, ...] = (
             *("noise", "product_left", "law", 0.3),
         ),
         outputs=("loader", "multiplier"),
+        mark="multiplier",
     ),
     # Where nothing bends, a force that comes late is one that is stamped late.
     replace(

@@ -30,7 +30,7 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
     loader = rig.controls[control].loader
     if loader.friction_stiffness > 0.0:
         return ()
-    most = YIELDS_rad if unit_of(control) == "rad" else YIELDS_m
+    most = most_yielding(control)
     length = Parameter("", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most,), may_end=True)
     share = Parameter(
         "", CONTACT[1], "value", 0.0, MOST_ELASTIC, (loader.friction_elastic_share,), may_end=True
@@ -38,6 +38,11 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
     names = ("setting of the contact", "setting of the contact's share")
     numbers = zip(names, (length, share), strict=True)
     return tuple(Effect(name, "loader", (one,), Signature("", "")) for name, one in numbers)
+
+
+def most_yielding(control: ControlName) -> float:
+    """Return by how much dry friction may yield before it slips, d."""
+    return YIELDS_rad if unit_of(control) == "rad" else YIELDS_m
 
 
 def is_dry(rig: Rig, control: ControlName) -> bool:

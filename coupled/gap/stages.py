@@ -21,14 +21,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.floors import given_noise, left_noise, noise_in, unsmoothed, with_error
+from coupled.gap.floors import (
+    given_noise,
+    left_noise,
+    noise_in,
+    unsmoothed,
+    with_error,
+    without_echo,
+)
 from coupled.gap.imposed import Imposed
 from coupled.gap.noise import Noise, between_jumps
 from coupled.gap.openloop import about
 from coupled.gap.output import Hides, Output, Predict, echoed, felt, heard, spread
-from coupled.gap.ratchet import passed_noise, unratcheted
+from coupled.gap.product import Product
+from coupled.gap.ratchet import Driven, is_walked, passed, passed_noise, unratcheted, unwalked
 from coupled.gap.reading import Reading
-from coupled.gap.served import asked, left, neutral, services
+from coupled.gap.served import asked, left, services
 from coupled.gap.smooth import rate_of, smoothed
 from coupled.gap.surfaces import filed_trim
 from coupled.gap.thresholds import (
@@ -37,7 +45,6 @@ from coupled.gap.thresholds import (
     FELT,
     HALF_FELT,
     NOISE_TRIES,
-    PRELOAD_UNSURE,
     REPLAY_KNOWN,
     ROUNDING_SPAN,
     SURFACE_KNOWN,
@@ -51,7 +58,6 @@ from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
     replay_compensation,
-    replay_product,
     replay_schedule,
     replay_surface,
 )
@@ -92,14 +98,16 @@ class Reader(Reading):
         own: Noise,
         driven_by: str = "",
         judged: NDArray[np.bool_] | None = None,
+        echo: Floats | None = None,
     ) -> Output:
         """Return an output whose floor is its own noise and its input's, carried through.
 
         Where it is not `judged`, the prediction is the measurement. Of one that is `driven_by` a
-        quantity of the control, it is known what the floor hides.
+        quantity of the control, it is known what the floor hides. What repeats an `echo` is none
+        of its own noise.
         """
         base = predict(self.rig)
-        own = left_noise(own, measured, measured - base, judged)
+        own = left_noise(own, measured, without_echo(measured - base, echo), judged)
         tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
         carried = float(np.sqrt(np.mean(np.square(tries))))
         floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
@@ -151,13 +159,13 @@ class Reader(Reading):
         leaks = [on_nodes(self.rig, smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
-        def driven(f: Floats, seen: Floats) -> Predict:
-            """Return the prediction for a force and the δc at which windows start."""
+        def driven(f: Floats, seen: Floats) -> Driven:
+            """Return the answer to a force, and so many times its noise, by where windows start."""
             nodes = on_nodes(self.rig, f)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
-            def predict(rig: Rig) -> Floats:
+            def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
                 scale, hum = sensed.scale(len(seen)), sensed.hum(computed)
                 still = rate
@@ -165,17 +173,22 @@ class Reader(Reading):
                     still = rate - rate_of(hum, self.rig.frame_rate)
                 restart = (every, (seen - hum) / scale, still / scale)
                 pull = sensed.force_on_nodes(nodes, f)
+                if times:
+                    pull = pull + times * on_nodes(self.rig, trembles)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0]
                 host = Hosted(services(self), self.missed.under(rig, self.control))
                 driven_by = (pull, gradient, misread + hum, load, second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
-            return predict
+            return at
+
+        def predicted(at: Driven, times: float = 1.0) -> Predict:
+            return lambda rig: unwalked(rig, self.control, at, times) if walks else at(rig, 0.0)
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + NOISE_TRIES, own)
-            return driven(wandering(force, k, level), seen)(rig)
+            return predicted(driven(wandering(force, k, level), seen), 2.0**0.5)(rig)
 
         if level.rms > BROAD * float(np.std(noisy_force)):
             share = felt(noisy_force, computed)
@@ -184,7 +197,10 @@ class Reader(Reading):
                 level = given_noise(self.rig, self.name_of("force"), noisy_force)
             if share > HALF_FELT:
                 force, wandering = noisy_force, unsmoothed
-        made = (self.name_of("computed"), computed, driven(force, smooth), noisy, own, "force")
+        trembles = passed(noisy_force, level)
+        answer = driven(force, smooth)
+        walks = force is not noisy_force and is_walked(self.rig, self.control, answer, own.rms)
+        made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
         return [self._made("loader", *made)]
 
     def _answering(self) -> list[Output]:
@@ -202,36 +218,9 @@ class Reader(Reading):
         return softest * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * loader.mass
 
     def _multiplier(self) -> list[Output]:
-        """Return F_mod against the product it should be: of δc itself, or of δc as read.
-
-        A digital product repeats the noise of the δc that it was made from, an analog one
-        does not know of it; a wrong scale is in the one and not in the other.
-        """
-        computed, product = self.signal("computed"), self.signal("modifying_force")
-        gradient, second, smooth = self.gradient(), self.second(), smoothed(computed)
-        level, own = self.heard("computed"), self.heard("modifying_force")
-        about = 0.0 * smooth + neutral(self)
-
-        def made(rig: Rig, read: Floats) -> Floats:
-            missed = self.missed.under(rig, self.control)
-            return replay_product(rig, self.control, read - about, gradient, second, missed)
-
-        # Around neutral a breakout makes F_mod jump, and noise in δc says there on which side.
-        jump = made(self.rig, about + level.rms) - made(self.rig, about - level.rms)
-        near = np.abs(smooth - about) < PRELOAD_UNSURE * level.rms
-        unsure = near & (np.abs(jump) > PRELOAD_UNSURE * own.rms)
-
-        def predict(rig: Rig, seen: Floats = smooth) -> Floats:
-            digital = rig.controls[self.control].loader.multiplier == "digital"
-            sensed = self.sensed(rig)
-            read = computed if digital else (seen - sensed.hum(computed)) / sensed.scale(len(seen))
-            return np.where(unsure, product, made(rig, read))
-
-        def noisy(rig: Rig, k: int) -> Floats:
-            return predict(rig, with_error(smooth, k, level))
-
-        made_of = (self.name_of("modifying_force"), product, predict, noisy, own)
-        return [self._made("multiplier", *made_of, judged=~unsure)]
+        product = Product(self)
+        made = (product.name, product.recorded, product.predict, product.noisy, product.own)
+        return [self._made("multiplier", *made, judged=~product.unsure, echo=product.echo)]
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")

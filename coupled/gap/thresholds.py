@@ -92,6 +92,11 @@ FLIGHT_KNOWN = 1e-4  # chosen: of its span, to which measured surfaces replay th
 SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axis has no spring
 RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size ratchets a play by √2 times as much
+# Of what noise shakes δc by, from which it walks a contact, and is put back at thrice the time: of
+# 24 blind records, seed 103, five.
+WALKED = 0.2
+WALKED_BY = 0.2  # chosen: of the most that friction yields by, the contact that is tried
+WALKED_N = 2.0  # chosen: its friction, where none is filed
 NOISE_TRIES = 4  # chosen: samples of the input's noise that are carried through a stage
 SURFACE_SHAKE_s = 1.0  # chosen: for so long each of the other controls is held off neutral
 SURFACE_SHAKE = 0.1  # chosen: of its travel

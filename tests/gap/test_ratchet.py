@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
+from coupled.flight.pilot import ForceTable
 from coupled.gap.fit import fit
 from coupled.gap.library import BY_NAME
 from coupled.gap.stages import Reader
 from coupled.gap.surfaces import surface_points
 from coupled.record.record import Record
+from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.records import NOISE
 
@@ -43,3 +47,29 @@ def test_a_play_is_found_as_large_beside_friction_as_without(
         assert play.low[key] < PLAY_m < play.high[key]
         found.append(play.values[key])
     assert np.mean(found) == pytest.approx(PLAY_m, rel=0.008)
+
+
+def held(rig: Rig, seed: int, tmp_path: Path) -> Record:
+    """Return a record of 30 s in which the force rests for two to three seconds at a time."""
+    t = np.arange(30 * 120 + 1) / 120.0
+    steps = [(1.0, 20.0), (5.0, -44.0), (10.0, 36.0), (14.0, -20.0), (18.0, 30.0), (24.0, -22.0)]
+    rises = [0.5 * (1.0 - np.cos(np.pi * np.clip((t - at) / 0.2, 0.0, 1.0))) for at, _ in steps]
+    force = np.array([size for _, size in steps]) @ np.array(rises)
+    rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
+    (tmp_path / "held.csv").write_text("time_s,column_force_N\n" + rows)
+    noise = {name: NOISE[name] for name in ("column_force_N", "column_computed_m")}
+    pilot = ForceTable(file=str(tmp_path / "held.csv"))
+    still = PressureProfile(time_s=[0.0, 30.0], dynamic_pressure_Pa=[1200.0, 1200.0])
+    noisy = rig.changed({"noise": noise})
+    return fly(Manoeuvre(noisy, {"column": pilot}, 30.0, seed=seed, bench=still))
+
+
+def test_noise_of_a_held_force_walks_no_contact(tmp_path: Path) -> None:
+    """Driven by the force as measured, the true rig itself would leave 3.5 floors, and 2.5."""
+    stiffness = "controls.column.loader.friction_stiffness_N_per_m"
+    rig = nominal_rig(False).changed({"controls.column.loader.friction_N": 7.5})
+    real = rig.changed({stiffness: 7.5 / 1.5e-4})
+    for seed in (1, 2):
+        outputs = Reader(rig, held(real, seed, tmp_path), "column", surface_points).outputs()
+        (loader,) = (output for output in outputs if output.stage == "loader")
+        assert loader.gap(real) < 1.6
