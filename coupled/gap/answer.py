@@ -9,6 +9,7 @@ import numpy as np
 
 from coupled.gap.budget import StageBudget
 from coupled.gap.case import Case
+from coupled.gap.chain import stage_of
 from coupled.gap.choose import Choice, Found
 from coupled.gap.courses import course_in
 from coupled.gap.credibility import credibility
@@ -23,7 +24,7 @@ from coupled.gap.result import (
 )
 from coupled.gap.settings import settings
 from coupled.gap.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, REMAINDER, SURE
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -35,12 +36,17 @@ def verdict_of(
     effects: Sequence[EffectResult],
     budget: Sequence[StageBudget],
 ) -> Verdict:
-    """Return the verdict; `mostly` where what is certain leaves structure, but holds more."""
+    """Return the verdict; `mostly` where what is certain leaves structure, but holds more.
+
+    An effect that is not certain, though no other rivals it, explains nothing: it may imitate what
+    is missing so well that nothing seems to remain.
+    """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
-    left = any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
-    known = {one.stage: one for one in budget}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
+    doubtful = any(not s.rivals and s.effect.name not in sure for s in choice.steps)
+    left = doubtful or any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
+    known = {one.stage: one for one in budget}
     if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
         return "unexplained"
     if not choice.steps:
@@ -75,29 +81,20 @@ def effects_of(
     choice: Choice,
     readers: Sequence[Reader],
     stages: Sequence[StageResult],
-    budget: Sequence[StageBudget],
 ) -> tuple[EffectResult, ...]:
     """Return the effects found, the largest first.
 
-    What stands beside a remainder may only imitate what is missing: the more it leaves, and the
-    less credible it is, the less sure.
+    What drifts, or stands beside a remainder, may only imitate what is missing: the less credible
+    it is, the less sure.
     """
-    unexplained = {stage.name for stage in stages if stage.unexplained}
-    # What has no residual of its own is as doubtful as those in which it shows.
-    shown = {stage.name: set(stage.shown_in) or {stage.name} for stage in stages}
-    left = {name for name, others in shown.items() if others & unexplained}
-    known = {one.stage: one.remains for one in budget}
-    remains = {
-        name: max((known.get(other, 0.0) for other in (name, *others & unexplained)), default=0.0)
-        for name, others in shown.items()
-    }
+    remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
 
     def result(step: Found) -> EffectResult:
         effect = step.effect
-        known = credibility(effect, case, choice.fit, records, effect.stage in left)
-        rest = remains.get(effect.stage, 0.0) if effect.stage in left else 0.0
-        sure = SURE - (SURE - DOUBT) * (1.0 - known.value) * rest / (rest + REMAINDER)
+        beside = max(remains.get(stage_of(output), 0.0) for output in effect.shows_in)
+        known = credibility(effect, case, choice.fit, records, beside)
+        sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
         probability = step.probability * sure

@@ -9,7 +9,11 @@ part of the action is there, 1 where it is as large as everywhere.
 
 And it is held beside a model free in form of the stage's own signals (`flexible`): the share of
 what that leaves without the effect, that it does not leave with it. A law that such a model takes
-up as well is none that the records have shown.
+up as well is none that the records have shown. What comes from outside, as a gust, is no law of
+those signals, and is not held so.
+
+Drift counts whatever remains; the free model by how much more remains than noise and the right
+physics may leave (`remainder`). Both go into one smooth number, and so does the probability.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ from coupled.gap.fit import Fit, touched
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import smoothed
-from coupled.gap.thresholds import DRIFT, FLEXIBLE_LEFT, LEAST_OF_A_HALF
+from coupled.gap.thresholds import DRIFT, FLEXIBLE_LEFT, LEAST_OF_A_HALF, LEAST_REMAINDER
 from coupled.gap.where import response, signals
 from coupled.record.record import Record
 
@@ -76,12 +80,14 @@ class Regime:
 class Credibility:
     """Whether an effect is as large everywhere, and what of it a free model would not take.
 
-    `beside_flexible` is None where nothing is left to explain.
+    `remainder` is how surely something remains beside it, 0 to 1 (`remainder`); `beside_flexible`
+    None where next to nothing does.
     """
 
     effect: str
     regimes: tuple[Regime, ...]
     beside_flexible: float | None = None
+    remainder: float = 0.0
 
     @property
     def worst(self) -> Regime | None:
@@ -105,13 +111,14 @@ class Credibility:
         same = 1.0 / (1.0 + (self.drift / DRIFT) ** 4)
         if self.beside_flexible is None:
             return same
-        return same / (1.0 + (FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)) ** 8)
+        law = 1.0 / (1.0 + (FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)) ** 8)
+        return same * (1.0 - self.remainder * (1.0 - law))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         found: dict[str, Any] = {"value": self.value, "drift": self.drift, "p": self.p_value}
         if self.beside_flexible is not None:
-            found["beside_flexible"] = self.beside_flexible
+            found |= {"remainder": self.remainder, "beside_flexible": self.beside_flexible}
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
 
 
@@ -125,10 +132,20 @@ class _Acts:
     left: Floats
 
 
+def remainder(left: float, explained_below: float) -> float:
+    """Return how surely a stage holds more than noise and the right physics may leave, 0 to 1.
+
+    `left` is its gap with the effects found, `explained_below` the gap up to which it is explained;
+    there it is one half. By the power beyond the floor's.
+    """
+    more, known = max(left**2 - 1.0, 0.0), explained_below**2 - 1.0
+    return more**4 / (more**4 + known**4)
+
+
 def credibility(
-    effect: Effect, case: Case, found: Fit, records: Sequence[Record], remains: bool
+    effect: Effect, case: Case, found: Fit, records: Sequence[Record], remains: float
 ) -> Credibility:
-    """Return an effect's credibility; beside a flexible model only where structure `remains`."""
+    """Return an effect's credibility, beside what `remains` of its stages (`remainder`)."""
     without = case.with_only(found, [other for other in found.effects if other is not effect])
     acts = []
     for output in touched(case.outputs, [effect]):
@@ -136,10 +153,10 @@ def credibility(
         action = output.residual(without) - left
         acts.append(_Acts(output, records[output.record], action, left))
     regimes = _regimes(case, acts)
-    if not remains or not acts:
+    if remains < LEAST_REMAINDER or not acts or effect.signature.drawing == "time":
         return Credibility(effect.name, regimes)
     most = max(acts, key=lambda one: float(one.action @ one.action))
-    return Credibility(effect.name, regimes, _beside_flexible(case, found, most))
+    return Credibility(effect.name, regimes, _beside_flexible(case, found, most), remains)
 
 
 def _beside_flexible(case: Case, found: Fit, one: _Acts) -> float:

@@ -117,7 +117,7 @@ def _diagnose(
         if stage.guilty
     ]
     budget = tuple(one for one in budgets if one is not None)
-    effects = effects_of(case, choice, readers, stages, budget)
+    effects = effects_of(case, choice, readers, stages)
     return Diagnosis(
         control=control,
         verdict=verdict_of(choice, stages, effects, budget),

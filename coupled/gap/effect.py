@@ -146,7 +146,7 @@ class Effect:
     `events`       when the events were that it consists of, in s from the record's start
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
     `mark`         the output that shows it by what it repeats, be it within its limit
-    `reserve`      it passes for others: only tried where without it a stage stays unexplained
+    `reserve`      it passes for others: only tried in a second search (`search`)
     """
 
     name: str

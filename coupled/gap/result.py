@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from coupled.gap.budget import StageBudget
 from coupled.gap.course import Course
-from coupled.gap.credibility import Credibility
+from coupled.gap.credibility import Credibility, remainder
 from coupled.gap.output import Hides, explained_below
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.gap.where import Remains, Where
@@ -60,6 +60,11 @@ class StageResult:
     def unexplained(self) -> bool:
         """Whether it still holds structure that the effects found do not explain."""
         return self.left is not None and self.left > self.explained_below
+
+    @property
+    def remainder(self) -> float:
+        """How surely something remains beside the effects found, 0 to 1 (`credibility`)."""
+        return 0.0 if self.left is None else remainder(self.left, self.explained_below)
 
     @property
     def within_settings(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,12 +14,14 @@ from scipy.stats import t as student
 from coupled.gap import choose
 from coupled.gap.case import Case
 from coupled.gap.choose import searched
+from coupled.gap.diagnose import diagnose
 from coupled.gap.fit import Fit, _half_width, fit
 from coupled.gap.gain import Candidate
 from coupled.gap.information import may_be_plainer, says_nothing
 from coupled.gap.library import BY_NAME
 from coupled.gap.output import Output
 from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
 
 FRAMES = 2400
@@ -112,3 +115,17 @@ def test_noise_is_the_least_that_a_rig_leaves(quiet: float, floor: float) -> Non
     again = case.heard_anew(rig)
     assert (again or case).outputs[0].floor == pytest.approx(floor)
     assert again is None or again.gaps(rig)["linkage"] == pytest.approx(2.0 / floor, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_servos_dead_time_is_no_slower_servo(tmp_path: Path) -> None:
+    """A servo of 0.39 times the frequency leaves 5 % of its gap of 25, within what may be left."""
+    nominal = nominal_rig(False)
+    late = {"servo_delay": {"delay_s": 0.02, "factor": 1.0}}
+    found = diagnose(nominal, {"r.csv": made(tmp_path, nominal, late, 5)})
+    assert found.verdict == "effect"
+    (effect,) = found.effects
+    assert effect.name == "servo_delay"
+    delay = effect.parameters[0]
+    assert delay.low is not None and delay.high is not None
+    assert delay.low < 0.02 < delay.high

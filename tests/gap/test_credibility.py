@@ -1,0 +1,61 @@
+"""What an effect is worth changes smoothly with what remains beside it, and with its drift."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coupled.gap.answer import verdict_of
+from coupled.gap.credibility import Credibility, Regime, remainder
+from coupled.gap.result import EffectResult, StageResult
+
+BOUND = 1.2
+
+
+def drifting(by: float, beside: float | None = None, remains: float = 0.0) -> Credibility:
+    """Return the credibility of an effect whose halves surely differ by so much."""
+    halves = Regime("time_s", 1.0 - 0.5 * by, 1.0 + 0.5 * by, 0.0, 0.0, 12)
+    return Credibility("bend", (halves,), beside, remains)
+
+
+def test_a_remainder_begins_at_the_floor_and_is_even_at_the_bound() -> None:
+    left = np.linspace(0.9, 4.0, 621)
+    known = np.array([remainder(one, BOUND) for one in left])
+    assert np.all(known[left <= 1.0] == 0.0)
+    assert remainder(BOUND, BOUND) == pytest.approx(0.5)
+    assert known[-1] > 0.999
+    assert np.all(np.diff(known) >= 0.0)
+    assert np.max(np.diff(known)) < 0.05  # for 0.005 floors: no cliff
+
+
+def test_credibility_has_no_cliff() -> None:
+    drifts, shares = np.linspace(0.0, 1.0, 501), np.linspace(-0.2, 1.0, 501)
+    by_drift = [drifting(one).value for one in drifts]
+    by_law = [drifting(0.0, one, 1.0).value for one in shares]
+    by_remainder = [drifting(0.0, 0.3, one).value for one in shares.clip(0.0)]
+    for found in (by_drift, by_law, by_remainder):
+        assert np.max(np.abs(np.diff(found))) < 0.03
+    assert np.all(np.diff(by_drift) <= 0.0)
+    assert np.all(np.diff(by_law) >= 0.0)
+    assert by_remainder[0] > 0.99  # where nothing remains, a free model has no say
+
+
+def verdict(probability: float, left: float, rivals: tuple[str, ...] = ()) -> str:
+    """Return the verdict on a bend of so much probability that leaves so much of a gap of 8."""
+    effect: Any = SimpleNamespace(name="bend", stage="linkage")
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=effect, rivals=rivals),))
+    stage = StageResult("linkage", gap=8.0, settled=8.0, limit=BOUND, left=left, guilty=True)
+    budget: Any = SimpleNamespace(stage="linkage", of=lambda name: 0.95)
+    found = EffectResult("bend", "linkage", probability, ())
+    return verdict_of(choice, [stage], [found], [budget])
+
+
+def test_what_imitates_is_unexplained_though_nothing_remains() -> None:
+    """A doubtful effect within the noise was named as certain, with a probability of 0.3."""
+    assert verdict(0.97, 1.0) == "effect"
+    assert verdict(0.97, 1.5) == "mostly"
+    assert verdict(0.4, 1.0) == verdict(0.4, 1.5) == "unexplained"
+    assert verdict(0.49, 1.0, ("stiffening_bend",)) == "ambiguous"
