@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import hypot
 
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, Known, fit
@@ -74,8 +75,16 @@ class Case:
         narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
         if self.refloored is None or rig == self.nominal or narrow:
             return gaps
-        own = stage_gaps(self.refloored(rig), rig)
-        return {stage: min(gap, own.get(stage, gap)) for stage, gap in gaps.items()}
+        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        found: dict[str, float] = {}
+        for one in self.outputs:
+            new = made.get((one.record, one.channel), one)
+            floor = max(
+                one.floor, hypot(min(one.own, new.own), new.carried) if new.carried else new.floor
+            )
+            gap = one.gap(rig) * one.floor / floor
+            found[one.stage] = max(found.get(one.stage, 0.0), gap)
+        return found
 
     def heard_anew(self, rig: Rig) -> Case | None:
         """Return the case with the noise that a rig's residuals have; None where none is lower.

@@ -223,7 +223,7 @@ def _round(
     Outputs are taken by their gap, each for itself: what explains one has no say in what is tried
     for another. One where nothing gains is `idle`, and not tried again until it changes.
     """
-    first = stage_gaps(case.outputs, settled.rig)
+    first = case.gaps(settled.rig)
     now = case.gaps(current.rig)
     limits = stage_limits(case.outputs)
     wide = {at for at, gap in now.items() if gap > explained_below(first[at], limits[at])}

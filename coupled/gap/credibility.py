@@ -12,8 +12,9 @@ what that leaves without the effect, that it does not leave with it. A law that 
 up as well is none that the records have shown. What comes from outside, as a gust, is no law of
 those signals, and is not held so.
 
-Drift counts whatever remains; the free model by how much more remains than noise and the right
-physics may leave (`remainder`). Both go into one smooth number, and so does the probability.
+Drift counts whatever remains; the free model by how surely more remains than noise and the right
+physics may leave, and how much of the gap that is (`remainder`). Both go into one
+smooth number, and that into the probability.
 """
 
 from __future__ import annotations
@@ -33,7 +34,13 @@ from coupled.gap.fit import Fit, touched
 from coupled.gap.flexible import free_share
 from coupled.gap.output import Output
 from coupled.gap.smooth import smoothed
-from coupled.gap.thresholds import DRIFT, FLEXIBLE_LEFT, LEAST_OF_A_HALF, LEAST_REMAINDER
+from coupled.gap.thresholds import (
+    DRIFT,
+    FLEXIBLE_LEFT,
+    LEAST_OF_A_HALF,
+    LEAST_REMAINDER,
+    REMAINDER,
+)
 from coupled.gap.where import response, signals
 from coupled.record.record import Record
 
@@ -80,7 +87,7 @@ class Regime:
 class Credibility:
     """Whether an effect is as large everywhere, and what of it a free model would not take.
 
-    `remainder` is how surely something remains beside it, 0 to 1 (`remainder`); `beside_flexible`
+    `remainder` is how much what remains says against it, 0 to 1 (`remainder`); `beside_flexible`
     None where next to nothing does.
     """
 
@@ -132,14 +139,18 @@ class _Acts:
     left: Floats
 
 
-def remainder(left: float, explained_below: float) -> float:
-    """Return how surely a stage holds more than noise and the right physics may leave, 0 to 1.
+def remainder(gap: float, left: float, explained_below: float) -> float:
+    """Return how much what remains of a stage says against the effects found, 0 to 1.
 
-    `left` is its gap with the effects found, `explained_below` the gap up to which it is explained;
-    there it is one half. By the power beyond the floor's.
+    `gap` is that without them, `left` that with them, `explained_below` the one up to which a stage
+    is explained. How surely more is left than noise and the right physics may leave, by the power
+    beyond the floor's and one half there; and how much that is of the gap: what takes nearly all of
+    a wide one seldom imitates.
     """
     more, known = max(left**2 - 1.0, 0.0), explained_below**2 - 1.0
-    return more**4 / (more**4 + known**4)
+    surely = more**4 / (more**4 + known**4)
+    share = more / max(gap**2 - 1.0, more, 1e-9)
+    return surely * share / (share + REMAINDER)
 
 
 def credibility(

@@ -106,6 +106,11 @@ class Output:
         return left if part == "all" else left[self.rows(part)]
 
     @property
+    def carried(self) -> float:
+        """The part of the floor that is its input's noise, carried through."""
+        return self.floor * self.smoothed
+
+    @property
     def own(self) -> float:
         """The part of the floor that is the channel's own noise, not its input's."""
         return self.floor * math.sqrt(1.0 - self.smoothed**2)

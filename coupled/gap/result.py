@@ -63,8 +63,10 @@ class StageResult:
 
     @property
     def remainder(self) -> float:
-        """How surely something remains beside the effects found, 0 to 1 (`credibility`)."""
-        return 0.0 if self.left is None else remainder(self.left, self.explained_below)
+        """How much what is left says against the effects found, 0 to 1 (`credibility`)."""
+        if self.left is None or self.settled is None:
+            return 0.0
+        return remainder(self.settled, self.left, self.explained_below)
 
     @property
     def within_settings(self) -> bool:

@@ -11,6 +11,7 @@ import pytest
 from coupled.gap.answer import verdict_of
 from coupled.gap.credibility import Credibility, Regime, remainder
 from coupled.gap.result import EffectResult, StageResult
+from coupled.gap.thresholds import REMAINDER
 
 BOUND = 1.2
 
@@ -23,10 +24,12 @@ def drifting(by: float, beside: float | None = None, remains: float = 0.0) -> Cr
 
 def test_a_remainder_begins_at_the_floor_and_is_even_at_the_bound() -> None:
     left = np.linspace(0.9, 4.0, 621)
-    known = np.array([remainder(one, BOUND) for one in left])
+    known = np.array([remainder(6.0, one, BOUND) for one in left])
     assert np.all(known[left <= 1.0] == 0.0)
-    assert remainder(BOUND, BOUND) == pytest.approx(0.5)
-    assert known[-1] > 0.999
+    share = (BOUND**2 - 1.0) / (6.0**2 - 1.0)
+    assert remainder(6.0, BOUND, BOUND) == pytest.approx(0.5 * share / (share + REMAINDER))
+    assert known[-1] > 0.95
+    assert remainder(60.0, 1.5, BOUND) < 0.1 * remainder(3.0, 1.5, BOUND)  # of a wide gap, little
     assert np.all(np.diff(known) >= 0.0)
     assert np.max(np.diff(known)) < 0.05  # for 0.005 floors: no cliff
 
