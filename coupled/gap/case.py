@@ -105,7 +105,7 @@ class Case:
             else old
             for old, new in pairs
         ]
-        return replace(self, outputs=outputs, _known={})
+        return replace(self, outputs=outputs)
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the settings whose number none of these effects frees, nor is the same law as.
