@@ -7,11 +7,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 
+from coupled.gap.course import Bounds
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, Known, fit
 from coupled.gap.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.settings import contact, is_dry, settings
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
+from coupled.gap.timed import Timing, timed
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -22,7 +24,8 @@ Tell = Callable[[str, int, int], None]
 class Case:
     """What the search works on: a nominal rig, and the outputs of its records.
 
-    `refloored` gives the outputs with the floors of another rig.
+    `refloored` gives the outputs with the floors of another rig; `timings` are of the effects that
+    begin within the record, and of all that free the same numbers, with the onsets as seen.
     """
 
     nominal: Rig
@@ -32,6 +35,7 @@ class Case:
     refloored: Callable[[Rig], Sequence[Output]] | None = None
     # A model with an error of its own strains its settings: only a stage over its limit is guilty.
     only_wide: bool = False
+    timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
     # Its fits: a case of other outputs, made by `replace`, begins with none.
     _known: Known = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -106,6 +110,29 @@ class Case:
             for old, new in pairs
         ]
         return replace(self, outputs=outputs)
+
+    def timed(self, effect: Effect, timing: Timing, seen: Bounds) -> Case:
+        """Return the case with outputs in which an effect's size goes with time."""
+
+        def ours(outputs: Sequence[Output]) -> list[Output]:
+            given = (self.nominal, self.control, effect, timing)
+            return [timed(o, *given) if o.stage in effect.shows_in else o for o in outputs]
+
+        before = self.refloored
+        return replace(
+            self,
+            outputs=ours(self.outputs),
+            refloored=None if before is None else lambda rig: ours(before(rig)),
+            timings=(*self.timings, (effect, timing, seen)),
+        )
+
+    def timing(self, effect: Effect) -> tuple[Timing, Bounds] | None:
+        """Return the timing of an effect that begins within the record; None of any other."""
+        keys = {p.key for p in effect.parameters}
+        each = (
+            (timing, seen, {p.key for p in one.parameters}) for one, timing, seen in self.timings
+        )
+        return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the settings whose number none of these effects frees, nor is the same law as.

@@ -9,8 +9,10 @@ part of the action is there, 1 where it is as large as everywhere.
 
 And it is held beside a model free in form of the stage's own signals (`flexible`): the share of
 what that leaves without the effect, that it does not leave with it. A law that such a model takes
-up as well is none that the records have shown. What comes from outside, as a gust, is no law of
-those signals, and is not held so.
+up as well says nothing beside it, be it right or wrong: a bend is a function of the force. Then it
+is held against that model: one number that leaves no more than a hundred free ones is the law, and
+what imitates another leaves more. What comes from outside, as a gust, is no law of those signals,
+and is not held so.
 
 Drift counts whatever remains; the free model by how surely more remains than noise and the right
 physics may leave, and how much of the gap that is (`remainder`). Both go into one
@@ -88,12 +90,14 @@ class Credibility:
     """Whether an effect is as large everywhere, and what of it a free model would not take.
 
     `remainder` is how much what remains says against it, 0 to 1 (`remainder`); `beside_flexible`
-    None where next to nothing does.
+    and `against_flexible`, what the free model leaves alone over what the effects do, are None
+    where next to nothing does.
     """
 
     effect: str
     regimes: tuple[Regime, ...]
     beside_flexible: float | None = None
+    against_flexible: float | None = None
     remainder: float = 0.0
 
     @property
@@ -116,16 +120,18 @@ class Credibility:
     def value(self) -> float:
         """A number from 1, as large everywhere and no function of a signal, to 0; smooth."""
         same = 1.0 / (1.0 + (self.drift / DRIFT) ** 4)
-        if self.beside_flexible is None:
+        if self.beside_flexible is None or self.against_flexible is None:
             return same
-        law = 1.0 / (1.0 + (FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)) ** 8)
-        return same * (1.0 - self.remainder * (1.0 - law))
+        needed = FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)
+        needed = min(needed, 1.0 / max(self.against_flexible, 1e-9))
+        return same * (1.0 - self.remainder * (1.0 - 1.0 / (1.0 + needed**8)))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         found: dict[str, Any] = {"value": self.value, "drift": self.drift, "p": self.p_value}
         if self.beside_flexible is not None:
             found |= {"remainder": self.remainder, "beside_flexible": self.beside_flexible}
+            found["against_flexible"] = self.against_flexible
         return found | {"regimes": [one.as_dict() for one in self.regimes]}
 
 
@@ -167,18 +173,24 @@ def credibility(
     if remains < LEAST_REMAINDER or not acts or effect.signature.drawing == "time":
         return Credibility(effect.name, regimes)
     most = max(acts, key=lambda one: float(one.action @ one.action))
-    return Credibility(effect.name, regimes, _beside_flexible(case, found, most), remains)
+    return Credibility(effect.name, regimes, *_flexible(case, found, most), remains)
 
 
-def _beside_flexible(case: Case, found: Fit, one: _Acts) -> float:
-    """Return the share of what a free model leaves without the effect, that it takes beside it."""
+def _flexible(case: Case, found: Fit, one: _Acts) -> tuple[float, float]:
+    """Return the share of what a free model leaves without the effect, that it takes beside it.
+
+    And what that model leaves, over what the effects leave without it.
+    """
     known = signals(one.output.stage, one.record, case.control, one.output.frame_rate_Hz)
     answers = response(one.output, found.rig, one.record, case.control)
     leaves = []
     for left in (one.left, one.left + one.action):
         share, _ = free_share(one.output, left, known, answers)
         leaves.append(float(left @ left) * (1.0 - share))
-    return 1.0 - leaves[0] / leaves[1] if leaves[1] > 0.0 else 0.0
+    if leaves[1] <= 0.0:
+        return 0.0, 0.0
+    power = max(float(one.left @ one.left), 1e-300)
+    return 1.0 - leaves[0] / leaves[1], leaves[1] / power
 
 
 def _regimes(case: Case, acts: Sequence[_Acts]) -> tuple[Regime, ...]:

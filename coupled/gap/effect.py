@@ -247,7 +247,7 @@ def apply(
     changes["compensation.basic_gradient_N_per_{d}"] = data.assumed_basic_gradient
     changes["compensation.breakout_N"] = data.assumed_breakout
     d = unit_of(control)
-    return rig.changed({_dotted(key, control).format(d=d): new for key, new in changes.items()})
+    return rig.changed({dotted(key, control).format(d=d): new for key, new in changes.items()})
 
 
 def possible(
@@ -260,7 +260,8 @@ def possible(
         return None
 
 
-def _dotted(key: str, control: ControlName) -> str:
+def dotted(key: str, control: ControlName) -> str:
+    """Return the key of a rig file for a key of a control, or of the flight."""
     return key if key.startswith("flight.") else f"controls.{control}.{key}"
 
 

@@ -182,6 +182,10 @@ COURSE_WINDOW_s = 0.5  # chosen: windows in which an effect has a size
 COURSE_POWER = 0.01  # chosen: of a window's mean action, under which it has none
 COURSE_GAIN = 8.0  # chosen: log-likelihood by which a course must beat one that is the same always
 COURSE_CHANGES = 0.3  # chosen: of its size, by which what changes must do so in the record
+ONSETS_s = 0.1  # chosen: between the onsets that are tried
+LATER_LEFT = 0.25  # chosen: of what is left without it, the most that an onset may leave
+BEGUN = 4  # chosen: windows from the record's start, within which nothing is said to begin
+LATER_TRIED = 3  # chosen: effects of which a course is sought where something is unexplained
 WHERE_LOUD = 2.0  # chosen: floors from which a window shows the gap
 WHERE_SHARE = 0.05  # chosen: least share of the variance that is worth saying
 NO_SIGN = 0.05  # chosen: of a signal's rms, under which its sign is not sure
@@ -225,5 +229,6 @@ DRIFT = 0.12  # of an effect's size, by which it surely differs from half to hal
 # And on three made ones: Coulomb friction for one that yields by 0.2 and 0.5 mm takes 0.99 and 0.89
 # beside a free model, viscous damping for one by the square of the speed 0.65; of ten wrong effects
 # of the same seeds nine take under 0.5, and a lag for a hysteresis of the schedule 0.75.
-FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it
+FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it,
+# or else leave no more than that model does alone: docs/diagnosis.md says of what it was tried on.
 LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size

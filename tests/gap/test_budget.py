@@ -10,6 +10,7 @@ import pytest
 
 from coupled.gap import diagnose as diagnosing
 from coupled.gap.budget import NOISE, UNEXPLAINED
+from coupled.gap.credibility import Credibility, Regime
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import apply
 from coupled.gap.flown import ChannelAgain, nearer
@@ -126,3 +127,14 @@ def test_a_rig_that_flies_further_from_the_record_is_not_offered() -> None:
     assert nearer([]) and nearer([same]) and nearer([same, better])
     assert not nearer([same, worse])
     assert not nearer([better, worse])
+
+
+def test_an_effect_that_does_as_well_as_a_free_model_is_credible() -> None:
+    """What a free model contains takes nothing beside it; what it does better than is doubtful."""
+    same = (Regime("time_s", 1.0, 1.0, 0.01, 0.01, 20),)
+    assert Credibility("play", same, 0.2, 2.0, 1.0).value > 0.95
+    assert Credibility("bend", same, 0.99, 0.3, 1.0).value > 0.85
+    assert Credibility("imitation", same, 0.5, 0.5, 1.0).value < 0.05
+    assert Credibility("between", same, 0.0, 1.0, 1.0).value == pytest.approx(0.5, abs=0.01)
+    drifts = (Regime("time_s", 0.5, 1.5, 0.01, 0.01, 20),)
+    assert Credibility("drifts", drifts, 0.2, 2.0, 1.0).value < 0.05

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,15 @@ from numpy.typing import NDArray
 from coupled.gap.course import Bounds, Course, course_of, course_of_events
 from coupled.gap.diagnose import diagnose
 from coupled.gap.onset import in_time
+from coupled.gap.timed import Timing, timing_of
 from coupled.record.record import Record
-from tests.support.gaps import made, nominal_rig
+from tests.support.gaps import LONG_s, made, nominal_rig
 
 RATE_Hz, LASTS_s = 120.0, 40.0
 T_s = np.arange(round(LASTS_s * RATE_Hz)) / RATE_Hz
 VALUE = Bounds(2.0, 1.9, 2.1)
 Floats = NDArray[np.float64]
+Size = Callable[[Floats], Floats]
 
 
 def seen(size: Floats, seed: int = 1, action: Floats | None = None) -> Course:
@@ -114,22 +117,83 @@ def test_a_gap_that_grows_with_amplitude_has_no_onset() -> None:
     assert jam.ends.low_s <= 30.0 <= jam.ends.high_s
 
 
+def coming(tmp_path: Path, values: dict[str, dict[str, float]], size: Size) -> Record:
+    """Return a record of a linkage whose effect has a size in time; what it does goes with that."""
+    nominal = nominal_rig(False)
+    whole, faulty = (made(tmp_path, nominal, some, 4) for some in ({}, values))
+    data, at = whole.data.copy(), whole.channels.index("column_deflection_m")
+    data[:, at] += size(whole.time_s) * (faulty.data - whole.data)[:, at]
+    return Record(whole.channels, data)
+
+
+BENT = {"bend": {"bend_{d}_per_N": 1.6e-4}}
+BENT_MORE = BENT["bend"]["bend_{d}_per_N"] - 9.14e-5
+
+
 @pytest.mark.slow
 def test_a_bend_that_comes_late_is_said_in_time(tmp_path: Path) -> None:
-    nominal = nominal_rig(False)
-    bent = made(tmp_path, nominal, {"bend": {"bend_{d}_per_N": 1.6e-4}}, 4)
-    whole = made(tmp_path, nominal, {}, 4)
-    data, at = bent.data.copy(), bent.channels.index("column_deflection_m")
-    data[:1500, at] = whole.data[:1500, at]
-    found = diagnose(nominal, {"r.csv": Record(bent.channels, data)})
+    record = coming(tmp_path, BENT, lambda t: np.where(t < 12.5, 0.0, 1.0))
+    found = diagnose(nominal_rig(False), {"r.csv": record})
+    assert found.verdict == "effect"
     (effect,) = found.effects
+    assert effect.parameters[0].found == pytest.approx(1.6e-4, rel=0.015)
     course = effect.course
     assert course is not None and course.onset_s is not None
     assert course.onset_s.low <= 12.5 <= course.onset_s.high
     assert "Bend: from 12.5 s on (12.3 to 12.8), then 1.60e-4 m/N." in found.summary
     said = effect.as_dict()["course"]
     assert said["kind"] == "from"
-    assert said["onset_s"]["value"] == pytest.approx(12.5, abs=0.3)
+    assert said["onset_s"]["value"] == pytest.approx(12.5, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_bend_that_wears_from_nothing_is_as_large_as_at_the_end(tmp_path: Path) -> None:
+    """What is said of it is its size at the record's end, and by how much it grew in a second."""
+    begins_s = 15.0
+    over_s = LONG_s - begins_s
+    record = coming(tmp_path, BENT, lambda t: np.maximum(t - begins_s, 0.0) / over_s)
+    found = diagnose(nominal_rig(False), {"r.csv": record})
+    assert found.verdict == "effect"
+    (effect,) = found.effects
+    assert effect.parameters[0].found == pytest.approx(1.6e-4, rel=0.015)
+    course = effect.course
+    assert course is not None and course.kind == "grows"
+    assert course.onset_s is not None and course.rate_per_s is not None
+    assert course.onset_s.low <= begins_s <= course.onset_s.high
+    assert course.rate_per_s.low <= BENT_MORE / over_s <= course.rate_per_s.high
+
+
+@pytest.mark.slow
+def test_what_changes_from_the_first_is_said_and_no_cause(tmp_path: Path) -> None:
+    found = diagnose(nominal_rig(False), {"r": coming(tmp_path, BENT, lambda t: t / LONG_s)})
+    assert found.verdict == "unexplained"
+    (effect,) = found.effects
+    course = effect.course
+    assert course is not None and course.kind == "changes" and course.rate_per_s is not None
+    assert course.rate_per_s.low <= BENT_MORE / LONG_s <= course.rate_per_s.high
+
+
+@pytest.mark.slow
+def test_a_play_that_comes_late_is_as_large_as_it_is(tmp_path: Path) -> None:
+    values = {"backlash": {"play_{d}": 1.5e-3}}
+    record = coming(tmp_path, values, lambda t: np.where(t < 22.0, 0.0, 1.0))
+    found = diagnose(nominal_rig(False), {"r.csv": record})
+    assert found.verdict == "effect"
+    (effect,) = found.effects
+    assert effect.name == "backlash"
+    assert effect.value == pytest.approx(1.5e-3, rel=0.02)
+
+
+@pytest.mark.parametrize("timing", [Timing(20.0, False), Timing(12.0, True), Timing(30.0, True)])
+def test_a_timing_is_found_by_what_an_effect_does(timing: Timing) -> None:
+    rng = np.random.default_rng(4)
+    action = np.sin(1.3 * T_s) + 0.4 * np.sin(3.1 * T_s)
+    size = timing.size(len(T_s), RATE_Hz)
+    left = size * 5.0 * action - action + 0.5 * rng.standard_normal(len(T_s))
+    found = timing_of([(action, left)], RATE_Hz)
+    assert found.grows == timing.grows
+    assert found.onset_s == pytest.approx(timing.onset_s, abs=0.25)
+    assert size.max() == 1.0
 
 
 @pytest.mark.slow

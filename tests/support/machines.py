@@ -217,3 +217,42 @@ def axis_rig(rate_Hz: float = 25.0, friction_N: float = 0.0) -> Rig:
     """Return the rig of that slide."""
     numbers = {"mass_kg": 95.0, "damping_N_s_per_m": 200.0, "friction_N": friction_N}
     return plain_rig(rate_Hz, numbers)
+
+
+def sprung(
+    friction: Signal,
+    rate_Hz: float = 100.0,
+    seconds: float = 40.0,
+    noise: tuple[float, float] = (0.05, 5e-6),
+    seed: int = 5,
+) -> Record:
+    """Return a record of a mass on a spring, whose dry friction goes with time as `friction` says.
+
+    2 kg, 40 N·s/m and 1000 N/m; tanh of the speed over 0.3 mm/s rubs; scipy's LSODA.
+    """
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(seconds * rate_Hz)) / rate_Hz
+    lines = ((14.0, 0.23, 0.3), (9.0, 0.61, 2.0), (5.0, 1.7, 4.0))
+    starts = sum(size * np.sin(phase) for size, _, phase in lines)
+
+    def pull(t: Floats) -> Floats:
+        wave = sum(size * np.sin(2.0 * np.pi * f * t + phase) for size, f, phase in lines)
+        return np.asarray((wave - starts) * np.clip(t, 0.0, 1.0))
+
+    def rates(t: float, y: Floats) -> tuple[float, float]:
+        now = np.asarray(t)
+        rubbing = float(friction(now)) * np.tanh(y[1] / 3e-4)
+        return y[1], (float(pull(now)) - 40.0 * y[1] - 1000.0 * y[0] - rubbing) / 2.0
+
+    way = solve_ivp(
+        rates, (0.0, times[-1]), (0.0, 0.0), "LSODA", times, rtol=1e-7, atol=1e-10, max_step=0.01
+    )
+    hiss = rng.normal(size=(2, len(times)))
+    return recorded(
+        rate_Hz, force_N=pull(times) + noise[0] * hiss[0], computed_m=way.y[0] + noise[1] * hiss[1]
+    )
+
+
+def sprung_rig(rate_Hz: float = 100.0) -> Rig:
+    """Return the rig of that mass, without friction."""
+    return plain_rig(rate_Hz, {"mass_kg": 2.0, "damping_N_s_per_m": 40.0}, 1000.0)
