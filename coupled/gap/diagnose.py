@@ -21,6 +21,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice
+from coupled.gap.counts import as_counted
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.drives import as_driven
 from coupled.gap.effect import Effect
@@ -82,6 +83,7 @@ def _diagnose(
         check_record(rig, record, control, file)
         if rig.flight is not None:
             check_trim(trim_speed(rig), record, file)
+    rig = as_counted(rig, list(records.values()), control)
     readers = [
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]

@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from coupled.gap.counts import as_counted
 from coupled.gap.diagnose import diagnose
 from coupled.gap.drives import as_driven, in_set_points
 from coupled.gap.nominal import fit_nominal
+from coupled.record.record import Record
 from tests.support.machines import servo, servo_rig, set_points
 
 POINTS = set_points(50.0, 40.0, 1)
@@ -73,3 +75,15 @@ def test_a_servos_numbers_are_fitted_with_its_dead_time() -> None:
         assert numbers[key].interval is not None
         low, high = numbers[key].interval or (0.0, 0.0)
         assert low < wanted < high, (key, low, high)
+
+
+def test_an_encoders_zero_is_known_to_a_count_and_no_finer() -> None:
+    record = servo(POINTS)
+    key = "sensing.deflection_zero_m"
+    counted = as_counted(servo_rig(), [record], "column")
+    assert counted.controls["column"].tolerance == {key: pytest.approx(1.5e-3)}
+    filed = servo_rig().changed({"controls.column.tolerance": {key: 0.01}})
+    assert as_counted(filed, [record], "column") == filed
+    data = record.data + np.random.default_rng(3).normal(0.0, 3e-3, record.data.shape)
+    fine = Record(record.channels, np.column_stack((record.time_s, data[:, 1:])))
+    assert as_counted(servo_rig(), [fine], "column") == servo_rig()
