@@ -17,7 +17,7 @@ ZEROS = {"deflection": "sensing.deflection_zero_{d}", "force": "sensing.force_ze
 def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
     """Return the rig with zeros that may be off by a count of their channels, where these count.
 
-    A channel counts where its rounding is half of its noise or more. What the file says of a zero stays.
+    A channel counts where its rounding is half of its noise or more. What the file says stays.
     """
     known = rig.controls[control].tolerance
     found = dict(known)
