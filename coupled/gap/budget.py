@@ -83,10 +83,7 @@ def stage_budget(
     `found` is fitted on the stretches that are not held out; `floors` are those of the improved
     rig by record and channel, where they are higher.
     """
-    outputs = _outputs(stage, case.outputs, settled)
-    if not outputs:  # its effects show in those of a neighbour
-        shown = {at for e in found.effects if e.stage == stage for at in e.shows_in}
-        outputs = [output for output in case.outputs if output.stage in shown]
+    outputs = _outputs(stage, case.outputs, settled, found)
     if not outputs:
         return None
     players = [e for e in found.effects if touched(outputs, [e])]
@@ -103,10 +100,15 @@ def stage_budget(
     return StageBudget(stage, tuple(each[:-2]), each[-2], each[-1])
 
 
-def _outputs(stage: str, outputs: Sequence[Output], settled: Fit) -> list[Output]:
-    """Return the outputs whose power is shared out: those of the stage that show a gap."""
-    names = STAGE_OF[stage].outputs or STAGE_OF[stage].effects_show_in
-    own = [output for output in outputs if output.stage in names]
+def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) -> list[Output]:
+    """Return the outputs whose power is shared out: those that show a gap.
+
+    They are the stage's own; of a stage without any, those of its neighbours in which its effects
+    show: what else is wrong with a neighbour is no part of it.
+    """
+    shown = {at for e in found.effects if e.stage == stage for at in e.shows_in}
+    own = [output for output in outputs if output.stage in STAGE_OF[stage].outputs]
+    own = own or [output for output in outputs if output.stage in shown]
     wide = [output for output in own if output.gap(settled.rig) > output.limit]
     return wide or sorted(own, key=lambda o: -o.gap(settled.rig))[:1]
 

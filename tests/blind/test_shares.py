@@ -7,8 +7,10 @@ import pytest
 
 from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.readings import same_law
-from coupled.blind.trials.shares import _shared
+from coupled.blind.trials.shares import _judged, _shared
 from coupled.blind.trials.trial import Plan, draw_trial
+from coupled.gap.output import Output
+from tests.support.rigs import bench
 
 
 def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
@@ -22,6 +24,23 @@ def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
     # What the rig has besides, here three floors² more, is no part of the gap.
     besides = _shared(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
     assert besides == pytest.approx({"a": 0.3, "b": 0.6})
+    # A floor taken for 1.7 times as high as the noise is says nothing of what an effect holds.
+    quiet = _shared(a, {none: 0.36, a: 1.44})
+    assert quiet == pytest.approx({"a": 0.75})
+
+
+def test_a_stage_without_an_output_is_judged_where_its_effects_show() -> None:
+    """A loader that has a gap of its own is no part of what the transducer's zero holds."""
+    still = np.zeros(2400)
+    noise = np.random.default_rng(1).normal(0.0, 1.0, 2400)
+    outputs = [
+        Output(name, name, gap * noise, lambda rig: still, 1.0, 120.0)
+        for name, gap in (("loader", 3.0), ("linkage", 2.0))
+    ]
+    seen = _judged("sensing", outputs, bench({}), frozenset(["deflection_zero"]))
+    assert [output.stage for output in seen] == ["linkage"]
+    both = _judged("sensing", outputs, bench({}), frozenset(["force_scale"]))
+    assert [output.stage for output in both] == ["loader", "linkage"]
 
 
 def test_friction_that_yields_is_friction() -> None:

@@ -3,7 +3,8 @@
 The budget of a diagnosis shares out the power of a stage's residual (docs/diagnosis.md). Here the
 twin is flown with every subset of its effects, the same noise in each, and an effect's share is
 what it takes off on the mean over all orders (Shapley). What the rig has besides, settings and
-friction that yields, is no part of it.
+friction that yields, is no part of it. Noise is what the rig leaves without any effect, and no more
+than the floor: the rest of that is what it has besides.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.library import BY_NAME
 from coupled.gap.output import Output
 from coupled.gap.shapley import shapley_weights
 from coupled.record.record import Record
@@ -34,16 +36,21 @@ def true_shares(
     every = max(outputs, key=len)
     found = {}
     for stage in stages:
-        judged = _judged(stage, outputs[every], rig)
+        judged = _judged(stage, outputs[every], rig, every)
         if judged:
             powers = {had: _power(judged, made, rig) for had, made in outputs.items()}
             found[stage] = _shared(every, powers)
     return found
 
 
-def _judged(stage: str, outputs: Sequence[Output], rig: Rig) -> list[Output]:
-    """Return the outputs of a stage whose power is shared out: those that show a gap."""
-    names = STAGE_OF[stage].outputs or STAGE_OF[stage].effects_show_in
+def _judged(stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset) -> list[Output]:
+    """Return the outputs whose power is shared out: those that show a gap.
+
+    They are the stage's own, or of a stage without any those in which its effects show.
+    """
+    here = [BY_NAME[name] for name in effects if name in BY_NAME]
+    shown = {output for effect in here if effect.stage == stage for output in effect.shows_in}
+    names = STAGE_OF[stage].outputs or shown
     own = [output for output in outputs if output.stage in names]
     wide = [output for output in own if output.gap(rig) > output.limit]
     return wide or sorted(own, key=lambda output: -output.gap(rig))[:1]
@@ -60,13 +67,17 @@ def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:
 
 
 def _shared(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
-    """Return each effect's share of the power with all of them, noise of one floor² with it."""
+    """Return each effect's share of the power with all of them, and of noise.
+
+    Noise is what is left without any, at most one floor².
+    """
     names = sorted(every)
     explained = [
         frozenset(name for i, name in enumerate(names) if subset & 1 << i)
         for subset in range(2 ** len(names))
     ]
     left = np.array([powers[every - known] for known in explained])
-    whole = powers[every] - powers[frozenset()] + 1.0
+    without = powers[frozenset()]
+    whole = powers[every] - without + min(without, 1.0)
     held = shapley_weights(len(names)) @ left
     return {name: float(share / whole) for name, share in zip(names, held, strict=True)}
