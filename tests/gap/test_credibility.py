@@ -16,10 +16,13 @@ from coupled.gap.thresholds import REMAINDER
 BOUND = 1.2
 
 
-def drifting(by: float, beside: float | None = None, remains: float = 0.0) -> Credibility:
+def drifting(
+    by: float, beside: float | None = None, remains: float = 0.0, against: float = 0.0
+) -> Credibility:
     """Return the credibility of an effect whose halves surely differ by so much."""
     halves = Regime("time_s", 1.0 - 0.5 * by, 1.0 + 0.5 * by, 0.0, 0.0, 12)
-    return Credibility("bend", (halves,), beside, remains)
+    alone = None if beside is None else against
+    return Credibility("bend", (halves,), beside, alone, remainder=remains)
 
 
 def test_a_remainder_begins_at_the_floor_and_is_even_at_the_bound() -> None:
@@ -39,10 +42,14 @@ def test_credibility_has_no_cliff() -> None:
     by_drift = [drifting(one).value for one in drifts]
     by_law = [drifting(0.0, one, 1.0).value for one in shares]
     by_remainder = [drifting(0.0, 0.3, one).value for one in shares.clip(0.0)]
-    for found in (by_drift, by_law, by_remainder):
+    by_model = [drifting(0.0, 0.0, 1.0, one).value for one in np.linspace(0.0, 2.0, 1001)]
+    for found in (by_drift, by_law, by_remainder, by_model):
         assert np.max(np.abs(np.diff(found))) < 0.03
     assert np.all(np.diff(by_drift) <= 0.0)
     assert np.all(np.diff(by_law) >= 0.0)
+    assert np.all(np.diff(by_model) >= 0.0)
+    assert by_law[-1] - by_law[0] > 0.9
+    assert by_model[-1] - by_model[0] > 0.9
     assert by_remainder[0] > 0.99  # where nothing remains, a free model has no say
 
 
