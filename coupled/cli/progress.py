@@ -79,6 +79,6 @@ def _starting() -> str:
     from coupled.rig.compiled import compiled_before
     from coupled.rig.frame import step_frame_at
 
-    if compiled_before(step_frame_at):  # for one kind of rig: others have other kernels
-        return "starting (the first rig of each kind compiles the physics)"
+    if compiled_before(step_frame_at):
+        return "starting"
     return "starting (the first start compiles the physics)"

@@ -96,6 +96,7 @@ class JSBSimAirframe:
     """
 
     motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
+    whole_motion: Callable[[], tuple[float, ...]]  # with zeros for those that its rig has not
     step: Step  # one frame with commands about trim
 
     def __init__(
@@ -114,7 +115,7 @@ class JSBSimAirframe:
         self._fdm = self._load(models, frame_s, wrappers)
         self._trim(wrappers)
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
-        self.motion = motion_reader(
+        self.motion, self.whole_motion = motion_reader(
             [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES],
             [self._node(name).get_double_value for name in LATERAL_PROPERTIES] if lateral else [],
         )

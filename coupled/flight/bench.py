@@ -6,11 +6,16 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Protocol
 
+from coupled.record.channels import BENCH_MOTION, WHOLE_MOTION
+
+_NO_AIRCRAFT = (0.0,) * (WHOLE_MOTION - len(BENCH_MOTION))
+
 
 class Airframe(Protocol):
     """What the frame loop flies: an aircraft, or a bench that only gives q̄."""
 
     motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
+    whole_motion: Callable[[], tuple[float, ...]]  # with zeros for those that it has not
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
     safe_altitude_m: float  # above it there is no ground to meet
 
@@ -30,6 +35,7 @@ class Bench:
         self._k = 0
         self.safe_altitude_m = 0.0
         self.motion = self._now
+        self.whole_motion = self._whole
         self.step = self._next
 
     def _now(self) -> tuple[float, ...]:
@@ -41,6 +47,9 @@ class Bench:
             if time < t1:
                 return (q0 + (q1 - q0) * (time - t0) / (t1 - t0),)
         return (points[-1][1],)
+
+    def _whole(self) -> tuple[float, ...]:
+        return self._now() + _NO_AIRCRAFT
 
     def _next(self, commands: tuple[float, float, float], /) -> None:
         self._k += 1

@@ -31,6 +31,7 @@ LATERAL_PROPERTIES = (
 )
 assert len(LONGITUDINAL_PROPERTIES) == len(LONGITUDINAL)
 assert len(LATERAL_PROPERTIES) == len(LATERAL)
+_LONGITUDINAL = len(LONGITUDINAL)
 # By channel; JSBSim has all but q̄, airspeed and height in SI, too.
 PROPERTIES = dict(
     zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
@@ -44,13 +45,23 @@ class Lever(NamedTuple):
     read: Callable[[], float]
 
 
+class Motion(NamedTuple):
+    """What reads the motion, in SI: the channels that there are, and with zeros for the others."""
+
+    read: Callable[[], tuple[float, ...]]
+    read_whole: Callable[[], tuple[float, ...]]
+
+
 def motion_reader(
     longitudinal: Sequence[Callable[[], float]], lateral: Sequence[Callable[[], float]]
-) -> Callable[[], tuple[float, ...]]:
-    """Return a function that reads the motion in SI; written out, since every frame calls it."""
+) -> Motion:
+    """Return what reads the motion; written out, since every frame calls it."""
     qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = longitudinal
 
     def column() -> tuple[float, ...]:
+        return whole_column()[:_LONGITUDINAL]
+
+    def whole_column() -> tuple[float, ...]:
         return (
             qbar() * PSF_Pa,
             load(),
@@ -60,16 +71,30 @@ def motion_reader(
             pitch(),
             speed() * FOOT_m,
             height() * FOOT_m,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
         )
 
     if not lateral:
-        return column
+        return Motion(column, whole_column)
     aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
 
     def all_controls() -> tuple[float, ...]:
         turned = heading()  # from 0 to 2π, north being either
         return (
-            *column(),
+            qbar() * PSF_Pa,
+            load(),
+            elevator(),
+            pitch_rate(),
+            alpha(),
+            pitch(),
+            speed() * FOOT_m,
+            height() * FOOT_m,
             aileron(),
             rudder(),
             roll_rate(),
@@ -79,7 +104,7 @@ def motion_reader(
             turned if turned <= math.pi else turned - 2.0 * math.pi,
         )
 
-    return all_controls
+    return Motion(all_controls, all_controls)
 
 
 def stepper(

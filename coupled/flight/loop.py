@@ -78,7 +78,7 @@ def fly(
     served = Served(manoeuvre, controls, companion is not None and companion.leads)
     extra: list[tuple[float, ...]] = []
 
-    read, step, safe_m = airframe.motion, airframe.step, airframe.safe_altitude_m
+    read, step, safe_m = airframe.whole_motion, airframe.step, airframe.safe_altitude_m
     arrays = addresses(controls, script, data, companion is not None and companion.elsewhere)
     place = int(arrays.ctypes.data)
     rig_frame = served.around(bound(step_frame_at, place, 0, read(), 1.0))

@@ -76,7 +76,7 @@ class Attached:
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
         place = addresses(controls, self._aboard.script, row, elsewhere=True)
-        motion = self._aboard.airframe.motion()
+        motion = self._aboard.airframe.whole_motion()
         while True:
             self._put(controls)
             row[:] = 0.0

@@ -79,6 +79,7 @@ LATERAL = (
     "roll_rad",
     "heading_rad",
 )
+WHOLE_MOTION = len(LONGITUDINAL) + len(LATERAL)  # what the rig's frame is given, on any rig
 # In the motion of a rig with wheel or pedals they follow the longitudinal ones.
 ROLL = len(LONGITUDINAL) + LATERAL.index("roll_rad")
 HEADING = len(LONGITUDINAL) + LATERAL.index("heading_rad")

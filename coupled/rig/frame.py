@@ -200,7 +200,7 @@ def host_frames(
     first_command = second_command = third_command = 0.0
     pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
     # Here, not after the flight: a frame then leaves no object behind.
-    for i in range(len(motion)):
+    for i in range(min(len(motion), len(row) - pressure_at)):
         row[pressure_at + i] += motion[i]
     if controls[0].parameters.crossing.joined != 0:
         for i in range(len(controls)):
@@ -235,7 +235,7 @@ def step_frame(
     script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
     record    shape (frames, channels): t, 10 a control, the motion; comes holding the noise
               that is added to what is read
-    motion    of the airframe at t_k, q̄ in Pa first
+    motion    of the airframe at t_k, q̄ in Pa first; the record takes as much as it has room for
     The commands are in ±1, one a control, 0 for a control that is absent.
     """
     if k == 0:
@@ -275,7 +275,8 @@ def step_frame_at(
 ) -> tuple[float, float, float]:
     """Run `step_frame` on the arrays whose addresses stand at `address`.
 
-    To hand over three arrays at every frame costs as much as half of the physics.
+    To hand over three arrays at every frame costs as much as half of the physics. A flight gives
+    the whole motion (`channels.WHOLE_MOTION`) on any rig, so that one kernel serves all.
     """
     at = carray(pointer(address), 8, np.int64)
     controls = carray(pointer(at[0]), (at[1],), CONTROL)
