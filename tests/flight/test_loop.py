@@ -17,6 +17,7 @@ from coupled.record.channels import record_channels
 from coupled.record.record import FORMAT, manifest_path, read_record, write_record
 from coupled.resources import shipped_rigs
 from coupled.rig.compiled import bound
+from coupled.rig.frame import step_frame_at
 from coupled.rig.rigfile import read_rig, rig_from_table
 from tests.support.runs import shortened
 
@@ -46,6 +47,13 @@ def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
         write_record(fly(flown), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     assert manifest_path(paths[0]).read_bytes() == manifest_path(paths[1]).read_bytes()
+
+
+def test_one_kernel_flies_every_kind_of_rig() -> None:
+    """Each kind of its own would compile for ten seconds more."""
+    for run, controls in (("pull-up-c172p", 1), ("three-controls", 3), ("appendix-c", 1)):
+        fly(shortened(run, controls, 2))
+    (_,) = step_frame_at.signatures
 
 
 def test_a_heading_starts_at_north_and_turns_to_either_side_of_it() -> None:

@@ -227,6 +227,28 @@ def test_noise_is_of_the_level_asked_and_of_the_seed() -> None:
     assert np.std(one["column_estimate_m"]) == pytest.approx(0.5 * K_REPORT, rel=0.05)
 
 
+@pytest.mark.parametrize("hand", [Hand(), Hand(stiffness=3000.0, damping=20.0, lag_s=0.05)])
+@pytest.mark.parametrize("friction_N", [0.0, 6.0])
+def test_a_control_that_stands_alone_moves_as_one_that_is_asked_for_all(
+    hand: Hand, friction_N: float
+) -> None:
+    """Services that rest change no bit, and nor does what is not asked at every node."""
+    rig = bench({"servo_frequency_Hz": 18.0, "friction_N": friction_N, "play_m": 1e-3})
+    frames, rng = 200, np.random.default_rng(3)
+    script = np.zeros((1, 2, frames * rig.substeps + 1))
+    script[0] = 0.01 * rng.standard_normal(script[0].shape).cumsum(axis=1)
+    script[0, 0] *= 400.0
+    apart, asked = (np.zeros((frames, 2 + CHANNELS_PER_CONTROL)) for _ in range(2))
+    for record, services in ((apart, 0), (asked, 1)):
+        packed = pack(rig, {"column": hand})
+        packed["state"]["services"]["on"] = services
+        packed["state"]["hand"]["command"] = 3.0
+        for k in range(frames):
+            step_frame(packed, script, record, k, (3000.0,), 1.0)
+    assert np.ptp(apart[:, 3]) > 0.01  # the grip moves, and rests now and then
+    assert np.array_equal(apart, asked)
+
+
 def test_a_hand_is_on_its_grip_from_the_first_row_on() -> None:
     """The script's first force, or what holds the first place: k·h = (1 + k·K)·F at δc = 0."""
     rig = bench({"servo_frequency_Hz": 18.0})
