@@ -1,5 +1,6 @@
 """What a coupled frame costs, as a ratio to JSBSim's own run(), measured side by side.
 
+By processor time, which other work on the machine changes little.
 Run alone, with its figures printed:  pytest -m bench -s
 """
 
@@ -29,20 +30,20 @@ ROUNDS = 9
 
 
 def flown_s(scenario: Manoeuvre) -> float:
-    start = time.perf_counter()
+    start = time.thread_time()
     record = fly(scenario)
     assert len(record) == scenario.frames
-    return time.perf_counter() - start
+    return time.thread_time() - start
 
 
 def bare_s(scenario: Manoeuvre) -> float:
     assert scenario.rig.flight is not None
     airframe = JSBSimAirframe(scenario.rig.flight, 1.0 / scenario.rig.frame_rate)
     run = airframe._fdm.run
-    start = time.perf_counter()
+    start = time.thread_time()
     for _ in range(scenario.frames):
         run()
-    return time.perf_counter() - start
+    return time.thread_time() - start
 
 
 @pytest.mark.parametrize(("controls", "most"), [(1, 1.5), (3, 2.0)])
