@@ -112,7 +112,7 @@ def fly(
                     extra.append(airframe.extra())
                 step(commands)
                 done = k + 1
-                if not done & 63 and progress is not None:
+                if progress is not None and not done & 63:
                     progress(done, frames)
     except KeyboardInterrupt:
         ended = EndedEarly("interrupted", done / rig.frame_rate)
@@ -164,9 +164,10 @@ def _finite(
     data: Floats, rate_Hz: float, ended: EndedEarly | None
 ) -> tuple[Floats, EndedEarly | None]:
     """Return a record up to where its state is lost, and why the flight ended."""
-    lost = np.flatnonzero(~np.isfinite(data).all(axis=1))
-    if not lost.size:
+    finite = np.isfinite(data)
+    if finite.all():
         return data, ended
+    lost = np.flatnonzero(~finite.all(axis=1))
     return data[: lost[0]], EndedEarly("the state is not finite", int(lost[0]) / rate_Hz)
 
 

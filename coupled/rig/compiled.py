@@ -59,6 +59,13 @@ def stage(function: F) -> F:
     return cast(F, _Stage(py_func=function, targetoptions=dict(_INLINED)))
 
 
+def seldom(function: F) -> F:
+    """Compile a stage that few rigs need: what it does is not in the way of what all do."""
+    if config.DISABLE_JIT:
+        return function
+    return cast(F, _Stage(py_func=function, targetoptions={**_INLINED, "forceinline": False}))
+
+
 def entry(function: F, nogil: bool = False) -> F:
     """Compile a function that Python calls, and keep the result on disk.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.record.channels import ALPHA
 from coupled.rig.compensation import estimate, misses
-from coupled.rig.compiled import carray, entry, pointer, stage
+from coupled.rig.compiled import carray, entry, pointer, seldom, stage
 from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import start_gauge
 from coupled.rig.hand import only_scripted
@@ -145,7 +145,7 @@ def serve_frame(controls: ControlArray, motion: tuple[float, ...], load_factor: 
             begin_services(p, s, motion[0], load_factor, angle_of_attack(motion))
 
 
-@stage
+@seldom
 def read_others(controls: ControlArray, row: Floats) -> None:
     """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row holds the noise."""
     for j in range(len(controls)):
@@ -159,7 +159,7 @@ def read_others(controls: ControlArray, row: Floats) -> None:
         controls[i].state.crossing.estimated = added
 
 
-@stage
+@seldom
 def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
     """Run all controls of one structure over frame k, node by node."""
     substeps = controls[0].parameters.clock.substeps
@@ -177,7 +177,7 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
         bend_by_others(controls, i)
 
 
-@stage
+@seldom
 def start_controls(controls: ControlArray, script: Floats) -> None:
     """Begin with each hand on its grip: gauge, delay and structure have its first force."""
     for i in range(len(controls)):

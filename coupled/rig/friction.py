@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration, Given
 
 
@@ -155,7 +155,7 @@ def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load
     return yielded(p, _slipping(p, load, rate), bent, way)[0]
 
 
-@stage
+@seldom
 def yielding_speed(
     p: FrictionParameters,
     bent: float,

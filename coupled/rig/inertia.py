@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig.compiled import TINY, layout, stage
+from coupled.rig.compiled import TINY, layout, seldom, stage
 from coupled.rig.declaration import Declaration, Given
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.parameters import MAX_ROWS
@@ -75,7 +75,7 @@ INERTIA = Declaration(
 )
 
 
-@stage
+@seldom
 def set_inertia(
     p: InertiaParameters,
     own: InertiaState,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.rig.command import take_set_point
-from coupled.rig.compiled import stage
+from coupled.rig.compiled import seldom, stage
 from coupled.rig.control import ControlParameters, ControlState
 from coupled.rig.gauge import gauge_force, move_gauge
 from coupled.rig.hand import ask, hold, move_muscle, only_scripted
@@ -41,7 +41,7 @@ def set_hand(
     hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
 
 
-@stage
+@seldom
 def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
     """Return the force that the loader takes for the hand's at the next node, N."""
     if p.gauge.present:
@@ -49,7 +49,7 @@ def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
     return lead_force(p.inertia, s.inertia, force) if p.inertia.rows > 0 else force
 
 
-@stage
+@seldom
 def sample_channels(p: ControlParameters, s: ControlState, left: int, first: bool) -> None:
     """Let the host's converters have δc and F, `left` substeps before the frame's end."""
     at_gauge = s.gauge.force if p.gauge.present else s.hand.force
@@ -74,7 +74,7 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
     return only_scripted(p.hand) and not stopped
 
 
-@stage
+@seldom
 def run_node(
     p: ControlParameters,
     s: ControlState,

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration
 from coupled.rig.friction import FrictionParameters, more_friction
 from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
@@ -72,7 +72,7 @@ def unbent(p: LinkageParameters, by: float) -> float:
     return by / compliance
 
 
-@stage
+@seldom
 def _place(
     r: float,
     side: float,
@@ -114,7 +114,7 @@ def free(stop: ReachState) -> None:
     stop.top_force, stop.bottom_force = _NO_FORCE, -_NO_FORCE
 
 
-@stage
+@seldom
 def set_reach(
     p: ReachParameters,
     stop: ReachState,
@@ -150,7 +150,7 @@ def bounds(
     return low, min(travel, max(stop.top + half, computed))
 
 
-@stage
+@seldom
 def stop_linkage(
     stop: ReachState, p: LinkageParameters, s: LinkageState, position: float, grip: float
 ) -> None:

@@ -27,7 +27,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.rig.compiled import layout, stage
+from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration, Ends
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.modification import ModificationState
@@ -142,7 +142,7 @@ SERVICES = Declaration(
 )
 
 
-@stage
+@seldom
 def begin_services(
     p: ServicesParameters,
     s: ServicesState,
@@ -244,7 +244,7 @@ def _jam(
     return True
 
 
-@stage
+@seldom
 def serve(
     p: ServicesParameters,
     s: ServicesState,
@@ -286,7 +286,7 @@ def asked_of_surface(p: ServicesParameters, s: ServicesState, estimated: float) 
     return s.asked
 
 
-@stage
+@seldom
 def note_services(s: ServicesState, loader: LoaderState) -> None:
     """Write what is recorded at t_k, as `SERVICE_CHANNELS` has it."""
     row = s.row
