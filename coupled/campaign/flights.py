@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import lru_cache
@@ -28,7 +29,9 @@ from coupled.parallel import as_done
 from coupled.record.record import Record
 
 Progress = Callable[[str, int, int], None]
-_AHEAD = 64  # flights that wait for a worker
+_AHEAD = 64  # blocks of flights that wait for a worker
+_BLOCK_s = 0.25  # what a worker flies before it hands over: a kill loses no more of its work
+_SHARE = 16  # of what is left, at the most, in a block: so that all workers end together
 
 
 def fly_planned(plan: SweepPlan, flight: PlannedFlight) -> JournalEntry:
@@ -75,18 +78,33 @@ def fly_sweep(
     """
     todo = [flight for flight in planned_flights(plan) if flight.number not in journal.done]
     every = len(journal.done) + len(todo)
-    packed = pickle.dumps(plan)
-    calls = [(packed, flight) for flight in todo]
-    for done, entry in enumerate(as_done(pool, _fly_packed, calls, _AHEAD), 1):
-        journal.add(entry)
+    packed, done, flying_s = pickle.dumps(plan), 0, 0.0
+
+    def blocks() -> Iterator[tuple[bytes, list[PlannedFlight]]]:
+        begun = 0
+        while begun < len(todo):
+            # To hand over and to keep a flight costs a tenth of a short one: many go together.
+            size = int(_BLOCK_s * done / flying_s) if flying_s else 1
+            end = begun + max(1, min(size, (len(todo) - begun) // _SHARE))
+            yield packed, todo[begun:end]
+            begun = end
+
+    for entries, seconds in as_done(pool, _fly_block, blocks(), _AHEAD):
+        journal.add(*entries)
+        done, flying_s = done + len(entries), flying_s + seconds
         if progress is not None:
             progress(f"{len(journal.done)} of {every} flights", done, len(todo))
     return table(plan, journal.entries())
 
 
-def _fly_packed(packed: bytes, flight: PlannedFlight) -> JournalEntry:
-    """Fly one of a plan that is sent as bytes, which costs nothing to send again."""
-    return fly_planned(_unpacked(packed), flight)
+def _fly_block(packed: bytes, flights: Sequence[PlannedFlight]) -> tuple[list[JournalEntry], float]:
+    """Fly some of a plan that is sent as bytes, which costs nothing to send again.
+
+    Return them, and how long it took, s.
+    """
+    start = time.perf_counter()
+    entries = [fly_planned(_unpacked(packed), flight) for flight in flights]
+    return entries, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)

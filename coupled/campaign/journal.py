@@ -1,4 +1,4 @@
-"""The journal of a sweep's folder: a line a flight, on the disk before the next is counted.
+"""The journal of a sweep's folder: a line a flight, on the disk before it is counted.
 
 Lines of JSON, the first of them the sweep's identity. A line cut short by a kill is dropped,
 and its flight flown again. One process at a time holds a folder; a killed one lets go, and
@@ -63,10 +63,10 @@ class Journal:
         with self.path.open("r+b") as file:
             file.truncate(len(whole))
 
-    def add(self, entry: JournalEntry) -> None:
-        """Keep a flight: it is on the disk when this returns."""
-        self._write(entry.line(self._columns) + "\n", "ab")
-        self.done.add(entry.flight)
+    def add(self, *entries: JournalEntry) -> None:
+        """Keep flights: they are on the disk when this returns."""
+        self._write("".join(entry.line(self._columns) + "\n" for entry in entries), "ab")
+        self.done.update(entry.flight for entry in entries)
 
     def entries(self) -> list[JournalEntry]:
         """Return the flights in the order of their numbers, as they were written."""
