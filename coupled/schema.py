@@ -7,10 +7,11 @@ so that one physics serves all controls.
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -98,9 +99,15 @@ def loads_toml(text: str, file: object) -> dict[str, Any]:
         if line.count(".") > MOST_DOTS and _dots(line) > MOST_DOTS:
             raise InputError(file, f"line {number}", f"a key of more than {MOST_DOTS} parts")
     try:
-        return tomllib.loads(text)
+        return copy.deepcopy(_tables(text))
     except (ValueError, RecursionError) as error:
         raise InputError(file, "", f"is not valid TOML: {error}") from None
+
+
+@lru_cache(maxsize=16)
+def _tables(text: str) -> dict[str, Any]:
+    """Return the tables of a text, kept: a sweep reads its rig's file at every flight."""
+    return tomllib.loads(text)
 
 
 _TOKEN = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+|[ \t]+|.""", re.DOTALL)

@@ -17,15 +17,17 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.authority.held import (
+    asked_and_reached,
+    by_the_statics,
+    felt_and_specified,
+    where_held,
+)
 from coupled.errors import InputError, listed, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.channels import ATTITUDE, RATE, ControlName, channel
 from coupled.record.record import Record, frame_of, pandas_frame
-from coupled.rig.equations import specified_force
-from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.rig import Rig
-from coupled.rig.statics import static_point
 
 if TYPE_CHECKING:
     import polars as pl
@@ -181,8 +183,10 @@ def fly_and_judge(
     return Flight(manoeuvre, configuration, record, judge(manoeuvre, configuration, record))
 
 
-def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
-    """Return the figures of a flight's record."""
+def judge(
+    manoeuvre: Manoeuvre, configuration: str, record: Record, closed_forms: bool = True
+) -> Outcome:
+    """Return the figures of a flight's record; without the closed forms those are NaN."""
     control, rig = manoeuvre.control, manoeuvre.rig
     why = "" if record.ended_early is None else str(record.ended_early)
     nan = float("nan")
@@ -190,23 +194,13 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
         return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
     deflection = record[channel(control, "deflection")]
     force = record[channel(control, "hand_force")]
-    held = _where_held(record.time_s, deflection)
+    held = where_held(record.time_s, deflection)
     side = float(np.sign(np.mean(deflection[held])))
-    asked, reached = _asked_and_reached(rig, control, record, held)
-    felt, specified = _felt_and_specified(rig, control, record, held)
-    pressure = float(np.mean(record["dynamic_pressure_Pa"][held]))
-    others = (
-        {}
-        if rig.structure.stands_apart
-        else {
-            str(name): float(np.mean(record[channel(name, "force")][held]))
-            for name in rig.controls
-            if name != control
-        }
-    )
-    point = static_point(rig, control, pressure, float(np.mean(deflection[held])), others)
-    breakout = side * rig.controls[control].loader.breakout
-    known = not manoeuvre.served  # the statics are those of a loader without services
+    asked, reached = asked_and_reached(rig, control, record, held)
+    felt, specified = felt_and_specified(rig, control, record, held)
+    # The statics are those of a loader without services.
+    known = closed_forms and not manoeuvre.served
+    loss, ratio = by_the_statics(rig, control, record, held) if known else (nan, nan)
     return Outcome(
         manoeuvre.label,
         configuration,
@@ -215,71 +209,14 @@ def judge(manoeuvre: Manoeuvre, configuration: str, record: Record) -> Outcome:
         reached,
         float(np.mean(deflection[held])) / rig.controls[control].travel,
         1.0 - reached / asked,
-        1.0 - float(point.estimate[0] / point.deflection[0]) if known else nan,
+        loss,
         felt / specified if specified else nan,
-        float((point.force[0] - breakout) / (point.specified[0] - breakout))
-        if specified and known
-        else nan,
+        ratio if specified else nan,
         float(np.max(np.abs(force))),
         float(np.max(np.abs(record[channel(control, "force_step")]))),
         *_motion_figures(manoeuvre, control, record, side),
         why,
     )
-
-
-def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> tuple[float, float]:
-    """Return the mean force felt and specified where a control is held, N; NaN if it never moves.
-
-    Breakout and bob weight are taken off both.
-    """
-    deflection = record[channel(control, "deflection")]
-    if len(record) < 2 or not np.any(deflection):
-        return float("nan"), float("nan")
-    held = _where_held(record.time_s, deflection)
-    return _felt_and_specified(manoeuvre.rig, control, record, held)
-
-
-def _where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
-    """Return the rows at which the control is held: far out on the peak's side, and still.
-
-    Still is a speed under 5 % of the peak a second, over ±0.1 s, so that a noisy transducer
-    counts as still too. Where it never is, the rows within 2 % of the peak.
-    """
-    peak = deflection[np.argmax(np.abs(deflection))]
-    share = deflection / peak
-    reach = max(1, round(0.1 / (time_s[1] - time_s[0])))
-    rate = np.full_like(share, np.inf)
-    if len(share) > 2 * reach:
-        span = time_s[2 * reach :] - time_s[: -2 * reach]
-        rate[reach:-reach] = (share[2 * reach :] - share[: -2 * reach]) / span
-    held = (share >= 0.5) & (np.abs(rate) <= 0.05)
-    return np.asarray(held if held.sum() >= reach else share >= 0.98)
-
-
-def _asked_and_reached(
-    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
-) -> tuple[float, float]:
-    data = rig.controls[control]
-    gain = COMMAND_SIGN[data.surface] / data.travel
-    deflection = record[channel(control, "deflection")]
-    asked = np.clip(gain * deflection, -1.0, 1.0)
-    reached = record[channel(control, "surface_norm")]
-    return float(np.mean(asked[held])), float(np.mean(reached[held]))
-
-
-def _felt_and_specified(
-    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Return the mean force felt and specified, breakout and bob weight taken off, N."""
-    deflection = record[channel(control, "deflection")][held]
-    pressure = record["dynamic_pressure_Pa"][held]
-    loader = rig.controls[control].loader
-    preload = np.sign(deflection) * loader.breakout
-    flown = rig.flight is not None
-    weight = loader.bob_weight * (record["load_factor"][held] - 1.0) if flown else 0.0
-    specified = specified_force(rig, control, pressure, deflection)
-    felt = record[channel(control, "hand_force")][held]
-    return float(np.mean(felt - preload - weight)), float(np.mean(specified - preload))
 
 
 def _motion_figures(

@@ -59,7 +59,8 @@ def fly_planned(plan: SweepPlan, flight: PlannedFlight) -> JournalEntry:
     ended = record.manifest["ended_early"]
     if ended and ended["reason"] == "interrupted":
         raise KeyboardInterrupt
-    outcome = judge(scenario, entry.configuration, record).as_dict()
+    closed_forms = any("closed_form" in name for name in sweep.keep)
+    outcome = judge(scenario, entry.configuration, record, closed_forms).as_dict()
     figures = {name: outcome[name] for name in sweep.keep} | _extremes(record, sweep.extremes)
     survived = None
     if sweep.survive:

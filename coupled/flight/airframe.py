@@ -81,6 +81,12 @@ def packaged_models() -> Mapping[str, Path]:
     return {folder.name: root for folder in root.iterdir() if _is_model(folder)}
 
 
+@lru_cache(maxsize=8)
+def _access(catalog: str) -> Mapping[str, str]:
+    """Return what may be done with each property of a model's catalogue: R, W or both."""
+    return {name: access for name, _, access in (x.rpartition(" (") for x in catalog.split("\n"))}
+
+
 def _is_model(folder: Path) -> bool:
     return (folder / f"{folder.name}.xml").is_file()
 
@@ -183,8 +189,7 @@ class JSBSimAirframe:
         fdm.set_dt(frame_s)
         self._properties = fdm.get_property_manager()
         # By this list, since asking the manager for a malformed name ends the process.
-        lines = fdm.query_property_catalog("").split("\n")
-        self._catalog = {name: access for name, _, access in (x.rpartition(" (") for x in lines)}
+        self._catalog = _access(fdm.query_property_catalog(""))
         return fdm
 
     def _set(self, name: str, value: float) -> None:

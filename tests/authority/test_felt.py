@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.authority.compare import held_forces
+from coupled.authority.held import held_forces
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, configure
 from coupled.flight.pilot import PILOTS
