@@ -33,7 +33,7 @@ from coupled.flight.everyframe import (
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import NothingToScaleError, loadable
+from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable
 from coupled.flight.newton import newton_trim
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
@@ -79,12 +79,6 @@ def packaged_models() -> Mapping[str, Path]:
     """Return the models that come with JSBSim: {name: folder of all models}."""
     root = Path(jsbsim.get_default_root_dir()) / "aircraft"
     return {folder.name: root for folder in root.iterdir() if _is_model(folder)}
-
-
-@lru_cache(maxsize=8)
-def _access(catalog: str) -> Mapping[str, str]:
-    """Return what may be done with each property of a model's catalogue: R, W or both."""
-    return {name: access for name, _, access in (x.rpartition(" (") for x in catalog.split("\n"))}
 
 
 def _is_model(folder: Path) -> bool:
@@ -189,7 +183,7 @@ class JSBSimAirframe:
         fdm.set_dt(frame_s)
         self._properties = fdm.get_property_manager()
         # By this list, since asking the manager for a malformed name ends the process.
-        self._catalog = _access(fdm.query_property_catalog(""))
+        self._catalog = catalogue(fdm.query_property_catalog(""))
         return fdm
 
     def _set(self, name: str, value: float) -> None:

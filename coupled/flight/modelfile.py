@@ -18,7 +18,7 @@ from __future__ import annotations
 import copy
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -66,6 +66,12 @@ class NothingToScaleError(Exception):
     def __init__(self, scaled: Scaled) -> None:
         super().__init__(scaled.name)
         self.scaled = scaled
+
+
+@lru_cache(maxsize=8)
+def catalogue(text: str) -> Mapping[str, str]:
+    """Return what may be done with each property of a model's catalogue: R, W or RW."""
+    return {name: access for name, _, access in (x.rpartition(" (") for x in text.split("\n"))}
 
 
 @contextmanager
