@@ -19,7 +19,8 @@ import secrets
 import shutil
 import stat
 import time
-from collections.abc import Callable, Iterable
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from io import BufferedReader
 from pathlib import Path
@@ -84,6 +85,15 @@ def read_json(path: Path, wanted: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError):
         raise InputError(path, "", f"is not JSON; {wanted}") from None
+
+
+@lru_cache(maxsize=16)
+def toml_tables(text: str) -> Mapping[str, Any]:
+    """Return a TOML text's tables, not to be changed: a sweep asks for its rig's at every flight.
+
+    Raises ValueError or RecursionError where it is none.
+    """
+    return tomllib.loads(text)
 
 
 def sha256(path: Path) -> str:

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import copy
 import re
-import tomllib
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from coupled.errors import MISSING, InputError, collected, nearest, together
-from coupled.files import read_text
+from coupled.files import read_text, toml_tables
 
 
 class Section(BaseModel):
@@ -99,15 +98,9 @@ def loads_toml(text: str, file: object) -> dict[str, Any]:
         if line.count(".") > MOST_DOTS and _dots(line) > MOST_DOTS:
             raise InputError(file, f"line {number}", f"a key of more than {MOST_DOTS} parts")
     try:
-        return copy.deepcopy(_tables(text))
+        return copy.deepcopy(toml_tables(text))
     except (ValueError, RecursionError) as error:
         raise InputError(file, "", f"is not valid TOML: {error}") from None
-
-
-@lru_cache(maxsize=16)
-def _tables(text: str) -> dict[str, Any]:
-    """Return the tables of a text, kept: a sweep reads its rig's file at every flight."""
-    return tomllib.loads(text)
 
 
 _TOKEN = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+|[ \t]+|.""", re.DOTALL)
