@@ -20,7 +20,7 @@ import shutil
 import stat
 import time
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from io import BufferedReader
 from pathlib import Path
@@ -88,7 +88,7 @@ def read_json(path: Path, wanted: str) -> Any:
 
 
 @lru_cache(maxsize=16)
-def toml_tables(text: str) -> Mapping[str, Any]:
+def toml_tables(text: str) -> dict[str, Any]:
     """Return a TOML text's tables, not to be changed: a sweep asks for its rig's at every flight.
 
     Raises ValueError or RecursionError where it is none.

@@ -53,7 +53,9 @@ def _column(of: str) -> Callable[[Given], Table]:
         host = g.control.compensation
         neutral = 0.0 if of == "force_lead" else 1.0
         values: list[float] = getattr(host, of) or [neutral] * len(host.inertia_gradient or [])
-        return np.pad(np.array(values, dtype=float), (0, MAX_ROWS - len(values)))
+        whole = np.zeros(MAX_ROWS)
+        whole[: len(values)] = values
+        return whole
 
     return column
 

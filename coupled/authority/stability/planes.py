@@ -112,7 +112,7 @@ def linear_rig(
     """Return the rig with this control alone, linear, at one gradient in N/d.
 
     The rig may be one that cannot be built: a gradient stiffer than the structure is what some
-    questions are about. Each value is checked against its own bounds only.
+    questions are about. The rig's own values are checked against their own bounds only.
     """
     return _asked(_linear(rig, name, gradient), name, question)
 
@@ -151,22 +151,24 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
 
 
 def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
-    """Return a linear rig with what a question puts in place of its own."""
-    d = unit_of(name)
-    own = {
-        "loader.multiplier": question.multiplier,
-        "loader.servo_frequency_Hz": question.servo_frequency_Hz,
-        f"compensation.bend_{d}_per_N": question.host_bend,
-        "compensation.gradient": question.host_gradient,
-        "sensing.gauge_frequency_Hz": question.gauge_frequency_Hz,
-        "sensing.gauge_mass_kg": question.gauge_mass,
+    """Return a linear rig with what a question puts in place of its own.
+
+    A plane asks thousands, each of a value that such a section takes: none is checked again.
+    """
+    control = linear.controls[name]
+    loader = {"multiplier": question.multiplier, "servo_frequency": question.servo_frequency_Hz}
+    host = {"bend": question.host_bend, "gradient": question.host_gradient}
+    sensing = {"gauge_frequency": question.gauge_frequency_Hz, "gauge_mass": question.gauge_mass}
+    sections = {
+        section: getattr(control, section).model_copy(
+            update={key: value for key, value in own.items() if value is not None}
+        )
+        for section, own in (("loader", loader), ("compensation", host), ("sensing", sensing))
     }
-    given = {key: value for key, value in own.items() if value is not None}
-    control = changed(linear.controls[name], given, linear.name, f"controls.{name}", d)
-    whole: dict[str, Any] = {"controls": {name: control}}
+    whole: dict[str, Any] = {"controls": {name: control.model_copy(update=sections)}}
     if question.frame_s is not None:
-        whole["frame_rate_Hz"] = 1.0 / question.frame_s
-    return changed(linear, whole, linear.name)
+        whole["frame_rate"] = 1.0 / question.frame_s
+    return linear.model_copy(update=whole)
 
 
 def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
