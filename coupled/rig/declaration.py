@@ -74,15 +74,13 @@ class Declaration:
     state: np.dtype[np.void] | None = None
     fixed: tuple[str, ...] = ()
 
-    def value(self, name: str, given: Given) -> ArrayLike:
-        """Return the value of a parameter; AttributeError where the rig has none of that name."""
-        if name in self.derived:
-            return self.derived[name](given)
+    def values(self, given: Given) -> tuple[ArrayLike, ...]:
+        """Return the parameters' values; AttributeError for one that the rig has not."""
         holder: Any = given
         for part in self.section.split("."):
             holder = getattr(holder, part)
-        value: ArrayLike = getattr(holder, name)
-        return value
+        own, names = self.derived, self.parameters.names or ()
+        return tuple([own[n](given) if n in own else getattr(holder, n) for n in names])
 
 
 def first_order_gain(lag_s: float, step_s: float) -> float:

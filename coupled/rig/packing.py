@@ -51,7 +51,6 @@ def pack(
             *(joined, bends, assumed, leaks(name, control.loader.crosstalk, list(found))),
         )
         for stage, declared in STAGES.items():
-            names = declared.parameters.names or ()
-            p[stage] = tuple(declared.value(name, given) for name in names)
+            p[stage] = declared.values(given)
     packed["state"]["services"]["on"] = packed["parameters"]["services"]["present"]
     return packed
