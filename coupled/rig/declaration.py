@@ -74,13 +74,25 @@ class Declaration:
     state: np.dtype[np.void] | None = None
     fixed: tuple[str, ...] = ()
 
+    def value(self, name: str, given: Given) -> ArrayLike:
+        """Return the value of a parameter; AttributeError where the rig has none of that name."""
+        if name in self.derived:
+            return self.derived[name](given)
+        value: ArrayLike = getattr(self._holder(given), name)
+        return value
+
     def values(self, given: Given) -> tuple[ArrayLike, ...]:
-        """Return the parameters' values; AttributeError for one that the rig has not."""
+        """Return the values of all parameters, in their order."""
+        own, holder = self.derived, self._holder(given)
+        names = self.parameters.names or ()
+        return tuple([own[n](given) if n in own else getattr(holder, n) for n in names])
+
+    def _holder(self, given: Given) -> Any:
+        """Return the part of the rig that the stage's own parameters are fields of."""
         holder: Any = given
         for part in self.section.split("."):
             holder = getattr(holder, part)
-        own, names = self.derived, self.parameters.names or ()
-        return tuple([own[n](given) if n in own else getattr(holder, n) for n in names])
+        return holder
 
 
 def first_order_gain(lag_s: float, step_s: float) -> float:
