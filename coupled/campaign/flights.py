@@ -1,4 +1,4 @@
-"""A sweep's flights, flown: a row a flight, kept in blocks of a quarter second, and one table at the end.
+"""A sweep's flights, flown: a row a flight, kept within a quarter second, and one table at the end.
 
 The rows depend on the sweep's file alone, not on who flew them or in which order.
 """
