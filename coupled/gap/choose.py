@@ -48,7 +48,8 @@ class Found:
 class Choice:
     """What the search found: its steps, and the final fit on all of the record.
 
-    `settled` has the nominal rig's settings moved within their tolerance, and no effect.
+    `settled` has the nominal rig's settings moved within their tolerance, and no effect. A search
+    that `circled` was ended where it came back to effects that it had stood at before.
     """
 
     steps: tuple[Found, ...]
@@ -56,6 +57,7 @@ class Choice:
     settled: Fit
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
     rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
+    circled: bool = False
 
 
 def searched(case: Case, library: Sequence[Effect]) -> Choice:
@@ -64,6 +66,8 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
     idle: set[str] = set()  # guilty outputs for which nothing was found
+    stood: list[set[str]] = [set()]  # the sets of effects that the search has stood at
+    circled = False
     while len(steps) < MOST_EFFECTS:
         ranked = _round(case, settled, current, library, idle)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
@@ -86,6 +90,12 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
             current = case.fit(rest, start=current.values)
             if needless is best.effect:
                 break
+            # Effects that displace one another would be found and dropped without end.
+            now = {step.effect.name for step in steps}
+            circled = now in stood
+            if circled:
+                break
+        stood.append({step.effect.name for step in steps})
     yields = yielding_reading(case, current)
     if yields is not None:
         plain, law, start = yields
@@ -98,7 +108,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     if len(steps) > 1:
         steps = [_again(case, settled, current, step) for step in steps]
     tried = next((gains for gains in rounds if gains), {})
-    return Choice(tuple(steps), current, settled, tried, tuple(rounds))
+    return Choice(tuple(steps), current, settled, tried, tuple(rounds), circled)
 
 
 def _again(case: Case, settled: Fit, current: Fit, step: Found) -> Found:

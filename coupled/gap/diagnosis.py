@@ -23,6 +23,8 @@ from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
+CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
+
 
 @dataclass(frozen=True)
 class Diagnosis(Findings):
@@ -99,6 +101,7 @@ class Diagnosis(Findings):
         flight = "" if self.in_flight is None else in_words(self.in_flight)
         filtered = filtered_words(self.filtered)
         said = summary(self, self.shrink, flight, filtered, self.next_test)
+        said += f" {CIRCLED}" if self.choice.circled else ""
         return said if self.baseline is None else f"{self.baseline.words} {said}"
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -114,6 +117,8 @@ class Diagnosis(Findings):
             "shrink": self.shrink.as_dict(),
             "settings": {setting.name: setting.factor for setting in self.settings},
         }
+        if self.choice.circled:
+            found["circled"] = True
         if self.filtered:
             found["filtered"] = dict(self.filtered)
         if self.baseline is not None:
