@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import count
 
+import numpy as np
+
 from coupled.gap.case import Case
-from coupled.gap.descent import Descent
+from coupled.gap.descent import Descent, leaves_noise
 from coupled.gap.effect import Effect, value_of
-from coupled.gap.fit import Fit
+from coupled.gap.fit import Fit, touched
 from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.information import informative
 from coupled.gap.screen import screen
@@ -21,6 +23,8 @@ from coupled.gap.thresholds import (
     RACE_EVALUATIONS,
 )
 from coupled.parallel import in_threads
+
+Starts = list[dict[str, float]]
 
 
 def fitted_candidates(
@@ -39,15 +43,23 @@ def fitted_candidates(
     screened = screen(case, current, candidates)
     laws = [one for one in screened if one[0].dry and not one[0].yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
-    # Other laws of friction start with the contact that plain friction was found with, and the
-    # richer of two laws where the plainer one ended, too.
-    beside = _contact_of(case, found)
-    started = [
-        (law, [*({**beside, **start} for start in starts), *_from_plainer(case, law, found)])
-        for law, starts in laws
-    ]
-    found += _fitted(case, current, started)
+    found += _fitted(case, current, [(law, _law_starts(case, law, s, found)) for law, s in laws])
     return informative(case, current, found)
+
+
+def _law_starts(
+    case: Case, law: Effect, starts: Starts, found: Sequence[tuple[Effect, Fit]]
+) -> Starts:
+    """Return where the fit of a law of friction starts, beside those that were fitted.
+
+    With the contact that plain friction was found with; the richer of two laws where the plainer
+    one ended, too, and only there where that one left noise alone.
+    """
+    beside = _contact_of(case, found)
+    from_plainer = _from_plainer(case, law, found)
+    if from_plainer and any(one.yielding and _leaves_noise(case, one, f) for one, f in found):
+        return from_plainer
+    return [*({**beside, **start} for start in starts), *from_plainer]
 
 
 def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, float]:
@@ -62,7 +74,6 @@ def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, fl
     }
 
 
-Starts = list[dict[str, float]]
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
 
 
@@ -94,7 +105,7 @@ def _fitted(
         effect, fitted = near
         return effect, _beside(case, current, effect, fitted.values, Descent("own"))
 
-    fits = in_threads(go_on, _still_racing(in_threads(begin, tries)))
+    fits = in_threads(go_on, _still_racing(case, in_threads(begin, tries)))
     found = _possible(case, list(_least(fits).values()))
     near = _near_the_best(case, current, found)
     far = [each for each in found if each not in near]
@@ -122,14 +133,25 @@ def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
     return best
 
 
-def _still_racing(begun: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
-    """Return the fits of each effect that are not far behind its best one."""
+def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
+    """Return the fits of each effect that are not far behind its best one.
+
+    Where that leaves noise alone, the others are given up.
+    """
     best = _least(begun)
+    behind = {name: 1.0 if _leaves_noise(case, *one) else RACE_BEHIND for name, one in best.items()}
     return [
         (effect, fitted)
         for effect, fitted in begun
-        if fitted.cost <= RACE_BEHIND * best[effect.name][1].cost
+        if fitted.cost <= behind[effect.name] * best[effect.name][1].cost
     ]
+
+
+def _leaves_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect, as fitted, leaves noise alone of the outputs that it shows in."""
+    ours = touched(case.outputs, [effect])
+    squares = [0.5 * float(np.sum(o.residual(fitted.rig, "fitted", wide=True) ** 2)) for o in ours]
+    return leaves_noise(sum(squares), sum(int(o.rows("fitted").sum()) for o in ours))
 
 
 def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:

@@ -19,6 +19,7 @@ from coupled.gap.thresholds import (
     DIFFERENCE,
     DIFFERENCE_STEPS,
     FIT_ITERATIONS,
+    NOISE_LEFT,
     RACE_BEHIND,
     RACE_EVALUATIONS,
     WIDE_DIFFERENCE,
@@ -71,14 +72,24 @@ class Descent:
         if len(firsts) == 1:
             return down(firsts[0], self.most)
         begun = [down(first, RACE_EVALUATIONS) for first in firsts]
-        least = min(one.cost for one in begun)
-        racing = [one for one in begun if one.cost <= RACE_BEHIND * least]
-        if self.most > RACE_EVALUATIONS:
-            racing = [down(one.x, self.most) for one in racing]
-        return min(racing, key=lambda one: one.cost)
+        begun.sort(key=lambda one: float(one.cost))
+        if self.most <= RACE_EVALUATIONS:
+            return begun[0]
+        best = down(begun[0].x, self.most)
+        for other in begun[1:]:
+            behind = other.cost > RACE_BEHIND * begun[0].cost
+            if behind or leaves_noise(best.cost, len(best.fun)):
+                break
+            best = min(best, down(other.x, self.most), key=lambda one: float(one.cost))
+        return best
 
 
 WHOLE = Descent()
+
+
+def leaves_noise(cost: float, frames: int) -> bool:
+    """Tell whether half a sum of squares, floors², is that of so many frames of noise."""
+    return 2.0 * cost <= NOISE_LEFT**2 * frames
 
 
 def _descended(residual: Any, slopes: _Slopes, first: Floats, ends: Ends, most: int) -> Any:

@@ -132,9 +132,10 @@ DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls 
 MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, another integrator
 YIELDING_ERROR = 0.12  # of a contact's numbers: noise of F walks it; 12 % off with 0.15 N of noise
 FIT_ITERATIONS = 40  # chosen
-WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 40 blind records of seed 101 went wrong
+WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 17 blind records (seed 101) went wrong
 WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
 RACE_EVALUATIONS = 6  # chosen: of each start, after which they are compared,
+NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
 RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
 
