@@ -201,7 +201,9 @@ def _regimes(case: Case, acts: Sequence[_Acts]) -> tuple[Regime, ...]:
             by.setdefault(name, []).append((one, signal))
     if len({one.output.record for one in acts}) > 1:
         by["record"] = [(one, np.full(len(one.left), float(one.output.record))) for one in acts]
-    found = (_regime(name, parts) for name, parts in by.items())
+    # A floor that is a model's own error is of one sign where the model is off.
+    lasting = 1.0 if case.only_wide else 0.0
+    found = (_regime(name, parts, lasting) for name, parts in by.items())
     return tuple(one for one in found if one is not None)
 
 
@@ -222,8 +224,11 @@ def _dividing(case: Case, one: _Acts) -> dict[str, Floats]:
     return {name: signal for name, signal in found.items() if np.ptp(signal) > 0.0}
 
 
-def _regime(by: str, parts: Sequence[tuple[_Acts, Floats]]) -> Regime | None:
-    """Return the sizes in two halves that hold as much of the action each, where they can."""
+def _regime(by: str, parts: Sequence[tuple[_Acts, Floats]], lasting: float) -> Regime | None:
+    """Return the sizes in two halves that hold as much of the action each, where they can.
+
+    `lasting` is what of a floor, rms, may be alike in all of a half.
+    """
     signal = np.concatenate([signal for _, signal in parts])
     action = np.concatenate([one.action for one, _ in parts])
     left = np.concatenate([one.left for one, _ in parts])
@@ -239,17 +244,23 @@ def _regime(by: str, parts: Sequence[tuple[_Acts, Floats]]) -> Regime | None:
     high = signal > 0.0 if by.endswith("sign") else signal >= middle
     if min(float(power[low].sum()), float(power[high].sum())) < LEAST_OF_A_HALF * total:
         return None
-    sizes = [_size(action[rows], left[rows], number[rows]) for rows in (low, high)]
+    sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]
     (a, a_error), (b, b_error) = sizes
     return Regime(by, 1.0 + a, 1.0 + b, a_error, b_error, len(np.unique(number)))
 
 
-def _size(action: Floats, left: Floats, number: NDArray[np.intp]) -> tuple[float, float]:
-    """Return how much more of an action a residual holds, and its error from the stretches."""
+def _size(
+    action: Floats, left: Floats, number: NDArray[np.intp], lasting: float = 0.0
+) -> tuple[float, float]:
+    """Return how much more of an action a residual holds, and its error.
+
+    That is from the stretches, and of a `lasting` part of the residual, rms, as large as its share.
+    """
     power = float(action @ action)
     more = float(left @ action) / power
     names, at = np.unique(number, return_inverse=True)
     scores = np.zeros(len(names))
     np.add.at(scores, at, (left - more * action) * action)
     freedom = max(len(names) - 1, 1)
-    return more, math.sqrt(float(scores @ scores) * len(names) / freedom) / power
+    scatter = math.sqrt(float(scores @ scores) * len(names) / freedom) / power
+    return more, math.hypot(scatter, lasting / math.sqrt(power / len(action)))
