@@ -10,7 +10,7 @@ import pytest
 
 from coupled.gap import diagnose as diagnosing
 from coupled.gap.budget import NOISE, UNEXPLAINED
-from coupled.gap.credibility import Credibility, Regime
+from coupled.gap.credibility import Credibility, Regime, _size
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.effect import apply
 from coupled.gap.flown import ChannelAgain, nearer
@@ -138,3 +138,12 @@ def test_an_effect_that_does_as_well_as_a_free_model_is_credible() -> None:
     assert Credibility("between", same, 0.0, 1.0, 1.0).value == pytest.approx(0.5, abs=0.01)
     drifts = (Regime("time_s", 0.5, 1.5, 0.01, 0.01, 20),)
     assert Credibility("drifts", drifts, 0.2, 2.0, 1.0).value < 0.05
+
+
+def test_a_models_own_error_may_be_alike_in_all_of_a_half() -> None:
+    """Of an action of 4 floors rms, an error of 1 floor that lasts is a quarter of its size."""
+    rng, number = np.random.default_rng(1), np.repeat(np.arange(20), 100)
+    action, left = 4.0 * rng.choice([-1.0, 1.0], 2000), rng.normal(size=2000)
+    more, scatter = _size(action, left, number)
+    assert abs(more) < 3.0 * scatter < 0.05
+    assert _size(action, left, number, 1.0)[1] == pytest.approx(0.25, rel=0.01)
