@@ -7,13 +7,15 @@ Run alone, with its figures printed, on an idle machine:
 flies 10,000; without the variable, 1000, which is the fewest that can be judged by.
 Each flight is 20 s of the report's column on a T-37. Bare JSBSim loads and trims the same model
 for each flight and takes the same steps, in as many processes. Rates are counted from the first
-flight done, so that starting up is not in them.
+flight done, so that starting up is not in them. The second test counts processor time, which a
+busy machine changes little.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -170,3 +172,42 @@ def test_a_sweeps_rate_and_memory(tmp_path: Path) -> None:
     figures |= {"two_of_one": two.rate / one.rate, "of_bare": two.rate / beside}
     keep("sweep", figures, load)
     assert two.rate / one.rate > 1.8
+
+
+def processor_s(folder: Path, workers: int, flights: int) -> float:
+    """Fly a sweep, and return the processor time of all its processes, s."""
+    name = f"{workers}-{flights}"
+    (folder / f"{name}.toml").write_text(SWEEP.format(flights=flights, seconds=SECONDS))
+    words = ["sweep", f"{name}.toml", "--folder", name, "-j", str(workers)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        [sys.executable, "-m", "coupled", *words], cwd=folder, stdout=subprocess.DEVNULL, check=True
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def test_what_a_second_worker_and_the_rig_cost_of_processor_time(tmp_path: Path) -> None:
+    """Without what waits for a disk or another core; so other work changes little of it.
+
+    Two workers that share nothing take for a flight what one takes, and are twice as fast.
+    """
+    frames = round(SECONDS * read_rig(shipped_rigs()["report-column"]).frame_rate)
+    few, many, load = 60, 360, os.getloadavg()[0]
+    processor_s(tmp_path, 1, 2)  # compiles, if need be
+    one, two, beside = list[float](), list[float](), list[float]()
+    for turn in range(3):
+        folder = tmp_path / str(turn)
+        folder.mkdir()
+        for workers, found in ((1, one), (2, two)):
+            starting = processor_s(folder, workers, few)
+            found.append((processor_s(folder, workers, many) - starting) / (many - few))
+        start = time.thread_time()
+        bare(few, frames)
+        beside.append((time.thread_time() - start) / few)
+    figures = {"two_of_one": 2.0 * min(one) / min(two), "of_bare": min(beside) / min(one)}
+    print(f"\na flight {1e3 * min(one):.1f} ms, with two workers {1e3 * min(two):.1f} ms,")
+    print(f"bare JSBSim {1e3 * min(beside):.1f} ms: {figures}")
+    keep("sweep, processor time", figures, load)
+    assert figures["two_of_one"] > 1.8
+    assert figures["of_bare"] > 0.65
