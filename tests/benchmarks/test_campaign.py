@@ -210,4 +210,4 @@ def test_what_a_second_worker_and_the_rig_cost_of_processor_time(tmp_path: Path)
     print(f"bare JSBSim {1e3 * min(beside):.1f} ms: {figures}")
     keep("sweep, processor time", figures, load)
     assert figures["two_of_one"] > 1.8
-    assert figures["of_bare"] > 0.65
+    assert figures["of_bare"] > 0.6
