@@ -7,7 +7,7 @@ which changes nothing in a linear rig, and the scale is added to the growth.
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +44,20 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
     late = logs[frames // 2 :]
     if not np.all(np.isfinite(late)):
         return math.inf
-    times = np.arange(late.size) / rig.frame_rate
-    # Weights that fade at both ends let a swing of the size about its trend fall out.
-    weights = np.sin(np.pi * (np.arange(late.size) + 0.5) / late.size)
-    return float(np.polyfit(times - times.mean(), late, 1, w=weights)[0])
+    return float(_slope_weights(late.size) @ late) * rig.frame_rate
+
+
+@lru_cache(maxsize=64)
+def _slope_weights(count: int) -> Floats:
+    """Return what values, each a frame after the last, give their trend by, a frame: its slope.
+
+    The straight line of least squares, with weights that fade at both ends and let a swing of
+    the values about their trend fall out.
+    """
+    frames = np.arange(count, dtype=np.float64)
+    weights = np.sin(np.pi * (frames + 0.5) / count) ** 2
+    levers = weights * (frames - (weights @ frames) / weights.sum())
+    return np.asarray(levers / (levers @ frames))
 
 
 @stage
