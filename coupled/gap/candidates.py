@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from itertools import count
 
+import numpy as np
+
 from coupled.gap.case import Case
+from coupled.gap.descent import Descent, leaves_noise
 from coupled.gap.effect import Effect, value_of
-from coupled.gap.fit import Fit
-from coupled.gap.gain import Candidate
+from coupled.gap.fit import Fit, touched
+from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.information import informative
 from coupled.gap.screen import screen
+from coupled.gap.thresholds import (
+    BEHIND_GAIN,
+    BEHIND_SHARE,
+    HARDLY,
+    RACE_BEHIND,
+    RACE_EVALUATIONS,
+)
 from coupled.parallel import in_threads
+
+Starts = list[dict[str, float]]
 
 
 def fitted_candidates(
@@ -28,43 +41,138 @@ def fitted_candidates(
         and outputs & set(effect.shows_in)
     ]
     screened = screen(case, current, candidates)
-    found = _fitted(case, current, [one for one in screened if one[0].alike is None])
-    # The richer of two laws also starts from where the plainer one ended.
-    richer = [
-        (effect, [*starts, *_from_plainer(case, effect, found)])
-        for effect, starts in screened
-        if effect.alike is not None
-    ]
-    return informative(case, current, found + _fitted(case, current, richer))
+    laws = [one for one in screened if one[0].dry and not one[0].yielding]
+    found = _fitted(case, current, [one for one in screened if one not in laws])
+    found += _fitted(case, current, [(law, _law_starts(case, law, s, found)) for law, s in laws])
+    return informative(case, current, found)
 
 
-Starts = list[dict[str, float]]
+def _law_starts(
+    case: Case, law: Effect, starts: Starts, found: Sequence[tuple[Effect, Fit]]
+) -> Starts:
+    """Return where the fit of a law of friction starts, beside those that were fitted.
+
+    With the contact that plain friction was found with; the richer of two laws where the plainer
+    one ended, too, and only there where that one left noise alone.
+    """
+    beside = _contact_of(case, found)
+    from_plainer = _from_plainer(case, law, found)
+    if from_plainer and any(one.yielding and _leaves_noise(case, one, f) for one, f in found):
+        return from_plainer
+    return [*({**beside, **start} for start in starts), *from_plainer]
+
+
+def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, float]:
+    """Return how plain friction yields by its fit, if it was fitted."""
+    return {
+        one.value_key(p): fitted.values[one.value_key(p)]
+        for plain, fitted in found
+        if plain.yielding
+        for one in case.contact
+        for p in one.free
+        if one.value_key(p) in fitted.values
+    }
+
+
+BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
 
 
 def _fitted(
     case: Case, current: Fit, screened: Sequence[tuple[Effect, Starts]]
 ) -> list[tuple[Effect, Fit]]:
-    """Return the effects that fit beside the current ones, each with the best of its fits."""
-    tries = [(effect, start) for effect, starts in screened for start in starts]
-    begun = count()
+    """Return the effects that fit beside the current ones, each with the best of its fits.
 
-    def one(tried: tuple[Effect, dict[str, float]]) -> Fit:
+    By the loader's wide steps, and by its own where that may decide.
+    """
+    tries = [(effect, start) for effect, starts in screened for start in starts]
+    begun, many = count(), Counter(effect.name for effect, _ in tries)
+
+    def begin(tried: tuple[Effect, dict[str, float]]) -> tuple[Effect, Fit]:
         effect, start = tried
         if case.tell is not None:
             case.tell(f"fitting {effect.name}", next(begun), len(tries))
-        return case.fit((*current.effects, effect), "fitted", {**current.values, **start}, effect)
+        values = {**current.values, **start}
+        first = BEGUN if many[effect.name] > 1 else WIDE
+        return effect, _beside(case, current, effect, values, first)
 
-    fits = iter(in_threads(one, tries))
-    best = [
-        (effect, min((next(fits) for _ in starts), key=lambda fitted: fitted.cost))
-        for effect, starts in screened
-    ]
+    def go_on(begun: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
+        effect, fitted = begun
+        if many[effect.name] == 1:
+            return begun
+        return effect, _beside(case, current, effect, fitted.values, WIDE)
+
+    def finish(near: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
+        effect, fitted = near
+        return effect, _beside(case, current, effect, fitted.values, Descent("own"))
+
+    fits = in_threads(go_on, _still_racing(case, in_threads(begin, tries)))
+    found = _possible(case, list(_least(fits).values()))
+    near = _near_the_best(case, current, found)
+    far = [each for each in found if each not in near]
+    return far + _possible(case, in_threads(finish, near))
+
+
+def _beside(
+    case: Case,
+    current: Fit,
+    effect: Effect,
+    values: Mapping[str, float],
+    descent: Descent,
+) -> Fit:
+    """Return an effect fitted on every other stretch beside the current ones, from these values."""
+    return case.fit((*current.effects, effect), "fitted", values, effect, descent)
+
+
+def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
+    """Return the best of each effect's fits, by its name."""
+    best: dict[str, tuple[Effect, Fit]] = {}
+    for each in fits:
+        name = each[0].name
+        if name not in best or each[1].cost < best[name][1].cost:
+            best[name] = each
+    return best
+
+
+def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
+    """Return the fits of each effect that are not far behind its best one.
+
+    Where that leaves noise alone, the others are given up.
+    """
+    best = _least(begun)
+    behind = {name: 1.0 if _leaves_noise(case, *one) else RACE_BEHIND for name, one in best.items()}
     return [
         (effect, fitted)
-        for effect, fitted in best
+        for effect, fitted in begun
+        if fitted.cost <= behind[effect.name] * best[effect.name][1].cost
+    ]
+
+
+def _leaves_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect, as fitted, leaves noise alone of the outputs that it shows in."""
+    ours = touched(case.outputs, [effect])
+    squares = [0.5 * float(np.sum(o.residual(fitted.rig, "fitted", wide=True) ** 2)) for o in ours]
+    return leaves_noise(sum(squares), sum(int(o.rows("fitted").sum()) for o in ours))
+
+
+def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
+    """Return the effects fitted that are away from their bounds, and beyond their settings."""
+    return [
+        (effect, fitted)
+        for effect, fitted in found
         if not any(effect.value_key(p) in fitted.at_bound for p in effect.free)
         and not _within_tolerance(case, effect, fitted)
     ]
+
+
+def _near_the_best(
+    case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]
+) -> list[tuple[Effect, Fit]]:
+    """Return those whose gain may still be the best's, or its rival's."""
+    ranked = ranked_by_gain(case.outputs, current, found)
+    most = max((one.gain for one in ranked), default=0.0)
+    least = most - max(BEHIND_GAIN, BEHIND_SHARE * most)
+    near = {one.effect.name for one in ranked if one.gain >= least}
+    return [each for each in found if each[0].name in near]
 
 
 def _from_plainer(
@@ -73,11 +181,21 @@ def _from_plainer(
     """Return where a richer law's fit starts by what its plainer one was fitted to, if it was."""
     if effect.alike is None:
         return []
-    return [
-        {**fitted.values, **imitating(case, effect, plain, fitted)}
-        for plain, fitted in found
-        if plain.name == effect.alike.plainer
-    ]
+    starts = []
+    for plain, fitted in found:
+        if plain.name == effect.alike.plainer:
+            alike = {**fitted.values, **imitating(case, effect, plain, fitted)}
+            starts += [alike, {**alike, **_hardly_richer(case, effect, fitted)}]
+    return starts
+
+
+def _hardly_richer(case: Case, effect: Effect, fitted: Fit) -> dict[str, float]:
+    """Return the numbers of a richer law that stand above another, hardly above it."""
+    return {
+        effect.value_key(p): HARDLY * float(value_of(fitted.rig, case.control, p.above))
+        for p in effect.free
+        if p.above
+    }
 
 
 def imitating(case: Case, richer: Effect, plain: Effect, fitted: Fit) -> dict[str, float]:

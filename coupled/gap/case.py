@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
+from typing import Any
 
 from coupled.gap.course import Bounds
+from coupled.gap.descent import WHOLE, Descent
 from coupled.gap.effect import Effect, possible
-from coupled.gap.fit import Fit, Known, fit
+from coupled.gap.fit import Fit, fit
 from coupled.gap.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.settings import contact, is_dry, settings
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
@@ -37,7 +39,7 @@ class Case:
     only_wide: bool = False
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
     # Its fits: a case of other outputs, made by `replace`, begins with none.
-    _known: Known = field(default_factory=dict, init=False, repr=False, compare=False)
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> dict[str, Effect]:
@@ -158,6 +160,7 @@ class Case:
         part: Part = "all",
         start: Mapping[str, float] | None = None,
         only: Effect | None = None,
+        descent: Descent = WHOLE,
     ) -> Fit:
         """Return the effects fitted, with the settings free within their tolerance.
 
@@ -165,4 +168,4 @@ class Case:
         """
         free = self.nuisances(effects)
         given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
-        return fit(*given, self._known)
+        return fit(*given, replace(descent, known=self._known))

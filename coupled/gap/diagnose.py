@@ -22,6 +22,7 @@ from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.choose import Choice
 from coupled.gap.counts import as_counted
+from coupled.gap.descent import Descent
 from coupled.gap.diagnosis import Diagnosis
 from coupled.gap.drives import as_driven
 from coupled.gap.effect import Effect
@@ -111,7 +112,7 @@ def _diagnose(
     case, choice = search(case, library)
     outputs = list(case.outputs)
     stages = _Judge(readers, outputs, choice, case.gaps(choice.fit.rig)).stages()
-    fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values)
+    fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values, descent=Descent("own"))
     floors = floors_of(case, choice)
     budgets = [
         stage_budget(stage.name, case, choice.settled, fitted, floors)

@@ -7,20 +7,19 @@ of them stand at a bound, and the residuals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from coupled.gap.descent import WHOLE, Descent
 from coupled.gap.effect import Effect, Parameter, possible
 from coupled.gap.output import Output, Part, memory
-from coupled.gap.thresholds import DIFFERENCE, DIFFERENCE_STEPS, FIT_ITERATIONS
-from coupled.parallel import go_on, in_threads
+from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
@@ -58,7 +57,7 @@ def fit(
     part: Part = "all",
     start: Mapping[str, float] | None = None,
     only: Effect | None = None,
-    known: Known | None = None,
+    descent: Descent = WHOLE,
 ) -> Fit:
     """Return the effects fitted to a part of the outputs that they touch.
 
@@ -67,8 +66,7 @@ def fit(
     Effects that share no output are fitted each on its own, so that neither's misfit misleads
     the other; of effects that free the same number the first fits it, and the others have it
     from there. With `only`, just those that share one with it, and the others stay at `start`. A
-    set that the physics cannot give stands at its bounds. `known` remembers what was fitted to
-    these outputs, so that none is fitted twice.
+    set that the physics cannot give stands at its bounds.
     """
     every = [*effects, *nuisances]
     values: dict[str, float] = {}
@@ -79,7 +77,8 @@ def fit(
     for group in _groups(every):
         if only is None or only in group:
             ours = touched(outputs, group)
-            found = _remembered(known, nominal, control, ours, group, part, start or {}, nuisances)
+            given = (nominal, control, ours, group, part, start or {}, nuisances, descent)
+            found = _remembered(*given)
             low, high, bound = low | found.low, high | found.high, bound + found.at_bound
             values, cost = values | found.values, cost + found.cost
             information[tuple(found.values)] = found.information
@@ -123,12 +122,12 @@ class _Group:
     information: Floats
 
 
-# {effects, which are nuisances, part, values at the starts: the fit}, of one rig and its outputs
-Known = dict[tuple[tuple[Effect, ...], frozenset[str], Part, tuple[tuple[float, ...], ...]], _Group]
+# {effects, which are nuisances, part, whether by wide steps, evaluations, values at the starts:
+# the fit}, of one rig and its outputs
+Asked = tuple[tuple[Effect, ...], frozenset[str], Part, bool, int, tuple[tuple[float, ...], ...]]
 
 
 def _remembered(
-    known: Known | None,
     nominal: Rig,
     control: ControlName,
     ours: Sequence[Output],
@@ -136,16 +135,23 @@ def _remembered(
     part: Part,
     start: Mapping[str, float],
     nuisances: Sequence[Effect],
+    descent: Descent,
 ) -> _Group:
     """Return a fit, as it is known; one that starts where another ended is that one."""
+    known = descent.known
     if known is None:
-        return _fit(nominal, control, ours, effects, part, start, nuisances)
-    what = (tuple(effects), frozenset(one.name for one in nuisances if one in effects), part)
-    key = (*what, tuple(map(tuple, _starts(*_free(effects), start))))
+        return _fit(nominal, control, ours, effects, part, start, nuisances, descent)
+    stepped = any(output.stepped for output in ours)
+    wide = stepped and descent.steps == "wide"
+    among = frozenset(one.name for one in nuisances if one in effects)
+    what = (tuple(effects), among, part, wide, descent.most)
+    key: Asked = (*what, tuple(map(tuple, _starts(*_free(effects), start))))
     if key not in known:
-        found = known[key] = _fit(nominal, control, ours, effects, part, start, nuisances)
+        given = (nominal, control, ours, effects, part, start, nuisances, descent)
+        known[key] = found = _fit(*given)
         known[*what, (tuple(found.values.values()),)] = found
-    return known[key]
+    held: _Group = known[key]
+    return held
 
 
 def _fit(
@@ -156,18 +162,19 @@ def _fit(
     part: Part,
     start: Mapping[str, float],
     nuisances: Sequence[Effect] = (),
+    descent: Descent = WHOLE,
 ) -> _Group:
     keys, frees = _free(effects)
     scale = np.array([_scale(p) for p in frees])
     frames = sum(int(output.rows(part).sum()) for output in ours)
 
-    def residual(scaled: Floats) -> Floats:
+    def residual(scaled: Floats, wide: bool = False) -> Floats:
         go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
             return np.full(frames, _FAR)
-        return np.concatenate([output.residual(rig, part) for output in ours])
+        return np.concatenate([output.residual(rig, part, wide) for output in ours])
 
     if not ours:
         known = dict(zip(keys, _starts(keys, frees, start)[0], strict=True))
@@ -177,16 +184,9 @@ def _fit(
         return _Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
-    best = None
-    for first in _starts(keys, frees, start):
-        x0 = np.clip(np.array(first) / scale, low + 1e-9, high - 1e-9)
-        slopes = _Slopes(residual, low, high)
-        found = least_squares(
-            residual, x0, slopes, bounds=(low, high), xtol=1e-4, ftol=1e-5, max_nfev=FIT_ITERATIONS
-        )
-        if best is None or found.cost < best.cost:
-            best = found
-    assert best is not None
+    stepped = any(output.stepped for output in ours)
+    firsts = [np.array(first) / scale for first in _starts(keys, frees, start)]
+    best = descent.end(residual, firsts, (low, high), stepped)
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     within = {one.value_key(p) for one in nuisances for p in one.free}
     known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
@@ -213,35 +213,6 @@ def _fit(
 def _scale(p: Parameter) -> float:
     """Return a size of a parameter for which a step of a hundredth is small."""
     return max(abs(start) for start in p.starts) or 0.5 * (p.high - p.low)
-
-
-class _Slopes:
-    """Derivatives by differences, over steps that change the residual by about a third of a floor.
-
-    Friction, breakout and play move the residual in small jumps: a difference over less than
-    those says nothing of where the fit should go, nor of how well it knows.
-    """
-
-    def __init__(self, residual: Callable[[Floats], Floats], low: Floats, high: Floats) -> None:
-        self._residual, self._low, self._high = residual, low, high
-        self._step = np.full(len(low), 0.01)
-
-    def __call__(self, x: Floats) -> Floats:
-        here = self._residual(x)
-
-        def column(i: int) -> Floats:
-            value = x[i]
-            room = max(self._high[i] - value, value - self._low[i])
-            step = min(self._step[i], 0.5 * room)
-            there = x.copy()
-            there[i] = value + (step if self._high[i] - value > step else -step)
-            change = self._residual(there) - here
-            size = float(np.sqrt(np.mean(change**2)))
-            growth = np.clip(DIFFERENCE / max(size, 1e-9), 0.1, 10.0)
-            self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
-            return np.asarray(change / (there[i] - value))
-
-        return np.column_stack(in_threads(column, range(len(x))))
 
 
 def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:

@@ -21,7 +21,7 @@ from coupled.gap.smooth import smoothed
 from coupled.gap.thresholds import JUMP_COUNTED, PLAY_LEAST, PLAYS
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.imposed import answer_to
-from coupled.rig.nodes import on_nodes
+from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
 
@@ -42,10 +42,10 @@ class Imposed:
     def predict(self, motion: Floats | None = None) -> Predict:
         """Return the prediction for a motion in d at each frame, as read; the record's own."""
         reading = self._reading
-        nodes = on_nodes(reading.rig, self._motion if motion is None else motion)
+        imposed = Nodes(self._motion if motion is None else motion)
 
         def predicted(rig: Rig) -> Floats:
-            data = rig.controls[reading.control]
+            data, nodes = rig.controls[reading.control], imposed.of(rig)
             read_as = reading.sensed(rig)
             true = nodes / read_as.scale_on_nodes(len(nodes))
             if reading.imposed == "deflection":
@@ -95,7 +95,7 @@ def _plays(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[di
 
     def left(play: float) -> float:
         other = rig.changed({key: filed + play})
-        return sum(float(np.sum(output.residual(other) ** 2)) for output in ours)
+        return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
 
     best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
     best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise import Noise, noise_of
+from coupled.gap.steps import widely_stepped
 from coupled.gap.thresholds import (
     ECHO_FRAMES,
     FELT_FRAMES,
@@ -80,6 +81,7 @@ class Output:
     `hides` what it hides, where that is known.
     `record` numbers the record that it is of; `held` are the frames held out from fits, without
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
+    One is `stepped` whose prediction runs at the loader's own steps, finer than the frames.
     """
 
     stage: str
@@ -94,11 +96,16 @@ class Output:
     hides: Hides | None = None
     held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    stepped: bool = False
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
-    def residual(self, rig: Rig, part: Part = "all") -> Floats:
-        """Return measured less predicted, in floors, shape (frames,), of a part's stretches."""
-        key = (rig.controls, rig.flight)
+    def residual(self, rig: Rig, part: Part = "all", wide: bool = False) -> Floats:
+        """Return measured less predicted, in floors, shape (frames,), of a part's stretches.
+
+        A `wide` one is by wide steps of the loader (`steps`).
+        """
+        rig = widely_stepped(rig) if wide and self.stepped else rig
+        key = (rig.controls, rig.flight, rig.substeps)
         left = next((left for known, left in self._known if known == key), None)
         if left is None:
             left = (self.measured - self.predict(rig)) / self.floor

@@ -25,7 +25,7 @@ from coupled.gap.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.smooth import Smoother
 from coupled.gap.thresholds import RATCHET, WALKED, WALKED_BY, WALKED_N
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.nodes import on_nodes
+from coupled.rig.nodes import Nodes
 from coupled.rig.rig import Rig
 
 Driven = Callable[[Rig, float], Floats]  # by a rig and so many times a sample of the noise
@@ -38,8 +38,8 @@ def passed(signal: Floats, noise: Noise) -> Floats:
 
 
 def passed_noise(
-    rig: Rig, signals: tuple[Floats, Floats], noises: tuple[Noise, Noise]
-) -> tuple[Floats, Floats]:
+    signals: tuple[Floats, Floats], noises: tuple[Noise, Noise]
+) -> tuple[Nodes, Floats]:
     """Return samples of what the smoothers of δc and F pass of their noise.
 
     δc's on the loader's nodes, in d, F's at the frames, in N.
@@ -49,7 +49,7 @@ def passed_noise(
         Smoother.of(signal).smooth(noise.sample(len(signal), rng))
         for signal, noise in zip(signals, noises, strict=True)
     )
-    return on_nodes(rig, computed), force
+    return Nodes(computed), force
 
 
 def unratcheted(rig: Rig, control: ControlName, at: Driven) -> Floats:

@@ -48,7 +48,7 @@ def screen(
 def _screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:
     """Return the power that an effect's signature takes, floors², and the starts of its fits."""
     ours = touched(case.outputs, [effect])
-    now = np.concatenate([output.residual(current.rig) for output in ours])
+    now = np.concatenate([output.residual(current.rig, wide=True) for output in ours])
     best, starts = 0.0, list[dict[str, float]]()
     for tries in _tries(case, current, effect):
         least, start = np.inf, {}
@@ -57,7 +57,7 @@ def _screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dic
             rig = _with(case, current, effect, values)
             if rig is None:
                 continue
-            left = np.concatenate([output.residual(rig) for output in ours])
+            left = np.concatenate([output.residual(rig, wide=True) for output in ours])
             sign = now - left
             size = float(sign @ sign)
             best = max(best, float(now @ sign) ** 2 / size if size > 0.0 else 0.0)

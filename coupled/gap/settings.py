@@ -31,7 +31,9 @@ def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
     if loader.friction_stiffness > 0.0:
         return ()
     most = most_yielding(control)
-    length = Parameter("", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most,), may_end=True)
+    length = Parameter(
+        "", CONTACT[0], "yields", 1e-3 * most, most, (0.1 * most, 0.01 * most), may_end=True
+    )
     share = Parameter(
         "", CONTACT[1], "value", 0.0, MOST_ELASTIC, (loader.friction_elastic_share,), may_end=True
     )

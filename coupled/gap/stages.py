@@ -53,7 +53,7 @@ from coupled.gap.thresholds import (
 )
 from coupled.gap.trim import trim_of
 from coupled.rig.hosted import Hosted
-from coupled.rig.nodes import on_nodes
+from coupled.rig.nodes import Nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -64,6 +64,7 @@ from coupled.rig.replay import (
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
+STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,8 @@ class Reader(Reading):
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
     ) -> Output:
         rate, missed = self.rig.frame_rate, self.missed.seen
-        return Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
+        made = Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
+        return replace(made, stepped=stage in STEPPED)
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
@@ -156,12 +158,12 @@ class Reader(Reading):
         computed, second = self.signal("computed"), self.second()
         load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
         smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
-        leaks = [on_nodes(self.rig, smoothed(other)) for other in self.partner()]
+        leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
         def driven(f: Floats, seen: Floats) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start."""
-            nodes = on_nodes(self.rig, f)
+            nodes = Nodes(f)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
@@ -172,11 +174,11 @@ class Reader(Reading):
                 if every and isinstance(hum, np.ndarray):
                     still = rate - rate_of(hum, self.rig.frame_rate)
                 restart = (every, (seen - hum) / scale, still / scale)
-                pull = sensed.force_on_nodes(nodes, f)
+                pull = sensed.force_on_nodes(nodes.of(rig), f)
                 if times:
-                    pull = pull + times * on_nodes(self.rig, trembles)
+                    pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
-                    pull = pull + share * leaks[0]
+                    pull = pull + share * leaks[0].of(rig)
                 host = Hosted(services(self), self.missed.under(rig, self.control))
                 driven_by = (pull, gradient, misread + hum, load, second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
@@ -197,7 +199,7 @@ class Reader(Reading):
                 level = given_noise(self.rig, self.name_of("force"), noisy_force)
             if share > HALF_FELT:
                 force, wandering = noisy_force, unsmoothed
-        trembles = passed(noisy_force, level)
+        trembling = Nodes(passed(noisy_force, level))
         answer = driven(force, smooth)
         walks = force is not noisy_force and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
@@ -227,14 +229,16 @@ class Reader(Reading):
         (smooth, level), (smooth_force, force_level) = self.commanded(), self.pulled()
         others = {name: smoothed(signal) for name, signal in self.others().items()}
         force = self.signal("force") if self.name_of("force") in self.record else smooth_force
-        noise = passed_noise(self.rig, (computed, force), (level, force_level))
+        noise = passed_noise((computed, force), (level, force_level))
 
         def driven(c: Floats, f: Floats) -> Predict:
-            nodes = on_nodes(self.rig, c)
+            nodes = Nodes(c)
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
-                driven_by = sensed.both(nodes + times * noise[0], f + times * noise[1], computed)
+                driven_by = sensed.both(
+                    nodes.of(rig) + times * noise[0].of(rig), f + times * noise[1], computed
+                )
                 return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
             return lambda rig: unratcheted(rig, self.control, at)

@@ -132,6 +132,11 @@ DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls 
 MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, another integrator
 YIELDING_ERROR = 0.12  # of a contact's numbers: noise of F walks it; 12 % off with 0.15 N of noise
 FIT_ITERATIONS = 40  # chosen
+WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 17 blind records (seed 101) went wrong
+WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
+RACE_EVALUATIONS = 6  # chosen: of each start, after which they are compared,
+NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
+RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
 
 # A nominal rig from records (`nominal`).
@@ -150,6 +155,11 @@ SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which 
 # Where a fit of a ripple starts (`ripples`).
 RIPPLE_LEAST = 1.5  # chosen: periods within the deflections met, fewer of which are a spring's law
 RIPPLE_PERIODS = 60.0  # chosen: the most of them
+
+# Fits of candidates that are finished (`candidates`).
+HARDLY = 1.05  # chosen: times the running friction, a breakaway where Coulomb's friction begins
+BEHIND_GAIN = 20.0  # chosen: log-likelihood by which a fit by wide steps is behind the best,
+BEHIND_SHARE = 0.2  # chosen: and share of the best's gain, from which it is left at that
 
 # Choosing (`choose`).
 LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it

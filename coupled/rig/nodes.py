@@ -21,6 +21,21 @@ def on_nodes(rig: Rig, samples: Floats) -> Floats:
     return _on_nodes(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), rig.substeps)
 
 
+class Nodes:
+    """A signal on the nodes of any rig of its frame rate, however finely its loader is stepped."""
+
+    def __init__(self, samples: Floats) -> None:
+        self._samples = samples
+        self._known: dict[int, Floats] = {}
+
+    def of(self, rig: Rig) -> Floats:
+        """Return the signal on a rig's nodes, as `on_nodes`."""
+        found = self._known.get(rig.substeps)
+        if found is None:
+            found = self._known[rig.substeps] = on_nodes(rig, self._samples)
+        return found
+
+
 @lru_cache(maxsize=8)
 def _on_nodes(samples: bytes, substeps: int) -> Floats:
     values = np.frombuffer(samples)

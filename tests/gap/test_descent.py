@@ -1,0 +1,86 @@
+"""Where a fit ends: at the least by the loader's own steps, from the start that leads there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.descent import Descent, leaves_noise
+from coupled.gap.output import Output
+from coupled.gap.steps import widely_stepped
+from coupled.gap.thresholds import RACE_EVALUATIONS, WIDE_STEPS_Hz
+from coupled.rig.rig import Rig
+from tests.support import gaps
+
+Floats = NDArray[np.float64]
+RNG = np.random.default_rng(5)
+LAW, SAID = RNG.normal(size=(200, 2)), RNG.normal(size=200)
+ENDS = (np.full(2, -5.0), np.full(2, 5.0))
+RIG = gaps.nominal_rig(False)
+
+
+def straight(scaled: Floats, wide: bool = False) -> Floats:
+    """Return a linear residual; by wide steps, one whose least is elsewhere."""
+    return LAW @ scaled - SAID + (0.3 * LAW[:, 0] if wide else 0.0)
+
+
+def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_wide_ones() -> None:
+    least = np.linalg.lstsq(LAW, SAID, rcond=None)[0]
+    begin = [np.array([1.0, 1.0])]
+    assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=2e-3)
+    found = Descent("wide").end(straight, begin, ENDS, stepped=True).x
+    assert np.allclose(found, least - [0.3, 0.0], atol=2e-3)
+
+
+def test_of_two_starts_the_one_that_leads_lower_is_kept_whatever_their_order() -> None:
+    def double(scaled: Floats, wide: bool = False) -> Floats:
+        """Return a residual with two hollows, at -2 and 2, of which the one at 2 is deeper."""
+        return np.concatenate(((scaled[0] ** 2 - 4.0) * np.ones(50), 0.5 * (scaled - 2.0)))
+
+    for starts in ([-2.2, 2.5], [2.5, -2.2]):
+        firsts = [np.array([start]) for start in starts]
+        found = Descent().end(double, firsts, (np.array([-5.0]), np.array([5.0])), stepped=False)
+        assert np.allclose(found.x, 2.0, atol=1e-3)
+
+
+def test_a_start_that_is_far_behind_is_given_up() -> None:
+    asked: list[float] = []
+
+    def far(scaled: Floats, wide: bool = False) -> Floats:
+        """Return a residual with a flat shelf far off, from which nothing leads away."""
+        asked.append(float(scaled[0]))
+        return np.full(50, 2.0 + min(float(scaled[0] - 1.0) ** 2, 50.0 + 1e-3 * float(scaled[0])))
+
+    ends = (np.array([0.0]), np.array([100.0]))
+    Descent().end(far, [np.array([90.0]), np.array([1.5])], ends, stepped=False)
+    on_the_shelf = sum(value > 10.0 for value in asked)
+    assert 0 < on_the_shelf <= 3 * RACE_EVALUATIONS
+
+
+def test_what_is_left_is_noise_up_to_a_tenth_more() -> None:
+    assert leaves_noise(0.5 * 1.09**2 * 1000, 1000)
+    assert not leaves_noise(0.5 * 1.11**2 * 1000, 1000)
+
+
+def test_wide_steps_are_those_of_the_loader_alone_and_only_where_asked_for() -> None:
+    wide = widely_stepped(RIG)
+    assert wide.substeps == WIDE_STEPS_Hz / RIG.frame_rate < RIG.substeps
+    assert wide.controls == RIG.controls
+    assert widely_stepped(wide) is wide
+    seen: list[int] = []
+
+    def predicted(rig: Rig) -> Floats:
+        seen.append(rig.substeps)
+        return np.zeros(3)
+
+    one = Output("loader", "column_computed_m", np.ones(3), predicted, 1.0, 120.0, stepped=True)
+    other = Output("schedule", "column_gradient", np.ones(3), predicted, 1.0, 120.0)
+    for output in (one, other):
+        for asked in (False, True):
+            output.residual(RIG, wide=asked)
+    assert seen == [RIG.substeps, wide.substeps, RIG.substeps]
+
+
+def test_a_widely_stepped_rig_can_be_changed_as_any_other() -> None:
+    key = "controls.column.loader.friction_N"
+    assert widely_stepped(RIG).changed({key: 2.0}) == widely_stepped(RIG.changed({key: 2.0}))
