@@ -8,13 +8,15 @@ from functools import cached_property
 from math import hypot
 from typing import Any
 
+import numpy as np
+
 from coupled.gap.course import Bounds
 from coupled.gap.descent import WHOLE, Descent
 from coupled.gap.effect import Effect, possible
-from coupled.gap.fit import Fit, fit
+from coupled.gap.fit import Fit, fit, touched
 from coupled.gap.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.settings import contact, is_dry, settings
-from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
+from coupled.gap.thresholds import HEARD_ANEW, LENGTHS, SETTLE_FROM
 from coupled.gap.timed import Timing, timed
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -167,5 +169,29 @@ class Case:
         With `only`, just that one and what shares an output with it; the others stay.
         """
         free = self.nuisances(effects)
+        start = self._with_length(effects, free, start or {})
         given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
         return fit(*given, replace(descent, known=self._known))
+
+    def _with_length(
+        self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Return where a fit starts, with the contact's length that leaves least of a few.
+
+        From a tenth of a length a fit does not find it: with each, the control sticks elsewhere.
+        """
+        known = dict(start)
+        length = next(iter(self.contact), None)
+        if length is None or length not in free or length.value_key(length.free[0]) in known:
+            return known
+        key, most = length.value_key(length.free[0]), length.free[0].high
+        begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
+        ours = touched(self.outputs, [length])
+        best = np.inf
+        for share in LENGTHS:
+            values = {**self.neutral, **begun, **start, key: share * most}
+            rig = possible(self.nominal, self.control, [*effects, *free], values)
+            left = sum(output.gap(rig) ** 2 for output in ours) if rig is not None else np.inf
+            if left < best:
+                best, known[key] = left, share * most
+        return known

@@ -123,6 +123,7 @@ JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 YIELDS_m = 5e-4  # the contract's: by how much friction may yield before it slips
 YIELDS_rad = 5e-3  # chosen: the same on a wheel of a tenth of a metre
 COUNTS = 0.5  # chosen: of a channel's noise, from which its rounding makes its zero unsure
+LENGTHS = (0.03, 0.1, 0.3, 0.8)  # chosen: of the most, from the best of which a contact is fitted
 YIELDED = 0.04  # chosen: of that, from which friction is read as yielding: 20 μm on a column
 CLOCK_s = 5e-4  # chosen: by which a recorder may stamp one channel late, or early, unnoticed
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting

@@ -117,6 +117,20 @@ def test_noise_is_the_least_that_a_rig_leaves(quiet: float, floor: float) -> Non
     assert again is None or again.gaps(rig)["linkage"] == pytest.approx(2.0 / floor, rel=0.05)
 
 
+def test_a_contact_is_looked_for_at_lengths_that_a_fit_does_not_come_to() -> None:
+    """A control that sticks elsewhere leaves as much for any short contact: no slope leads away."""
+    rig = bench({"controls.column.loader.friction_N": 6.0})
+    noise = np.random.default_rng(8).normal(0.0, 1.0, FRAMES)
+
+    def moved(one: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        stiffness = one.controls["column"].loader.friction_stiffness
+        length = 6.0 / stiffness if stiffness else 0.0
+        return np.full(FRAMES, 30.0 if length < 2e-4 else 1e5 * (length - 4e-4))
+
+    found = Case(rig, "column", [Output("loader", "x", noise, moved, 1.0, 120.0)]).fit(())
+    assert found.values["setting of the contact."] == pytest.approx(4e-4, rel=0.02)
+
+
 @pytest.mark.slow
 def test_a_servos_dead_time_is_no_slower_servo(tmp_path: Path) -> None:
     """A servo of 0.39 times the frequency leaves 5 % of its gap of 25, within what may be left."""
