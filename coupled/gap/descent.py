@@ -56,18 +56,19 @@ class Descent:
         """
         near = partial(residual, wide=True)
         if self.steps != "own" or not stepped:
-            best = self._raced(near, firsts, ends)
+            share = WIDE_DIFFERENCE if stepped else 0.0
+            best = self._raced(near, firsts, ends, share)
             firsts = [best.x]
         if self.steps != "wide" and stepped:
             slopes = _Slopes(near, ends)
             best = _descended(residual, slopes, firsts[0], ends, self.most)
         return best
 
-    def _raced(self, near: Any, firsts: Sequence[Floats], ends: Ends) -> Any:
+    def _raced(self, near: Any, firsts: Sequence[Floats], ends: Ends, share: float) -> Any:
         """Return the least that is reached; a start soon far behind the best is given up."""
 
         def down(first: Floats, most: int) -> Any:
-            return _descended(near, _Slopes(near, ends, WIDE_DIFFERENCE), first, ends, most)
+            return _descended(near, _Slopes(near, ends, share), first, ends, most)
 
         if len(firsts) == 1:
             return down(firsts[0], self.most)

@@ -24,6 +24,7 @@ from coupled.gap.thresholds import (
     SMOOTHING_LOST,
     STRETCH_POWER,
     UNCORRELATED,
+    WIDE_NEAR,
     SHORTEST_STRETCH_s,
     STRETCH_s,
 )
@@ -81,7 +82,8 @@ class Output:
     `hides` what it hides, where that is known.
     `record` numbers the record that it is of; `held` are the frames held out from fits, without
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
-    One is `stepped` whose prediction runs at the loader's own steps, finer than the frames.
+    One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
+    that wider ones hardly change.
     """
 
     stage: str
@@ -98,6 +100,15 @@ class Output:
     missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     stepped: bool = False
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
+
+    def widely(self, rig: Rig) -> bool:
+        """Tell whether wide steps of the loader change the prediction by little, against the floor.
+
+        They do under a force up to half of the frame rate, and where the floor is near zero.
+        """
+        stepped = replace(self, stepped=True)
+        change = stepped.residual(rig, wide=True) - stepped.residual(rig)
+        return float(np.sqrt(np.mean(change**2))) < WIDE_NEAR
 
     def residual(self, rig: Rig, part: Part = "all", wide: bool = False) -> Floats:
         """Return measured less predicted, in floors, shape (frames,), of a part's stretches.

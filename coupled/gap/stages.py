@@ -126,7 +126,7 @@ class Reader(Reading):
     ) -> Output:
         rate, missed = self.rig.frame_rate, self.missed.seen
         made = Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
-        return replace(made, stepped=stage in STEPPED)
+        return replace(made, stepped=stage in STEPPED and made.widely(self.rig))
 
     def _schedule(self) -> list[Output]:
         pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
