@@ -18,7 +18,7 @@ from coupled.gap.noise import Noise
 from coupled.gap.output import Floats
 from coupled.gap.reading import Reading
 from coupled.gap.served import neutral
-from coupled.gap.smooth import smoothed
+from coupled.gap.smooth import Smoother, smoothed
 from coupled.gap.thresholds import PRELOAD_UNSURE
 from coupled.rig.replay import replay_product
 from coupled.rig.rig import Rig
@@ -49,12 +49,15 @@ class Product:
     def unsure(self) -> NDArray[np.bool_]:
         """Where noise in δc says on which side of neutral it is, and a breakout makes F_mod jump.
 
-        There the prediction is the measurement.
+        There the prediction is the measurement. A jump that F_mod's own noise covers counts too, where
+        it is more than the gradient's rise: δc as read is on its right side more often than δc
+        smoothed, of an analog product as of a digital one.
         """
         away, level = self._smooth - self._neutral, self._level.rms
-        jump = self._made(self._neutral + level) - self._made(self._neutral - level)
+        below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
+        jump, rise = np.abs(above - below), np.abs(beyond - above)
         near = np.abs(away) < PRELOAD_UNSURE * level
-        return np.asarray(near & (np.abs(jump) > PRELOAD_UNSURE * self.own.rms))
+        return np.asarray(near & ((jump > PRELOAD_UNSURE * self.own.rms) | (jump > 2.0 * rise)))
 
     @cached_property
     def echo(self) -> Floats:
@@ -68,13 +71,13 @@ class Product:
         if rig.controls[of.control].loader.multiplier == "digital":
             read = self._computed
         else:
-            sensed, smooth = of.sensed(rig), self._smooth if seen is None else seen
+            sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
             read = (smooth - sensed.hum(self._computed)) / sensed.scale(len(smooth))
         return np.where(self.unsure, self.recorded, self._made(read, rig))
 
     def noisy(self, rig: Rig, k: int) -> Floats:
         """Return the same of δc with the k-th sample of its noise."""
-        return self.predict(rig, with_error(self._smooth, k, self._level))
+        return self.predict(rig, with_error(self._likely, k, self._level))
 
     @cached_property
     def _computed(self) -> Floats:
@@ -83,6 +86,20 @@ class Product:
     @cached_property
     def _smooth(self) -> Floats:
         return smoothed(self._computed)
+
+    @cached_property
+    def _likely(self) -> Floats:
+        """δc as it likely was, d: with the share of what the smoother takes off that was motion.
+
+        Of a fast motion beside little noise it is a large one, and an analog product, which has
+        all of the motion, would seem to repeat the noise.
+        """
+        rest = self._computed - self._smooth
+        noise = self._level.sample(len(rest), np.random.default_rng(53))
+        alone = noise - Smoother.of(self._computed).smooth(noise)
+        power = float(rest @ rest)
+        motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
+        return self._smooth + motion * rest
 
     @cached_property
     def _level(self) -> Noise:
