@@ -49,9 +49,9 @@ class Product:
     def unsure(self) -> NDArray[np.bool_]:
         """Where noise in δc says on which side of neutral it is, and a breakout makes F_mod jump.
 
-        There the prediction is the measurement. A jump that F_mod's own noise covers counts too, where
-        it is more than the gradient's rise: δc as read is on its right side more often than δc
-        smoothed, of an analog product as of a digital one.
+        There the prediction is the measurement. A jump that F_mod's own noise covers counts too,
+        where it is more than the gradient's rise: δc as read is on its right side more often than
+        δc smoothed, of an analog product as of a digital one.
         """
         away, level = self._smooth - self._neutral, self._level.rms
         below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
