@@ -108,4 +108,22 @@ def sweep_rate() -> str:
     )
 
 
-SENTENCES = {"frame cost": frame_cost, "sweep rate": sweep_rate}
+def diagnosis_seconds() -> str:
+    """Return what the guide says a diagnosis takes; no figure without a measurement."""
+    name = "diagnosis of 60 s"
+    ends = ", wall_s by all"
+    taken = {key.removesuffix(ends): s for key, s in kept_figures(name).items() if ends in key}
+    if not taken:
+        return "How long a diagnosis takes goes by what is found: dry friction takes longest."
+    each = ", ".join(f"{s:.1f} s for {what}" for what, s in taken.items() if what != "none")
+    return (
+        f"A record of 60 s with no gap takes {taken['none']:.1f} s, one with a gap {each}, with the"
+        f" code compiled, measured on {under(name)} ([docs/benchmarks.json](docs/benchmarks.json))."
+    )
+
+
+SENTENCES = {
+    "frame cost": frame_cost,
+    "sweep rate": sweep_rate,
+    "diagnosis seconds": diagnosis_seconds,
+}
