@@ -61,3 +61,11 @@ def find(name: str, shipped: dict[str, Path], kind: str, beside: Path | None = N
         except (OSError, ValueError):  # a name that no file can have
             break
     raise InputError(name, "", f"there is no such {kind} file")
+
+
+def find_named(file: Path, key: str, name: str, shipped: dict[str, Path], kind: str) -> Path:
+    """Return the file that a key of another file names; a wrong name is that file's fault."""
+    try:
+        return find(name, shipped, kind, beside=file.parent)
+    except InputError as error:
+        raise InputError(file, key, f"{error.file}: {error.problem}") from None

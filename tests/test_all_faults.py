@@ -126,6 +126,16 @@ def test_a_runs_without_its_rig(tmp_path: Path, rig: str) -> None:
     assert sorted(one.key for one in fault.value.every) == ["duration_s", "rig"]
 
 
+def test_a_runs_misspelt_rig_beside_a_key_that_lacks(tmp_path: Path) -> None:
+    """The rig is looked at where the run's own tables are right one by one, and only a key lacks."""
+    (tmp_path / "r.toml").write_text(
+        'name = "r"\nrig = "t73"\nduration_s = 1.0\n[pilot.column]\nkind = "step"\nforce_N = 1.0\n'
+    )
+    found = faults(lambda: read_run(str(tmp_path / "r.toml")))
+    assert set(found) == {"card", "rig"}
+    assert found["rig"].startswith("t73: is no shipped rig; did you mean")
+
+
 def test_a_folders_records(tmp_path: Path) -> None:
     (tmp_path / "records.toml").write_text(RECORDS)
     assert set(faults(lambda: jobs(tmp_path, tmp_path / "out"))) == {"no", "b", "../c"}

@@ -28,7 +28,7 @@ from coupled.flight.loop import make_airframe
 from coupled.flight.manifest import input_files
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import manoeuvres_from_table
-from coupled.resources import find, shipped_runs
+from coupled.resources import find_named, shipped_runs
 from coupled.rig.rigfile import change
 from coupled.schema import load_toml
 
@@ -85,7 +85,7 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
     A run that is named by a relative path is sought beside it first.
     """
     sweep = read_sections(given, file)
-    run_file = find(sweep.run, shipped_runs(), "run", beside=file.parent)
+    run_file = find_named(file, "run", sweep.run, shipped_runs(), "run")
     run_table = load_toml(run_file)
     try_changes = partial(_changed, run_table, run_file, sweep.case)
     if sweep.case is not None:

@@ -24,7 +24,7 @@ from coupled.flight.manoeuvre import (
 )
 from coupled.flight.pilot import PILOTS, ForceTable, Pilot
 from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
-from coupled.resources import find, shipped_rigs, shipped_runs
+from coupled.resources import find, find_named, shipped_rigs, shipped_runs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, read_rig
 from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
@@ -92,20 +92,29 @@ def _checked_run(table: dict[str, Any], keys: dict[str, str], pilots: Any, file:
                 made.append(build(each, item, file, f"{key}[{i}]"))
         table[key] = made
     if not faults:
-        return build(RunFile, table, file, "")
-    sections = ("bench", "case", "expect", *Conditions.model_fields)
-    plain = {key: value for key, value in table.items() if key in keys and key not in sections}
-    with collected(faults):
-        build(RunFile, plain, file, "")
-    named = table.get("rig")
-    if isinstance(named, str) and named:  # that it lacks, or is no name, is said above
         with collected(faults):
-            _pilots(pilots, read_rig(find(named, shipped_rigs(), "rig", beside=file.parent)), file)
+            return build(RunFile, table, file, "")
+    else:
+        sections = ("bench", "case", "expect", *Conditions.model_fields)
+        plain = {key: value for key, value in table.items() if key in keys and key not in sections}
+        with collected(faults):
+            build(RunFile, plain, file, "")
+    _add_rig_faults(table, pilots, file, faults)
     raise together(faults)
 
 
+def _add_rig_faults(
+    table: dict[str, Any], pilots: Any, file: Path, faults: list[InputError]
+) -> None:
+    """Add what is wrong with the rig that a run names, and with its pilots' controls."""
+    named = table.get("rig")
+    if isinstance(named, str) and named:  # that it lacks, or is no name, is said already
+        with collected(faults):
+            _pilots(pilots, read_rig(find_named(file, "rig", named, shipped_rigs(), "rig")), file)
+
+
 def _manoeuvre(run: RunFile, file: Path, pilots: Any, case: Case, index: int) -> Manoeuvre:
-    rig_file = find(run.rig, shipped_rigs(), "rig", beside=file.parent)
+    rig_file = find_named(file, "rig", run.rig, shipped_rigs(), "rig")
     rig = _changed_rig(rig_file, case, file, index)
     pilots = copy.deepcopy(pilots)
     for key, value in case.pilot.items():

@@ -38,8 +38,8 @@ def test_every_shipped_run_reads_and_has_a_card(name: str) -> None:
     [
         ("duration_s = 4.0", "duration_s = 0.0", "duration_s", "greater than 0"),
         ("duration_s", "duration_min", "duration_min", "give duration_s instead"),
-        ('"report-column"', '"report-colum"', "", "did you mean report-column?"),
-        ('"report-column"', '"no/such.toml"', "", "there is no such rig file"),
+        ('"report-column"', '"report-colum"', "rig", "did you mean report-column?"),
+        ('"report-column"', '"no/such.toml"', "rig", "there is no such rig file"),
         ('kind = "step"', 'kind = "stepp"', "pilot.column.kind", "did you mean step?"),
         ("force_N = 30.0", "force_lb = 30.0", "pilot.column.force_lb", "give force_N"),
         ("force_N = 30.0", "force_N = nan", "pilot.column.force_N", "finite"),
