@@ -127,7 +127,7 @@ def test_a_runs_without_its_rig(tmp_path: Path, rig: str) -> None:
 
 
 def test_a_runs_misspelt_rig_beside_a_key_that_lacks(tmp_path: Path) -> None:
-    """The rig is looked at where the run's own tables are right one by one, and only a key lacks."""
+    """The rig is looked at, too, where each table of the run is right and only a key lacks."""
     (tmp_path / "r.toml").write_text(
         'name = "r"\nrig = "t73"\nduration_s = 1.0\n[pilot.column]\nkind = "step"\nforce_N = 1.0\n'
     )
