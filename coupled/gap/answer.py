@@ -44,8 +44,9 @@ def verdict_of(
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
-    doubtful = any(not s.rivals and s.effect.name not in sure for s in choice.steps)
-    left = doubtful or any(s.guilty and (s.name not in blamed or s.unexplained) for s in stages)
+    left = bool(doubted(choice, effects)) or any(
+        s.guilty and (s.name not in blamed or s.unexplained) for s in stages
+    )
     known = {one.stage: one for one in budget}
     if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
         return "unexplained"
@@ -55,6 +56,12 @@ def verdict_of(
     if any(step.rivals for step in choice.steps):
         return "ambiguous"
     return "mostly" if left else "effect"
+
+
+def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
+    """Return the effects that are not certain, though no other rivals them."""
+    alone = {step.effect.name for step in choice.steps if not step.rivals}
+    return frozenset(e.name for e in effects if e.name in alone and e.probability < CERTAIN)
 
 
 def _held(budget: StageBudget | None, effects: Collection[str]) -> float:

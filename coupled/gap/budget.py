@@ -1,12 +1,19 @@
 """The budget of a gap: how much of a stage's residual each effect found explains, and what is left.
 
-A stage's power is the mean square of its residuals on the stretches held out, in floors, with the
+A stage's power is the mean square of its residuals over all of the records, in floors, with the
 settings as they were found and no effect. Each effect's share is what it takes off, on the mean
 over all orders in which the effects could be added (Shapley 1953): with one effect, what leaving
 it out brings back. What all of them leave is noise, as far as noise can be that large, and a
-structure that is not explained. The shares sum to 1. Their intervals come from drawing the
-held-out stretches anew (the bootstrap of `shrink`): they say how far another such record's budget
-would differ.
+structure that is not explained. The shares sum to 1.
+
+Noise is that of the residual without any effect, one floor². An effect may raise the floor: the
+air's motion is found with an error, and a contact that yields lets the force's noise pass. By so
+much more it leaves, and that is of its own power, not the rig's noise.
+
+A few numbers hardly fit thousands of frames' noise, and what happens rarely, as a limit that is met
+twice, lies unevenly in two halves of a record: so all of it counts, not what was held out alone.
+The intervals come from drawing its stretches anew (the bootstrap of `shrink`): they say how far
+another such record's budget would differ.
 """
 
 from __future__ import annotations
@@ -80,8 +87,7 @@ def stage_budget(
 ) -> StageBudget | None:
     """Return a stage's budget; None where no output of its own or its neighbours' judges it.
 
-    `found` is fitted on the stretches that are not held out; `floors` are those of the improved
-    rig by record and channel, where they are higher.
+    `floors` are those of the improved rig by record and channel, where they are higher.
     """
     outputs = _outputs(stage, case.outputs, settled, found)
     if not outputs:
@@ -89,7 +95,9 @@ def stage_budget(
     players = [e for e in found.effects if touched(outputs, [e])]
     blocks = _powers(outputs, case, found, players)
     floor = [max(1.0, floors.get((o.record, o.channel), 0.0) / o.floor) ** 2 for o in outputs]
-    noise = np.concatenate([np.full(len(_held(o)), f) for o, f in zip(outputs, floor, strict=True)])
+    noise = np.concatenate(
+        [np.full(len(np.unique(o.stretches)), f) for o, f in zip(outputs, floor, strict=True)]
+    )
     draws = np.random.default_rng(7).integers(0, len(noise), (BOOTSTRAPS, len(noise)))
     weights = _Weights(players)
     whole = weights.shares(blocks, noise, np.arange(len(noise)))
@@ -113,14 +121,9 @@ def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) ->
     return wide or sorted(own, key=lambda o: -o.gap(settled.rig))[:1]
 
 
-def _held(output: Output) -> NDArray[np.intp]:
-    """Return the numbers of the stretches that hold frames held out."""
-    return np.unique(output.stretches[output.rows("held")])
-
-
 @dataclass(frozen=True)
 class _Blocks:
-    """Sums of squares, floors², by subset of the effects and held-out stretch; and its frames."""
+    """Sums of squares, floors², by subset of the effects and stretch; and a stretch's frames."""
 
     sums: Floats  # (subsets, stretches)
     frames: Floats  # (stretches,)
@@ -137,8 +140,7 @@ def _powers(
         rig = case.with_only(found, [*kept, *(e for e in found.effects if e not in players)])
         row: list[float] = []
         for output in outputs:
-            number = output.stretches[output.rows("held")]
-            square = output.residual(rig, "held") ** 2
+            number, square = output.stretches, output.residual(rig) ** 2
             row += [float(np.sum(square[number == b])) for b in np.unique(number)]
             if subset == 0:
                 frames += [float(np.sum(number == b)) for b in np.unique(number)]
@@ -155,7 +157,7 @@ class _Weights:
     def shares(self, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
         """Return the shares of the effects, of what is not explained, and of noise; they sum to 1.
 
-        `noise` is the power of noise alone on each stretch, floors².
+        `noise` is the power that noise alone leaves with the effects on each stretch, floors².
         """
         frames = blocks.frames[pick]
         power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
@@ -163,4 +165,9 @@ class _Weights:
         named = self._of @ power
         if power[0] <= 0.0:  # stretches without any residual: nothing but noise, of size zero
             return np.array([*(0.0 * named), 0.0, 1.0])
-        return np.asarray(np.array([*named, power[-1] - floor, floor]) / power[0])
+        own, taken = min(floor, 1.0), float(named.sum())
+        if taken > 0.0:
+            named = named * (1.0 + (floor - own) / taken)
+        else:
+            own = floor
+        return np.asarray(np.array([*named, power[-1] - floor, own]) / power[0])
