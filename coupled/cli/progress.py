@@ -77,7 +77,7 @@ def _lines(first: str) -> Iterator[Advance]:
 def _starting() -> str:
     """Return what is said while a command loads; compiling takes longer than all the rest."""
     from coupled.rig.compiled import compiled_before
-    from coupled.rig.frame import step_frame_at
+    from coupled.rig.placed import step_frame_at
 
     if compiled_before(step_frame_at):
         return "starting"

@@ -28,16 +28,21 @@ from coupled.errors import InputError, nearest
 from coupled.flight.everyframe import (
     LATERAL_PROPERTIES,
     LONGITUDINAL_PROPERTIES,
+    Frames,
     Lever,
+    PlainAircraft,
     motion_reader,
+    plain_frames,
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
 from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable
 from coupled.flight.newton import newton_trim
+from coupled.flight.surfacemap import flown_through
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
+from coupled.rig.placed import Placed
 from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
@@ -115,10 +120,10 @@ class JSBSimAirframe:
         self._fdm = self._load(models, frame_s, wrappers)
         self._trim(wrappers)
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
-        self.motion, self.whole_motion = motion_reader(
-            [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES],
-            [self._node(name).get_double_value for name in LATERAL_PROPERTIES] if lateral else [],
-        )
+        along = [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES]
+        across = LATERAL_PROPERTIES if lateral else ()
+        beside = [self._node(name).get_double_value for name in across]
+        self.motion, self.whole_motion = motion_reader(along, beside)
         self._height = self._node(_HEIGHT).get_double_value
         touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
         self._touching = [self._node(name).get_double_value for name in touching]
@@ -135,6 +140,10 @@ class JSBSimAirframe:
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
+        self._plain = None
+        if not hooks and flight.steps_per_frame == 1:
+            safe_m, run = self.safe_altitude_m, self._fdm.run
+            self._plain = PlainAircraft(along, beside, writes, run, safe_m, self.trouble)
         trouble = self.trouble()
         if trouble:
             raise self.fault("altitude_m", f"{trouble} at the start; choose a higher one")
@@ -249,15 +258,7 @@ class JSBSimAirframe:
 
         Spends this aircraft: it is flown through all of them, a frame each.
         """
-        commands = np.linspace(-1.5, 1.5, 601)
-        positions = np.empty_like(commands)
-        at = motion_channels(self._controls, flown=True).index(surface)
-        moved = [f"{SURFACES[control]}_rad" == surface for control in self._controls]
-        first, second, third = (*map(float, moved), 0.0, 0.0)[:3]
-        for i, command in enumerate(commands.tolist()):
-            self.step((first * command, second * command, third * command))
-            positions[i] = self.motion()[at]
-        return commands, positions
+        return flown_through(self.step, self.motion, self._controls, surface)
 
     def names(self) -> list[str]:
         """Return the names of all of the model's properties."""
@@ -286,6 +287,10 @@ class JSBSimAirframe:
     def set_gust(self, up_m_per_s: float) -> None:
         """Let a gust rise at this speed from the next step on, beside any wind."""
         self._fdm[GUST_DOWN] = -up_m_per_s / FOOT_m
+
+    def plain_frames(self, placed: Placed) -> Frames | None:
+        """Return what flies it by a rig from frame to frame; None where more acts on it."""
+        return None if self._plain is None else plain_frames(self._plain, placed)
 
     def extra(self) -> tuple[float, ...]:
         """Return the further properties, in JSBSim's units."""

@@ -6,18 +6,24 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Protocol
 
-from coupled.record.channels import BENCH_MOTION, WHOLE_MOTION
+from coupled.flight.everyframe import Frames
+from coupled.record.channels import BENCH_MOTION, LOAD, WHOLE_MOTION
+from coupled.rig.placed import Placed
 
-_NO_AIRCRAFT = (0.0,) * (WHOLE_MOTION - len(BENCH_MOTION))
+_AT_REST = (1.0,) + (0.0,) * (WHOLE_MOTION - len(BENCH_MOTION) - 1)  # its load factor first
+assert len(BENCH_MOTION) == LOAD
 
 
 class Airframe(Protocol):
     """What the frame loop flies: an aircraft, or a bench that only gives q̄."""
 
     motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
-    whole_motion: Callable[[], tuple[float, ...]]  # with zeros for those that it has not
+    whole_motion: Callable[[], tuple[float, ...]]  # at rest where it has none
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
     safe_altitude_m: float  # above it there is no ground to meet
+
+    def plain_frames(self, placed: Placed) -> Frames | None:
+        """Return what flies it by a rig from frame to frame; None where more acts on it."""
 
     def trouble(self) -> str:
         """Return why the flight cannot go on, or an empty string; asked below safe_altitude_m."""
@@ -49,10 +55,14 @@ class Bench:
         return (points[-1][1],)
 
     def _whole(self) -> tuple[float, ...]:
-        return self._now() + _NO_AIRCRAFT
+        return self._now() + _AT_REST
 
     def _next(self, commands: tuple[float, float, float], /) -> None:
         self._k += 1
+
+    def plain_frames(self, placed: Placed) -> Frames | None:
+        """Return nothing: its frames are taken one by one."""
+        return None
 
     def extra(self) -> tuple[float, ...]:
         """Return nothing: a bench has no properties."""

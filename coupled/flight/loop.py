@@ -7,7 +7,7 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -21,6 +21,7 @@ from coupled.flight.bench import Airframe, Bench
 from coupled.flight.companion import Aboard, Companion
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
+from coupled.flight.frames import Frames, Progress
 from coupled.flight.gusts import Gusts
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
@@ -28,23 +29,19 @@ from coupled.flight.pilot import Action
 from coupled.flight.pilot.base import Look, Start
 from coupled.flight.served import Served
 from coupled.record.channels import (
-    ALTITUDE,
-    LOAD,
     PRESSURE,
     ControlName,
     record_channels,
 )
 from coupled.record.record import EndedEarly, Record
 from coupled.resources import aircraft_folder
-from coupled.rig.compiled import bound
 from coupled.rig.control import ControlArray
 from coupled.rig.equations import specified_gradient
-from coupled.rig.frame import addresses, step_frame_at
 from coupled.rig.packing import pack
+from coupled.rig.placed import Placed
 from coupled.rig.recorder import lateness, stamp
 from coupled.timing import timed
 
-Progress = Callable[[int, int], None]
 Floats = NDArray[np.float64]
 
 
@@ -76,47 +73,18 @@ def fly(
     noise = data.copy() if lateness(rig) else None
     looks = _looks(controls, names, actions)
     served = Served(manoeuvre, controls, companion is not None and companion.leads)
-    extra: list[tuple[float, ...]] = []
-
-    read, step, safe_m = airframe.whole_motion, airframe.step, airframe.safe_altitude_m
-    arrays = addresses(controls, script, data, companion is not None and companion.elsewhere)
-    place = int(arrays.ctypes.data)
-    rig_frame = served.around(bound(step_frame_at, place, 0, read(), 1.0))
-    flown, asked = rig.flight is not None, bool(manoeuvre.record_properties)
-    ended: EndedEarly | None = None
-    done = 0
+    elsewhere = companion is not None and companion.elsewhere
+    placed = Placed(controls, script, data, rig.frame_rate, elsewhere)
+    flight = Frames(manoeuvre, airframe, placed, served, looks, companion, progress)
+    beside = (served, flight.extra)
     if companion is not None:
-        so_far = partial(_so_far, manoeuvre, channels, (data, noise), (served, extra))
+        so_far = partial(_so_far, manoeuvre, channels, (data, noise), beside)
         companion.board(
             Aboard(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
         )
-    try:
-        with timed("fly"):
-            for k in range(frames):
-                motion = read()
-                if companion is not None and (why := companion.before(k, motion)):
-                    ended = EndedEarly(why, k / rig.frame_rate)
-                    break
-                # Not above it: near the ground, or not a number.
-                if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
-                    ended = EndedEarly(why, k / rig.frame_rate)
-                    break
-                if looks:
-                    for state, look in looks:
-                        state["command"] = look(k / rig.frame_rate, motion)
-                load = motion[LOAD] if flown else 1.0
-                commands = rig_frame(place, k, motion, load)
-                if companion is not None:
-                    companion.after(k, commands)
-                if asked:
-                    extra.append(airframe.extra())
-                step(commands)
-                done = k + 1
-                if progress is not None and not done & 63:
-                    progress(done, frames)
-    except KeyboardInterrupt:
-        ended = EndedEarly("interrupted", done / rig.frame_rate)
-    return _flown(manoeuvre, channels, (data[:done], noise), (served, extra), ended)
+    with timed("fly"):
+        flight.fly()
+    return _flown(manoeuvre, channels, (data[: flight.done], noise), beside, flight.ended)
 
 
 def _looks(
@@ -149,7 +117,6 @@ def _flown(
     """Return the record of the frames flown, with their noise, up to the first without a number."""
     (data, noise), (served, extra), properties = flown, beside, manoeuvre.record_properties
     data, ended = _finite(data, manoeuvre.rig.frame_rate, ended)
-    data[:, 0] = np.arange(len(data)) / manoeuvre.rig.frame_rate
     if noise is not None:
         stamp(manoeuvre.rig, channels, data, noise[: len(data)])
     more, data = served.beside(data)

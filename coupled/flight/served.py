@@ -14,7 +14,7 @@ from coupled.rig.services import SERVICE_CHANNELS
 from coupled.rig.serving import noted, service_channels
 
 Floats = NDArray[np.float64]
-Frame = Callable[[int, int, tuple[float, ...], float], tuple[float, float, float]]
+Frame = Callable[[int, tuple[float, ...]], tuple[float, float, float]]
 
 
 # What a service that rests leaves at 0; what is asked of the surface is not of them.
@@ -49,11 +49,9 @@ class Served:
             return frame
         happen, rows = self._happen or (lambda: None), self._rows
 
-        def served(
-            place: int, k: int, motion: tuple[float, ...], load_factor: float
-        ) -> tuple[float, float, float]:
+        def served(k: int, motion: tuple[float, ...]) -> tuple[float, float, float]:
             happen()
-            commands = frame(place, k, motion, load_factor)
+            commands = frame(k, motion)
             noted(self._controls, self._names, self._which, rows[k])
             return commands
 

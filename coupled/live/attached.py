@@ -15,7 +15,7 @@ from coupled.flight.companion import Aboard
 from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, WATCHDOG_s
 from coupled.live.safety import Fade, Limiter, Limits
 from coupled.record.channels import channel
-from coupled.rig.frame import addresses, step_frame_at
+from coupled.rig.placed import Placed
 
 ANSWER_s = 10.0  # how long the host waits for a loader's first answer
 GONE_s = 30.0  # and for one again, before the flight ends
@@ -75,12 +75,13 @@ class Attached:
         self._check_rest()
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
-        place = addresses(controls, self._aboard.script, row, elsewhere=True)
+        rate_Hz = self._rig.frame_rate
+        placed = Placed(controls, self._aboard.script, row, rate_Hz, elsewhere=True)
         motion = self._aboard.airframe.whole_motion()
         while True:
             self._put(controls)
             row[:] = 0.0
-            step_frame_at(int(place.ctypes.data), 0, motion, 1.0)
+            placed.frame(0, motion)
             self.order(controls, row[0])
             if self._fade.share >= 1.0:
                 return

@@ -18,6 +18,7 @@ from typing import Any, TypeVar, cast, get_type_hints
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
@@ -129,8 +130,28 @@ def _pointer(context: Any, address: Any) -> Any:
     return types.voidptr(types.intp), generate
 
 
+def _call_at(context: Any, place: Any, address: Any, k: Any) -> Any:
+    """Call the machine code at a place with an address and a frame's number; inside kernels."""
+
+    def generate(generator: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole = generator.get_value_type(types.intp)
+        kind = ir.FunctionType(generator.get_value_type(types.float64), [whole, whole])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+
+    return types.float64(types.intp, types.intp, types.intp), generate
+
+
 pointer: Any = intrinsic(_pointer)
+call_at: Any = intrinsic(_call_at)
 carray: Any = numba.carray
+
+
+def machine_code(kernel: Any, *arguments: Any) -> int:
+    """Return where an entry's machine code lies, for `call_at`; it raises no error."""
+    bound(kernel, *arguments)
+    compiled = kernel.overloads[tuple(_type_of(argument) for argument in arguments)]
+    name = compiled.fndesc.llvm_cfunc_wrapper_name
+    return int(compiled.library.get_pointer_to_function(name))
 
 
 def _type_of(argument: Any) -> Any:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from coupled.record.channels import ALPHA
 from coupled.rig.compensation import estimate, misses
-from coupled.rig.compiled import carray, entry, pointer, seldom, stage
-from coupled.rig.control import CONTROL, ControlArray, ControlParameters, ControlState
+from coupled.rig.compiled import entry, seldom, stage
+from coupled.rig.control import ControlArray, ControlParameters, ControlState
 from coupled.rig.gauge import start_gauge
 from coupled.rig.hand import only_scripted
 from coupled.rig.inertia import set_inertia
@@ -249,40 +249,3 @@ def step_frame(
         p, s = controls[i].parameters, controls[i].state
         run_frame(p, s, script[i, 0], script[i, 1], k * p.clock.substeps, load_factor)
     return commands
-
-
-def addresses(
-    controls: ControlArray, script: Floats, record: Floats, elsewhere: bool = False
-) -> NDArray[np.int64]:
-    """Return addresses and sizes of `step_frame`'s arrays for `step_frame_at`; keep all alive.
-
-    `elsewhere`: hand and loader are not simulated, but measured; only the host's part is done.
-    """
-    assert all(array.flags.c_contiguous for array in (controls, script, record))
-    return np.array(
-        [
-            *(controls.ctypes.data, len(controls)),
-            *(script.ctypes.data, script.shape[2]),
-            *(record.ctypes.data, *record.shape),
-            elsewhere,
-        ]
-    )
-
-
-@entry
-def step_frame_at(
-    address: int, k: int, motion: tuple[float, ...], load_factor: float
-) -> tuple[float, float, float]:
-    """Run `step_frame` on the arrays whose addresses stand at `address`.
-
-    To hand over three arrays at every frame costs as much as half of the physics. A flight gives
-    the whole motion (`channels.WHOLE_MOTION`) on any rig, so that one kernel serves all.
-    """
-    at = carray(pointer(address), 8, np.int64)
-    controls = carray(pointer(at[0]), (at[1],), CONTROL)
-    script = carray(pointer(at[2]), (at[1], 2, at[3]), np.float64)
-    record = carray(pointer(at[4]), (at[5], at[6]), np.float64)
-    if at[7] != 0:
-        serve_frame(controls, motion, load_factor)
-        return host_frames(controls, record[k], motion)
-    return step_frame(controls, script, record, k, motion, load_factor)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.flight import loop
+from coupled.flight.companion import Aboard
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
@@ -17,7 +18,7 @@ from coupled.record.channels import record_channels
 from coupled.record.record import FORMAT, manifest_path, read_record, write_record
 from coupled.resources import shipped_rigs
 from coupled.rig.compiled import bound
-from coupled.rig.frame import step_frame_at
+from coupled.rig.placed import step_frame_at
 from coupled.rig.rigfile import read_rig, rig_from_table
 from tests.support.runs import shortened
 
@@ -113,19 +114,42 @@ def test_a_state_that_is_not_finite_ends_the_flight(
     def breaking(kernel: Any, *arguments: Any) -> Any:
         whole = bound(kernel, *arguments)
 
-        def broken(*now: Any) -> tuple[float, float, float]:
+        def broken(*now: Any) -> Any:
             nonlocal calls
             calls += 1
-            return (float("nan"), 0.0, 0.0) if calls == 100 else whole(*now)
+            return float("nan") if calls == 100 else whole(*now)
 
         return broken
 
-    monkeypatch.setattr("coupled.flight.loop.bound", breaking)
+    monkeypatch.setattr("coupled.rig.placed.bound", breaking)
     record = fly(flown)
     ended = record.manifest["ended_early"]
     assert ended["reason"] == "the state is not finite"
     assert ended["time_s"] == pytest.approx(100 / 120)
     assert np.all(np.isfinite(record.data))
+
+
+class Onlooker:
+    """Who goes along and does nothing: the flight is then taken frame by frame."""
+
+    elsewhere = leads = False
+
+    def board(self, aboard: Aboard) -> None:
+        pass
+
+    def before(self, k: int, motion: tuple[float, ...]) -> str:
+        return ""
+
+    def after(self, k: int, commands: tuple[float, float, float]) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("run", "controls"), [("pull-up-c172p", 1), ("three-controls", 3)])
+def test_frames_in_blocks_are_the_frames_one_by_one(run: str, controls: int) -> None:
+    flown = shortened(run, controls, 200)
+    in_blocks, one_by_one = fly(flown), fly(flown, companion=Onlooker())
+    assert np.ptp(in_blocks["column_surface_norm"]) > 0.01
+    assert in_blocks.data.tobytes() == one_by_one.data.tobytes()
 
 
 def test_an_interrupted_flight_keeps_its_record(tmp_path: Path) -> None:

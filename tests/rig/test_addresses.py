@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from coupled.resources import shipped_rigs
-from coupled.rig.frame import CHANNELS_PER_CONTROL, addresses, step_frame, step_frame_at
+from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.packing import pack
+from coupled.rig.placed import Placed
 from coupled.rig.rigfile import read_rig
 
 FRAMES = 40
@@ -22,12 +23,13 @@ def test_by_address_as_by_array(rig_name: str) -> None:
     noise = 1e-3 * rng.standard_normal((FRAMES, width))
     script = rng.standard_normal((len(rig.controls), 2, FRAMES * rig.substeps + 1)).cumsum(axis=2)
     given, placed = (pack(rig), noise.copy()), (pack(rig), noise.copy())
-    at = addresses(placed[0], script, placed[1])
+    at = Placed(placed[0], script, placed[1], rig.frame_rate)
     for k in range(FRAMES):
         by_array = step_frame(given[0], script, given[1], k, MOTION, MOTION[1])
-        by_address = step_frame_at(int(at.ctypes.data), k, MOTION, MOTION[1])
+        by_address = at.frame(k, MOTION)
         assert by_array == by_address
-    assert np.array_equal(given[1], placed[1])
+    assert np.array_equal(given[1][:, 1:], placed[1][:, 1:])
+    assert np.array_equal(placed[1][:, 0], np.arange(FRAMES) / rig.frame_rate)
     assert given[0].tobytes() == placed[0].tobytes()
     assert placed[1][:, -len(MOTION) :] == pytest.approx(noise[:, -len(MOTION) :] + MOTION)
 
@@ -36,4 +38,4 @@ def test_arrays_that_do_not_lie_in_one_piece_are_not_taken() -> None:
     rig = read_rig(shipped_rigs()["bench"])
     controls, script = pack(rig), np.zeros((1, 2, 9))
     with pytest.raises(AssertionError):
-        addresses(controls, script, np.zeros((8, 12))[:, ::2])
+        Placed(controls, script, np.zeros((8, 12))[:, ::2], rig.frame_rate)

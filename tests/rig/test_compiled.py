@@ -69,7 +69,7 @@ def test_a_cache_folder_that_is_set_is_used(tmp_path: Path) -> None:
 START = """
 import sys
 from coupled.rig.compiled import compiled_before
-from coupled.rig.frame import step_frame_at
+from coupled.rig.placed import step_frame_at
 print(compiled_before(step_frame_at))
 from coupled.flight.loop import fly
 from tests.support.runs import shortened

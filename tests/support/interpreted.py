@@ -117,8 +117,17 @@ def interpret() -> None:
     def plain_bound(kernel: Any, *arguments: Any) -> Any:
         return bound(kernel, *arguments) if hasattr(kernel, "compile") else kernel
 
+    placed: list[Function] = []
+
+    def number(kernel: Function, *arguments: Any) -> int:
+        placed.append(kernel)
+        return len(placed) - 1
+
     instead = {
+        "machine_code": number,
+        "call_at": lambda place, address, k: placed[place](address, k),
         "stage": plain_or(compiled.stage),
+        "seldom": plain_or(compiled.seldom),
         "entry": plain_or(compiled.entry),
         "bound": plain_bound,
         "carray": _carray,

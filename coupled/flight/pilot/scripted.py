@@ -34,7 +34,13 @@ class _Levels(Pilot):
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the scripted force."""
-        return Action(force=lambda t: self.force_N * edges(t, self.levels(), self.rise_s))
+
+        def force(times: Floats) -> Floats:
+            signal = edges(times, self.levels(), self.rise_s)
+            signal *= self.force_N
+            return signal
+
+        return Action(force=force)
 
 
 class Step(_Levels):
