@@ -15,7 +15,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from coupled.flight.everyframe import (
     Frames,
     Lever,
     PlainAircraft,
+    Read,
     motion_reader,
     plain_frames,
     stepper,
@@ -115,37 +116,29 @@ class JSBSimAirframe:
         record_file: object = "run",
         wrappers: Sequence[Wrapper] = (),
     ) -> None:
-        self._file = file
-        self._flight, self._controls = flight, tuple(controls)
+        self._file, self._flight, self._controls = file, flight, tuple(controls)
         self._fdm = self._load(models, frame_s, wrappers)
         self._trim(wrappers)
         lateral = len(motion_channels(controls, flown=True)) > len(LONGITUDINAL)
-        along = [self._node(name).get_double_value for name in LONGITUDINAL_PROPERTIES]
-        across = LATERAL_PROPERTIES if lateral else ()
-        beside = [self._node(name).get_double_value for name in across]
+        along = self._reads(LONGITUDINAL_PROPERTIES)
+        beside = self._reads(LATERAL_PROPERTIES if lateral else ())
         self.motion, self.whole_motion = motion_reader(along, beside)
         self._height = self._node(_HEIGHT).get_double_value
         touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
-        self._touching = [self._node(name).get_double_value for name in touching]
-        self._extra = [
-            self._node(name, "record_properties", record_file).get_double_value for name in record
-        ]
-        writes = []
-        for control in controls:
-            node = self._node(_COMMANDS[SURFACES[control]])
-            writes.append((node.set_double_value, node.get_double_value()))
+        self._touching = self._reads(touching)
+        self._extra = self._reads(record, "record_properties", record_file)
+        nodes = [self._node(_COMMANDS[SURFACES[control]]) for control in controls]
+        writes = [(node.set_double_value, node.get_double_value()) for node in nodes]
         plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
         hooks = [hook for wrapper in wrappers if (hook := wrapper.meet(self)) is not None]
         self.step = led_by(hooks, plain)
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
-        self._plain = None
-        if not hooks and flight.steps_per_frame == 1:
-            safe_m, run = self.safe_altitude_m, self._fdm.run
-            self._plain = PlainAircraft(along, beside, writes, run, safe_m, self.trouble)
-        trouble = self.trouble()
-        if trouble:
+        calls = (self._fdm.run, self.safe_altitude_m, self.trouble)
+        alone = not hooks and flight.steps_per_frame == 1
+        self._plain = PlainAircraft(along, beside, writes, *calls) if alone else None
+        if trouble := self.trouble():
             raise self.fault("altitude_m", f"{trouble} at the start; choose a higher one")
 
     def fault(self, key: str, problem: str) -> InputError:
@@ -215,6 +208,9 @@ class JSBSimAirframe:
             like = f", but {near[0]}" if near else ""
             raise InputError(file, key, f"{problem}{like}; none is created")
         return node
+
+    def _reads(self, names: Iterable[str], key: str = "model", file: object = None) -> list[Read]:
+        return [self._node(name, key, file).get_double_value for name in names]
 
     def _trim(self, wrappers: Sequence[Wrapper]) -> None:
         fdm, flight = self._fdm, self._flight
