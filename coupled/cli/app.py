@@ -49,7 +49,7 @@ RunArgument = Annotated[
     str, typer.Argument(help="A run file, or the name of a shipped one (coupled runs).")
 ]
 JsonOption = Annotated[
-    str, typer.Option("--json", metavar="FILE", help="Write the table as JSON; - prints it.")
+    str, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - prints it.")
 ]
 
 

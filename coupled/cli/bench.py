@@ -50,13 +50,13 @@ def bench(
         ),
     ] = None,
     strongest: StrongestOption = 150.0,
-    seed: Annotated[int, typer.Option(help="Of hand and eyes.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the errors of hand and eyes.", min=0)] = 0,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Readings, CSV (default: out/RIG-readings.csv)."),
     ] = None,
     inches: Annotated[bool, typer.Option("--inches", help="In inches and pounds.")] = False,
-    perfect: Annotated[bool, typer.Option("--perfect", help="Without any error.")] = False,
+    perfect: Annotated[bool, typer.Option("--perfect", help="Readings without any error.")] = False,
     repeat: Annotated[
         int,
         typer.Option(

@@ -22,10 +22,11 @@ app.add_typer(blind, name="blind")
 def make(
     folder: Annotated[Path, typer.Argument(help="A new folder for records, rigs and seal.")],
     key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The key.  [default: DIR.key.json]")
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write the key. (default: DIR.key.json)"),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="For the same bytes again.  [default: drawn]")
+        int | None, typer.Option(min=0, help="A seed gives the same bytes again. (default: drawn)")
     ] = None,
     records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
     rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,
@@ -33,11 +34,11 @@ def make(
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", "-j", min=0, max=512, help="Processes; 0: one a core.  [default: 0]"
+            "--workers", "-j", min=0, max=512, help="Processes; 0: one a core. (default: 0)"
         ),
     ] = None,
     cluster: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, to make them there.")
+        str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to make them there.")
     ] = "",
 ) -> None:
     """Write sealed records of an independent twin, with and without effects; the key elsewhere."""
@@ -78,7 +79,8 @@ def score(
     diagnoses: Annotated[Path, typer.Argument(help="A folder of diagnoses, rNNN.json each.")],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key of the trials.")],
     seal: Annotated[
-        Path | None, typer.Option(help="Its seal.  [default: seal.toml of DIR for DIR.key.json]")
+        Path | None,
+        typer.Option(help="The trials' seal. (default: seal.toml of DIR for DIR.key.json)"),
     ] = None,
     json_file: JsonOption = "",
     figure: Annotated[

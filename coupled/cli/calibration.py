@@ -44,7 +44,7 @@ def calibrate(
         str,
         typer.Option(
             help="A rig file, or the name of a shipped one: its travel, arc, gains and gradients"
-            f" count.  [default: {DEFAULT_RIG}]"
+            f" count. (default: {DEFAULT_RIG})"
         ),
     ] = "",
     control: ControlOption = "column",
@@ -62,7 +62,7 @@ def calibrate(
     date: Annotated[str, typer.Option(help="Noted in the rig file as given.")] = "",
     plan: Annotated[bool, typer.Option("--plan", help="Choose readings to take.")] = False,
     precision: Annotated[
-        float, typer.Option(help="Wanted of K by a plan, ± % (95 %).", min=0.1, max=100)
+        float, typer.Option(help="How well a plan is to find K, ± % (95 %).", min=0.1, max=100)
     ] = 5.0,
     strongest: StrongestOption = 150.0,
     once: OnceOption = False,

@@ -83,17 +83,17 @@ def sweep(
     ],
     folder: Annotated[
         Path | None,
-        typer.Option(help="Of the flights and their table.  [default: out/NAME]"),
+        typer.Option(help="Folder of the flights and their table. (default: out/NAME)"),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option("--workers", "-j", min=1, max=512, help="Processes.  [default: all cores]"),
+        typer.Option("--workers", "-j", min=1, max=512, help="Processes. (default: all cores)"),
     ] = None,
     cluster: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, to fly there instead.")
+        str, typer.Option(metavar="ADDRESS", help="A dask scheduler's, to fly there instead.")
     ] = "",
     figure: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG.  [default: FOLDER/sweep.png]")
+        Path | None, typer.Option(help="PNG, PDF or SVG. (default: FOLDER/sweep.png)")
     ] = None,
     json_file: JsonOption = "",
     report: ReportOption = None,

@@ -32,7 +32,7 @@ def export(
     jsbsim: Annotated[Path, typer.Option(help="The folder to write: new, or a former export.")],
     run: Annotated[
         list[str] | None,
-        typer.Option(help="A run to write scripts of; may be repeated.  [default: the rig's]"),
+        typer.Option(help="A run to write scripts of; may be repeated. (default: the rig's)"),
     ] = None,
     case: Annotated[
         str, typer.Option(help="Export the rig as this case of the run has it, and this case only.")

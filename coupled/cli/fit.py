@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def fit(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help=f"Records of the healthy machine, {RECORDS}."),
+        typer.Argument(metavar="RECORD...", help=f"Records of the healthy machine, {RECORDS}."),
     ],
     rig: Annotated[str, typer.Option(help="The rig file to start from, or a shipped one.")],
     free: Annotated[
@@ -37,7 +37,7 @@ def fit(
         typer.Option(
             metavar="KEY",
             help="A number of the control to fit, as loader.mass_kg; may be given often."
-            "  [default: those that the records judge]",
+            " (default: those that the records judge)",
         ),
     ] = None,
     control: ControlOption = "column",
@@ -47,7 +47,7 @@ def fit(
     ] = None,
     json_file: JsonOption = "",
 ) -> None:
-    """Fit a nominal rig to records of a healthy machine, and say what they do not tell."""
+    """Fit a nominal rig to records of a healthy machine, and say what they do not determine."""
     from coupled.gap.nominal import fit_nominal
     from coupled.rig.rigfile import read_rig
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 def compare(
     run: RunArgument = DEFAULT_RUN,
     figure: Annotated[
-        Path | None, typer.Option(help="The figure: PNG, PDF or SVG.  [default: out/RUN.png]")
+        Path | None, typer.Option(help="The figure: PNG, PDF or SVG. (default: out/RUN.png)")
     ] = None,
     json_file: JsonOption = "",
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
@@ -86,7 +86,7 @@ def fly(
     run: RunArgument = DEFAULT_RUN,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet.  [default: out/RUN.csv]"),
+        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/RUN.csv)"),
     ] = None,
     case: Annotated[str, typer.Option(help="Case to fly, by its label; else the first.")] = "",
     configuration: Annotated[
@@ -145,7 +145,7 @@ def fly(
 def plot(
     record: Annotated[Path, typer.Argument(help="A record, CSV or Parquet.")],
     figure: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG.  [default: beside the record]")
+        Path | None, typer.Option(help="PNG, PDF or SVG. (default: beside the record)")
     ] = None,
 ) -> None:
     """Draw a record."""

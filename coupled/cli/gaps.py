@@ -43,7 +43,7 @@ def diagnose(
     healthy: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="LOG",
+            metavar="RECORD",
             help="A record of the machine when it was well; may be given often. What differs from"
             " those is judged.",
         ),
@@ -52,7 +52,8 @@ def diagnose(
         Path | None, typer.Option(metavar="NEW.toml", help="Write the rig with the effects found.")
     ] = None,
     plots: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Draw ladder, stages and signature there.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Draw the figures ladder, stages and signature there."),
     ] = None,
     power: Annotated[
         bool, typer.Option("--power", help="Say what size of each effect would have shown.")
@@ -64,20 +65,20 @@ def diagnose(
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", "-j", min=1, max=512, help="For a folder: processes.  [default: all cores]"
+            "--workers", "-j", min=1, max=512, help="For a folder: processes. (default: all cores)"
         ),
     ] = None,
     cluster: Annotated[
         str,
         typer.Option(
-            metavar="ADDRESS", help="For a folder: of a dask scheduler, to diagnose there."
+            metavar="ADDRESS", help="For a folder: a dask scheduler's, to diagnose there."
         ),
     ] = "",
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Say where records depart from their rig, which effect causes it, and how far it shrinks."""
+    """Say where records depart from their rig, which effect causes it, and how far it then shrinks."""
     name = control_named(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}

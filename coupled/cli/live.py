@@ -45,22 +45,30 @@ def live(
         typer.Option(help="Who moves a simulated loader: pilot (the run's), page or stick."),
     ] = "",
     axes: Annotated[
-        str, typer.Option(metavar="N,N,N", help="The stick's axes: column, wheel, pedals; − turns.")
+        str,
+        typer.Option(
+            metavar="N,N,N", help="The stick's axes: column, wheel, pedals; a minus reverses one."
+        ),
     ] = "1,0,3",
     unmeasured: Annotated[
         bool, typer.Option("--unmeasured", help="The loader at udp:// does not measure δ.")
     ] = False,
     adapt: Annotated[
-        bool, typer.Option("--adapt", help="Give K as found in service to the compensation.")
+        bool, typer.Option("--adapt", help="Let the compensation follow K as estimated in flight.")
     ] = False,
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="As fast as the loader answers, not in real time.")
     ] = False,
     dashboard: Annotated[
-        bool, typer.Option("--dashboard", help="Open a page in the browser; see its address.")
+        bool,
+        typer.Option("--dashboard", help="Serve a page for the browser, and print its address."),
     ] = False,
     bind: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Where the page is served; loopback only.")
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address that serves the page; the default admits this machine only.",
+        ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Its port; 0: a free one.")] = 0,
     flightgear: Annotated[
@@ -77,7 +85,7 @@ def live(
     ] = 5000.0,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet.  [default: out/NAME.csv]"),
+        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/NAME.csv)"),
     ] = None,
     json_file: JsonOption = "",
 ) -> None:

@@ -53,14 +53,14 @@ def import_log(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Record, CSV or Parquet.  [default: out/LOG.csv]"),
+        typer.Option("--output", "-o", help="Record, CSV or Parquet. (default: out/LOG.csv)"),
     ] = None,
     rig: Annotated[
         str, typer.Option(help="Hold it against a rig file, or the name of a shipped one.")
     ] = "",
     json_file: JsonOption = "",
 ) -> None:
-    """Make a record of your own log, and tell whether each channel can be true."""
+    """Make a record of your own log, and say whether each channel is plausible."""
     if map_file is not None and suggest is not None:
         problem = "give a map, or --suggest to have one proposed: one of the two"
         raise InputError("coupled import", "--map", problem)

@@ -30,7 +30,7 @@ def draw_map(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Figure, PNG, PDF or SVG.  [default: out/RIG-map.png]"),
+        typer.Option("--output", "-o", help="Figure, PNG, PDF or SVG. (default: out/RIG-map.png)"),
     ] = None,
     units: UnitsOption = "si",
 ) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @app.command(epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -[/]")
 def models(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Models to look at.  [default: all that are here]")
+        list[str] | None, typer.Argument(help="Models to look at. (default: all that are here)")
     ] = None,
     workers: Annotated[
         int, typer.Option("--workers", "-j", help="Processes; 0 is one a core.", min=0)
@@ -73,14 +73,14 @@ def _print(rows: list[Surveyed]) -> None:
 
 
 @new.command(
-    epilog="[dim]Examples: coupled new rig T38 · coupled new rig path/to/mymodel my-rig.toml[/]"
+    epilog="[dim]Examples: coupled new rig DHC6 · coupled new rig path/to/mymodel my-rig.toml[/]"
 )
 def rig(
     model: Annotated[
         str, typer.Argument(help="A JSBSim model that is here, or the folder of another.")
     ],
     file: Annotated[
-        Path | None, typer.Argument(help="The new rig file.  [default: MODEL.toml]")
+        Path | None, typer.Argument(help="The new rig file. (default: MODEL.toml)")
     ] = None,
 ) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""

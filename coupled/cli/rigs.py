@@ -40,7 +40,9 @@ StrongestOption = Annotated[
 
 CrossedOption = Annotated[
     float,
-    typer.Option("--crossed-N", help="Held with either sign on each other control, N.", min=0),
+    typer.Option(
+        "--crossed-N", help="Force to hold with either sign on each other control, N.", min=0
+    ),
 ]
 
 

@@ -25,12 +25,12 @@ from coupled.resources import find, shipped_rigs
 def stability(
     rig: Annotated[str, typer.Argument(help="A rig file, or a shipped one.")] = DEFAULT_RIG,
     control: Annotated[
-        str, typer.Option(help="column, wheel or pedals.  [default: all that bend]")
+        str, typer.Option(help="column, wheel or pedals. (default: all that bend)")
     ] = "",
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="Figure, PNG, PDF or SVG.  [default: out/RIG-stability.png]"
+            "--output", "-o", help="Figure, PNG, PDF or SVG. (default: out/RIG-stability.png)"
         ),
     ] = None,
     json_file: JsonOption = "",
@@ -38,7 +38,7 @@ def stability(
 ) -> None:
     """Map where a rig is stable, simulated and by linear theory, over K·G_T.
 
-    Against the host's K̂, the frame of a digital product, the hand's stiffness and the servo.
+    Against the host's K̂, the frame of a digital product, the hand, the servo and the gauge.
     """
     from coupled.authority.stability.aircraft import bob_weight
     from coupled.authority.stability.limits import disagreement, stability_limits

@@ -123,9 +123,11 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
 
 def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str]:
     d, low, high = unit_of(control), _pressure(found.slowest), _pressure(found.fastest)
-    bend = _BEND_m_per_N if d == "m" else _BEND_m_per_N / _RIM_m
-    if control == "pedals":
-        bend *= 0.5
+    bend, origin = {
+        "column": (_BEND_m_per_N, "K of Cleveland's column"),
+        "wheel": (_BEND_m_per_N / _RIM_m, "K of Cleveland's column over the rim's radius"),
+        "pedals": (0.5 * _BEND_m_per_N, "half of K of Cleveland's column"),
+    }[control]
     stiffest = min(guess.full_force_N / guess.travel, _MOST_BENT / bend)
     softest = max(stiffest * low / high, 0.05 * stiffest)
     rows = (low, high) if high > 1.05 * low else (0.0, high)
@@ -147,7 +149,7 @@ def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str
         'multiplier = "hybrid"',
         "servo_frequency_Hz = 18.0  # guess",
         "servo_damping_ratio = 0.7  # guess",
-        f"bend_{d}_per_N = {bend:.4g}  # guess: K of Cleveland's column",
+        f"bend_{d}_per_N = {bend:.4g}  # guess: {origin}",
         "",
         f"[{at}.schedule]",
         "# q̄ at the slowest and the fastest trim, found; gradients in proportion to it, a guess",
