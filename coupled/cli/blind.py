@@ -26,7 +26,7 @@ def make(
         typer.Option(metavar="FILE", help="Where to write the key. (default: DIR.key.json)"),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="A seed gives the same bytes again. (default: drawn)")
+        int | None, typer.Option(min=0, help="The same seed gives the same bytes. (default: drawn)")
     ] = None,
     records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
     rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,

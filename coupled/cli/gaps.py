@@ -78,7 +78,7 @@ def diagnose(
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Say where records depart from their rig, which effect causes it, and how far it then shrinks."""
+    """Find where records depart from their rig, the effect behind it, and how far the gap shrinks."""
     name = control_named(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
