@@ -78,7 +78,7 @@ def diagnose(
     report: ReportOption = None,
     units: UnitsOption = "si",
 ) -> None:
-    """Find where records depart from their rig, the effect behind it, and how far the gap shrinks."""
+    """Find where records depart from their rig, the effect behind it, and how much it explains."""
     name = control_named(control, records[0])
     if any(record.is_dir() for record in records):
         asked = {"--improve": improve, "--plots": plots, "--power": power, "--healthy": healthy}
