@@ -67,7 +67,9 @@ def read_expecting(name: str) -> list[Manoeuvre]:
 
 def _expecting(scenarios: Sequence[Manoeuvre]) -> list[Manoeuvre]:
     if not scenarios[0].expect:
-        raise InputError(scenarios[0].file, "expect", "there is none: nothing could fail")
+        raise InputError(
+            scenarios[0].file, "expect", "is missing: without one there is nothing to check"
+        )
     return list(scenarios)
 
 

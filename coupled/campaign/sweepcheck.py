@@ -81,7 +81,9 @@ def _size_faults(sweep: SweepFile, file: Path, countable: bool) -> Iterator[Inpu
     samples = sweep.samples or 0
     if sweep.method == "sensitivity" and (samples < 8 or samples & (samples - 1)):
         near = 2 ** max(3, round(math.log2(samples)))
-        yield InputError(file, "samples", f"is a power of two from 8 with sensitivity, as {near}")
+        yield InputError(
+            file, "samples", f"must be a power of two, 8 or more, with sensitivity: {near}"
+        )
     if countable and (flights := flight_count(sweep)) > MOST_FLIGHTS:
         yield InputError(file, "vary", f"makes {flights} flights; at most {MOST_FLIGHTS}")
 
@@ -99,7 +101,7 @@ def _range_faults(sweep: SweepFile, index: int, file: Path) -> Iterator[InputErr
         yield InputError(file, place, "give values, or low and high")
         return
     if ranged and (sweep.method == "grid") != (vary.steps is not None):
-        yield InputError(file, f"{place}.steps", "is given for a range in a grid, and only there")
+        yield InputError(file, f"{place}.steps", "goes with low and high in a grid, and only there")
     low, high = vary.low or 0.0, vary.high or 0.0
     if ranged and not (low < high and (vary.spread == "even" or low > 0.0)):
         problem = "must be above low, and low above 0 where the spread is log"

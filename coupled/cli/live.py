@@ -104,7 +104,7 @@ def live(
         raise InputError("coupled live", "", "give a run, or --rig RIG, one of the two")
     who = hand or ("pilot" if run else "page" if dashboard else "")
     if rig and loader == "sim" and who not in ("page", "stick"):
-        raise InputError(rig, "--hand", "is missing: page, with --dashboard, or stick")
+        raise InputError(rig, "--hand", "is missing: give page, with --dashboard, or stick")
     if who == "page" and not dashboard:
         raise InputError("--hand", "page", "needs --dashboard")
     flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)

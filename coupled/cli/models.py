@@ -95,7 +95,7 @@ def rig(
     if found.flight is None:
         raise InputError(model, "", f"does not trim wherever it was tried: {found.why}")
     if not found.controls:
-        raise InputError(model, "", f"has no control that a rig could lead: {found.lacking[0]}")
+        raise InputError(model, "", f"has no control that a rig could move: {found.lacking[0]}")
     folder = os.path.relpath(home, path.resolve().parent) if own else ""
     text = draft(found, path.stem, folder)
     write_new(path, text, ".toml", "coupled new run, with this rig in it, and coupled compare")

@@ -207,7 +207,7 @@ def _check_bounds(expect: Expect, file: object, place: str) -> None:
                 file, f"{place}.{alien[0]}", "needs the level that is reached: reaches"
             )
         if (expect.equal is None) != (expect.within is None):
-            raise InputError(file, place, "is and within are given together")
+            raise InputError(file, place, "give is and within together")
         if expect.equal is not None and _given(expect, ("least", "most")):
             raise InputError(file, place, "give is and within, or least and most, not both")
         if expect.standard is None and not _given(expect, _BOUNDS):
@@ -250,7 +250,7 @@ def _check_flights(
             problem = f"the run flies no {name!r}; {nearest(name, configurations)}"
             raise InputError(file, f"{place}.{key}", problem)
     if not any(expect.concerns(case, c) for case in cases for c in configurations):
-        raise InputError(file, place, f"holds {expect.reference} against itself, and nothing else")
+        raise InputError(file, place, f"compares {expect.reference} with itself alone")
 
 
 def _check_channels(expect: Expect, file: object, place: str, channels: Sequence[str]) -> None:

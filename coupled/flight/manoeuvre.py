@@ -200,9 +200,9 @@ class Manoeuvre:
                 raise InputError(file, "bench", f"{rig} has an aircraft, which gives q̄ itself")
             return
         if bench is None:
-            raise InputError(file, "bench", f"is missing: {rig} has no aircraft, so say q̄")
+            raise InputError(file, "bench", f"is missing: {rig} has no aircraft, so give q̄ here")
         if self.record_properties:
-            raise InputError(file, "record_properties", f"{rig} has no aircraft to ask")
+            raise InputError(file, "record_properties", f"{rig} has no aircraft, so no properties")
         if self.conditions.given:
             raise InputError(file, self.conditions.given[0], f"{rig} has no aircraft for it")
         bench.check(file)

@@ -306,7 +306,7 @@ def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
         ('standard = "25.143"', "expect[0].standard: input should be"),
         ("most = 1.0", "expect[0]: give one of channel, measure and standard"),
         ('measure = "loss"', "expect[0]: has no bound"),
-        ('measure = "loss"\nis = 0.5', "expect[0]: is and within are given together"),
+        ('measure = "loss"\nis = 0.5', "expect[0]: give is and within together"),
         ('measure = "loss"\nis = 0.5\nwithin = 0.1\nleast = 0.0', "not both"),
         ('measure = "loss"\nleast = 0.5\nmost = 0.0', "nothing is at least 0.5 and at most 0"),
         ('measure = "loss"\nmost = 0.5\nat_s = 1.0', "at_s: has no meaning with measure"),
@@ -318,7 +318,7 @@ def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
         ('measure = "loss"\nmost = 0.5\nconfiguration = "gradient only"', "flies no 'gradient on"),
         (
             'measure = "loss"\nmost = 0.5\nminus = "rigid"\nconfiguration = "rigid"',
-            "holds rigid against itself",
+            "compares rigid with itself",
         ),
         ('standard = "25.143(d) one hand"\ncontrol = "wheel"', "control: the rig has no wheel"),
         ('standard = "25.143(d) one hand"\nmost = 1.0', "most: has no meaning with standard"),
@@ -367,7 +367,10 @@ def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["check", "push.toml"], "push.toml: expect: there is none: nothing could fail"),
+        (
+            ["check", "push.toml"],
+            "push.toml: expect: is missing: without one there is nothing to check",
+        ),
         (["check", "capture", "capture"], "capture: two of the runs have this name"),
         (["check", "capture", "--junit", "push.toml/x.xml"], "cannot be written there"),
     ],

@@ -147,7 +147,9 @@ def test_flown_losses_have_the_indices_of_their_closed_form(
 def test_samples_are_a_power_of_two(tmp_path: Path, samples: str) -> None:
     (tmp_path / "push.toml").write_text(PUSH + STRAIGHT)
     (tmp_path / "s.toml").write_text(SWEEP.replace("samples = 64", f"samples = {samples}"))
-    with pytest.raises(InputError, match="samples: is a power of two from 8 with sensitivity"):
+    with pytest.raises(
+        InputError, match="samples: must be a power of two, 8 or more, with sensitivity"
+    ):
         read_plan(tmp_path / "s.toml")
 
 

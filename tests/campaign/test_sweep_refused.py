@@ -90,7 +90,7 @@ def changed(old: str, new: str) -> str:
         (changed("pilot.column.force_N", BEND), f"vary: duplicate {BEND}"),
         (changed("high = 60.0", "high = 10.0"), "vary[1].high: must be above low"),
         (changed("high = 60.0", ""), "vary[1]: give values, or low and high"),
-        (changed("steps = 3", ""), "vary[1].steps: is given for a range in a grid"),
+        (changed("steps = 3", ""), "vary[1].steps: goes with low and high in a grid"),
         (changed("steps = 3", "steps = 9999999"), "vary[1].steps: input should be"),
         (changed("[2e-5, 4e-5, 8e-5]", "[-1.0]"), "input should be greater than or equal to 0"),
         (changed("[2e-5, 4e-5, 8e-5]", '["x"]'), "= 'x': "),
