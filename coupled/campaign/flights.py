@@ -24,6 +24,7 @@ from coupled.campaign.journal import Journal
 from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, planned_flights
 from coupled.campaign.sweepfile import Survive
 from coupled.errors import InputError
+from coupled.flight.kept import Hangar
 from coupled.flight.loop import fly
 from coupled.parallel import as_done
 from coupled.record.record import Record
@@ -34,8 +35,13 @@ _BLOCK_s = 0.25  # what a worker flies before it hands over: a kill loses no mor
 _SHARE = 16  # of what is left, at the most, in a block: so that all workers end together
 
 
-def fly_planned(plan: SweepPlan, flight: PlannedFlight) -> JournalEntry:
-    """Return what came of one flight; why it ended early, or could not be flown, is in it."""
+def fly_planned(
+    plan: SweepPlan, flight: PlannedFlight, hangar: Hangar | None = None
+) -> JournalEntry:
+    """Return what came of one flight; why it ended early, or could not be flown, is in it.
+
+    A `hangar` keeps its aircraft for the next.
+    """
     sweep, columns = plan.sweep, plan.columns
     entry = JournalEntry(
         flight.number,
@@ -53,7 +59,7 @@ def fly_planned(plan: SweepPlan, flight: PlannedFlight) -> JournalEntry:
         entry = replace(entry, seed=scenario.seed)
         if flight.configuration:
             scenario = scenario.configured(flight.configuration)
-        record = fly(scenario)
+        record = fly(scenario, hangar=hangar)
     except InputError as error:
         return replace(entry, ended_early=f"not flown: {error.problem}")
     ended = record.manifest["ended_early"]
@@ -104,14 +110,15 @@ def _fly_block(packed: bytes, flights: Sequence[PlannedFlight]) -> tuple[list[Jo
     Return them, and how long it took, s.
     """
     start = time.perf_counter()
-    entries = [fly_planned(_unpacked(packed), flight) for flight in flights]
+    plan, hangar = _unpacked(packed)
+    entries = [fly_planned(plan, flight, hangar) for flight in flights]
     return entries, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)
-def _unpacked(packed: bytes) -> SweepPlan:
-    plan: SweepPlan = pickle.loads(packed)
-    return plan
+def _unpacked(packed: bytes) -> tuple[SweepPlan, Hangar]:
+    """Return a plan, and where this worker keeps the aircraft between its flights."""
+    return pickle.loads(packed), Hangar()
 
 
 def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:

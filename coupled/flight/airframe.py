@@ -18,7 +18,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import jsbsim
 import numpy as np
@@ -37,8 +37,9 @@ from coupled.flight.everyframe import (
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable
+from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable, models_in
 from coupled.flight.newton import newton_trim
+from coupled.flight.putback import put_back
 from coupled.flight.surfacemap import flown_through
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
@@ -83,12 +84,7 @@ _base: Callable[[], Any] = jsbsim.FGJSBBase  # its debug level is the library's
 @lru_cache(maxsize=1)
 def packaged_models() -> Mapping[str, Path]:
     """Return the models that come with JSBSim: {name: folder of all models}."""
-    root = Path(jsbsim.get_default_root_dir()) / "aircraft"
-    return {folder.name: root for folder in root.iterdir() if _is_model(folder)}
-
-
-def _is_model(folder: Path) -> bool:
-    return (folder / f"{folder.name}.xml").is_file()
+    return models_in(Path(jsbsim.get_default_root_dir()) / "aircraft")
 
 
 class JSBSimAirframe:
@@ -124,7 +120,7 @@ class JSBSimAirframe:
         beside = self._reads(LATERAL_PROPERTIES if lateral else ())
         self.motion, self.whole_motion = motion_reader(along, beside)
         self._height = self._node(_HEIGHT).get_double_value
-        touching = sorted(filter(_STRUCTURE, self._catalog)) if flight.landing else [_WHEELS]
+        touching = filter(_STRUCTURE, self._catalog) if flight.landing else [_WHEELS]
         self._touching = self._reads(touching)
         self._extra = self._reads(record, "record_properties", record_file)
         nodes = [self._node(_COMMANDS[SURFACES[control]]) for control in controls]
@@ -148,10 +144,9 @@ class JSBSimAirframe:
     def _load(self, models: Sequence[Path], frame_s: float, wrappers: Sequence[Wrapper]) -> Any:
         _base().debug_lvl = 0
         jsbsim.set_logger(_log)
-        known = dict(packaged_models())
+        name, known = self._flight.model, dict(packaged_models())
         for folder in reversed(models):
-            known |= {m.name: folder for m in folder.iterdir() if _is_model(m)}
-        name = self._flight.model
+            known |= models_in(folder)
         if self._flight.folder:
             known[name] = Path(self._flight.folder)
         if name not in known:
@@ -249,6 +244,11 @@ class JSBSimAirframe:
         if not started or not math.isfinite(fdm["aero/alpha-rad"]):
             raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
+    def restart(self) -> None:
+        """Put it back and trim it again; only one around which nothing acts (`kept`)."""
+        put_back(self._fdm)
+        self._trim(())
+
     def surface_map(self, surface: str = "elevator_rad") -> tuple[Floats, Floats]:
         """Return commands about trim, and where a surface stands for each, rad.
 
@@ -277,8 +277,7 @@ class JSBSimAirframe:
     def reader(self, name: str) -> Callable[[], float] | None:
         """Return what reads a property, in JSBSim's unit; None where the model has none such."""
         node: Any = self._properties.get_node(name) if self.has(name) else None
-        read: Callable[[], float] | None = None if node is None else node.get_double_value
-        return read
+        return None if node is None else cast(Read, node.get_double_value)
 
     def set_gust(self, up_m_per_s: float) -> None:
         """Let a gust rise at this speed from the next step on, beside any wind."""

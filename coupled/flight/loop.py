@@ -23,6 +23,7 @@ from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.frames import Frames, Progress
 from coupled.flight.gusts import Gusts
+from coupled.flight.kept import Hangar, Lent
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
@@ -50,17 +51,22 @@ def fly(
     progress: Progress | None = None,
     air_m_per_s: Sequence[float] | None = None,
     companion: Companion | None = None,
+    hangar: Hangar | None = None,
 ) -> Record:
     """Fly a manoeuvre and return its record, SI, one row a frame.
 
     `progress` is called now and then with frames done and frames in all. The manifest says
     what went in, and under `ended_early` why and when a flight ended before its time.
     `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame. A
-    `companion` is called before and after each frame.
+    `companion` is called before and after each frame. A `hangar` keeps the aircraft for the next
+    flight, unless its air is given.
     """
     rig = manoeuvre.rig
+    hangar = hangar if air_m_per_s is None else None
+    make = partial(make_airframe, manoeuvre, air_m_per_s)
     with timed("trim"):
-        airframe = make_airframe(manoeuvre, air_m_per_s)
+        lent = Lent(make()) if hangar is None else hangar.lend(manoeuvre, make)
+    airframe = lent.airframe
     frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
     actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
@@ -84,6 +90,8 @@ def fly(
         )
     with timed("fly"):
         flight.fly()
+    if hangar is not None and flight.ended is None:
+        hangar.take_back(lent)
     return _flown(manoeuvre, channels, (data[: flight.done], noise), beside, flight.ended)
 
 

@@ -68,6 +68,15 @@ class NothingToScaleError(Exception):
         self.scaled = scaled
 
 
+def models_in(folder: Path) -> dict[str, Path]:
+    """Return the models of a folder: {name: the folder}."""
+    return {each.name: folder for each in folder.iterdir() if _is_model(each)}
+
+
+def _is_model(folder: Path) -> bool:
+    return (folder / f"{folder.name}.xml").is_file()
+
+
 @lru_cache(maxsize=8)
 def catalogue(text: str) -> Mapping[str, str]:
     """Return what may be done with each property of a model's catalogue: R, W or RW."""

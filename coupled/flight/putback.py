@@ -1,0 +1,42 @@
+"""A loaded JSBSim aircraft put back to what it was before its first trim, as far as JSBSim does so.
+
+`reset_to_initial_conditions` alone leaves the initial conditions of the last trim, from which the
+next one starts: a T-37 then stands 2e-9 m higher. So they are put to zero, the models are
+reset about them with a step, and once more without (a B747's fuel flow is known after the step
+only), and they are put to zero again, since the step has moved their last digits.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+# In this order: airspeed first, so that none is kept over the others; the height three times, of
+# which the first still refers to where the aircraft was.
+_ZEROS = (
+    *("vc-kts", "lat-gc-rad", "long-gc-rad", "terrain-elevation-ft"),
+    *("h-sl-ft", "h-sl-ft", "h-sl-ft"),
+    *("alpha-rad", "beta-rad", "phi-rad", "theta-rad", "psi-true-rad"),
+    *("p-rad_sec", "q-rad_sec", "r-rad_sec", "vn-fps", "ve-fps", "vd-fps"),
+)
+_WITHOUT_RUN = 2  # JSBSim's mode of a reset that takes no step
+# How many steps there were, and memory that JSBSim reads before it sets it.
+_TELLS_NOTHING = re.compile(r"simulation/frame|gear/unit(\[\d+\])?/side_friction_coeff").fullmatch
+
+
+def put_back(fdm: Any) -> None:
+    """Reset an aircraft's models and its initial conditions."""
+    _to_zero(fdm)
+    fdm.reset_to_initial_conditions(0)
+    fdm.reset_to_initial_conditions(_WITHOUT_RUN)
+    _to_zero(fdm)
+
+
+def _to_zero(fdm: Any) -> None:
+    for name in _ZEROS:
+        fdm[f"ic/{name}"] = 0.0
+
+
+def tells(name: str) -> bool:
+    """Tell whether a property says something of the aircraft."""
+    return not _TELLS_NOTHING(name)
