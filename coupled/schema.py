@@ -238,7 +238,9 @@ def changed(
             _refuse_unreal(inner, file, dotted)
         else:
             raise InputError(
-                file, f"{dotted}.{next(iter(inner))}", "leads through a value, not a table"
+                file,
+                f"{dotted}.{next(iter(inner))}",
+                "names a key within a value; only a table has keys",
             )
         values[keys[key]] = value
     try:

@@ -51,7 +51,11 @@ CLOSED = b"error: standard output: --json: is closed; give a file\n"
         ("coupled runs | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("coupled --help | true; exit ${PIPESTATUS[0]}", 141, b""),
         ("coupled runs --json - | true; exit ${PIPESTATUS[0]}", 141, b""),
-        ("mkdir gone; cd gone; rmdir ../gone; coupled runs", 2, b"working folder: is gone"),
+        (
+            "mkdir gone; cd gone; rmdir ../gone; coupled runs",
+            2,
+            b"working folder: no longer exists",
+        ),
     ],
 )
 def test_streams_that_take_no_more(folder: Path, line: str, code: int, says: bytes) -> None:

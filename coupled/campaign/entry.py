@@ -75,7 +75,7 @@ def read_entry(line: str, columns: Columns, file: object, place: str) -> Journal
     except (ValueError, RecursionError):
         raise InputError(file, place, f"is not JSON; {_REMEDY}") from None
     if not isinstance(row, dict):
-        raise InputError(file, place, f"is no flight; {_REMEDY}")
+        raise InputError(file, place, f"is no line of a flight; {_REMEDY}")
     for name in columns.names:
         if name not in row:
             raise InputError(file, place, f"lacks {name}; {_REMEDY}")

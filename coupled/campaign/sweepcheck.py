@@ -64,7 +64,7 @@ def _faults(sweep: SweepFile, file: Path) -> Iterator[InputError]:
                 yield InputError(file, name, f"duplicate {word}")
     for key in keys:
         if key.partition(".")[0] in _NO_CONDITION:
-            yield InputError(file, "vary", f"{key} changes no flight")
+            yield InputError(file, "vary", f"{key} is varied, but has no effect on any flight")
     ranges = [fault for i in range(len(sweep.vary)) for fault in _range_faults(sweep, i, file)]
     yield from ranges
     yield from _size_faults(sweep, file, countable=not ranges)

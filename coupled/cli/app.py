@@ -145,4 +145,4 @@ def _root(
     try:
         Path.cwd()
     except OSError:
-        raise InputError("working folder", "", "is gone; change to another") from None
+        raise InputError("working folder", "", "no longer exists; change to another") from None

@@ -44,7 +44,7 @@ def check(
     names = [scenarios[0].name for scenarios in found]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(name, "", "two of the runs have this name")
+            raise InputError(name, "", "two of the runs given have this name; give each once")
     inputs = [file for scenarios in found for s in scenarios for file in input_files(s)]
     if junit is not None:
         check_target(junit, inputs)

@@ -190,14 +190,14 @@ def _check_subject(expect: Expect, file: object, place: str) -> None:
     else:
         alien += _given(expect, (*_BOUNDS, "minus"))
     if alien:
-        raise InputError(file, f"{place}.{alien[0]}", f"has no meaning with {subjects[0]}")
+        raise InputError(file, f"{place}.{alien[0]}", f"cannot be given with {subjects[0]}")
 
 
 def _check_bounds(expect: Expect, file: object, place: str) -> None:
     if expect.reaches is not None:
         alien = _given(expect, (*_BOUNDS, "minus", "at"))
         if alien:
-            raise InputError(file, f"{place}.{alien[0]}", "has no meaning with reaches")
+            raise InputError(file, f"{place}.{alien[0]}", "cannot be given with reaches")
         if not _given(expect, ("by", "not_before")):
             raise InputError(file, place, "reaches needs by_s, not_before_s, or both")
     else:

@@ -63,14 +63,16 @@ def fit_nominal(
     ]
     outputs = [output.halved(rig) for output in _outputs(readers)]
     if not outputs:
-        raise InputError(next(iter(records)), "", "lets no stage be judged, so nothing be fitted")
+        problem = "holds too little to judge any stage by, so nothing can be fitted"
+        raise InputError(next(iter(records)), "", problem)
     chosen = tuple(keys) or default_keys(rig, control, {output.stage for output in outputs})
     effects = [freed(rig, control, key) for key in chosen]
     for key, effect in zip(chosen, effects, strict=True):
         if not touched(outputs, [effect]):
             lacking = sorted({n for r in readers for n in r.missing().get(effect.stage, [])})
             needs = ", ".join(lacking) or f"what judges the {effect.stage}"
-            raise InputError(next(iter(records)), key, f"nothing depends on it; it lacks {needs}")
+            problem = f"nothing in these records depends on it; they lack {needs}"
+            raise InputError(next(iter(records)), key, problem)
     _tell(tell, "fitting", 0, len(records) + 2)
     held = fit(rig, control, outputs, effects, part="fitted")
     _tell(tell, "fitting to all", 1, len(records) + 2)

@@ -77,9 +77,9 @@ class Switches:
         """Make a change that is not remembered, as an adaptation makes them."""
         name, place = self._control(control), f"{control}.{what}"
         if what not in KEYS:
-            raise InputError("switch", place, f"is none; {nearest(what, KEYS)}")
+            raise InputError("switch", place, f"is no switch; {nearest(what, KEYS)}")
         if what in HARDWARE and self._elsewhere:
-            raise InputError("switch", place, "is the real loader's own; change it there")
+            raise InputError("switch", place, "is set on the real loader itself; change it there")
         if what in _WIDEST and value > _WIDEST[what]:
             raise InputError("switch", place, f"is {value:g} N; at most {_WIDEST[what]:g}")
         at = f"controls.{name}"

@@ -86,7 +86,10 @@ def changed(old: str, new: str) -> str:
         (changed("pilot.column.force_N", "pilot.colum.force_N"), "vary[1]: pilot.colum.force_N"),
         (changed("pilot.column.force_N", "nothing"), "vary[1]: nothing = 20.0: unknown key"),
         (changed("pilot.column.force_N", "event.gust.to"), "has no event 'gust'; it has none"),
-        (changed("pilot.column.force_N", "expect.most"), "vary: expect.most changes no flight"),
+        (
+            changed("pilot.column.force_N", "expect.most"),
+            "vary: expect.most is varied, but has no effect",
+        ),
         (changed("pilot.column.force_N", BEND), f"vary: duplicate {BEND}"),
         (changed("high = 60.0", "high = 10.0"), "vary[1].high: must be above low"),
         (changed("high = 60.0", ""), "vary[1]: give values, or low and high"),
