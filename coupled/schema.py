@@ -240,7 +240,7 @@ def changed(
             raise InputError(
                 file,
                 f"{dotted}.{next(iter(inner))}",
-                "names a key within a value; only a table has keys",
+                "names a key within a value, not a table",
             )
         values[keys[key]] = value
     try:

@@ -140,7 +140,7 @@ def _changed(
         if head in ("rig", "pilot") and rest:
             case.setdefault(head, {})[rest] = value
         elif not change(tables, key, value):
-            raise InputError(file, key, "names a key within a value; only a table has keys")
+            raise InputError(file, key, "names a key within a value, not a table")
     tables["case"] = [case]
     return manoeuvres_from_table(tables, file)[0]
 

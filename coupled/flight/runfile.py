@@ -122,7 +122,7 @@ def _manoeuvre(run: RunFile, file: Path, pilots: Any, case: Case, index: int) ->
         if not isinstance(pilots, dict) or key.split(".")[0] not in pilots or "." not in key:
             raise InputError(file, place, "no such pilot; write CONTROL.KEY of one in this run")
         if not change(pilots, key, value):
-            raise InputError(file, place, "names a key within a value; only a table has keys")
+            raise InputError(file, place, "names a key within a value, not a table")
     conditions = {key: getattr(run, key) for key in Conditions.model_fields}
     try:
         return Manoeuvre(

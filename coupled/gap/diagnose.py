@@ -86,9 +86,8 @@ def _diagnose(
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
-        raise InputError(
-            file, "", "holds too little to judge any stage by; it lacks " + ", ".join(lacking)
-        )
+        problem = f"holds too little to judge any stage by; it lacks {', '.join(lacking)}"
+        raise InputError(file, "", problem)
     library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()), control)]
     library = under_motion(library) if readers[0].moved else library
 

@@ -169,9 +169,7 @@ class Host:
         control, service, value = word.control, word.text, word.value
         try:
             if self.elsewhere:
-                raise InputError(
-                    "service", service, "is done by the real loader itself; ask for it there"
-                )
+                raise InputError("service", service, "is done by the real loader itself; ask it")
             check_led(self.switches.rig, control, service, value, "service", service)
         except InputError as error:
             self.plan.warn(str(error))

@@ -111,7 +111,7 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
     lines.append(f"altitude_m = {flight.altitude:g}               # it trims here, and {holds}")
     lines.append(
         f"calibrated_airspeed_m_per_s = {flight.calibrated_airspeed:g}"
-        f"  # it trims and answers from {found.slowest:g} to {found.fastest:g} m/s, as far as was tried"
+        f"  # it trims and answers from {found.slowest:g} to {found.fastest:g} m/s, as tried"
     )
     if not found.direct:
         lines.append("direct_controls = false         # a law or lag of the model's own is between")

@@ -19,7 +19,7 @@ def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
     table = load_toml(path)
     for key, value in (changes or {}).items():
         if not change(table, key, value):
-            raise InputError(path, key, "names a key within a value; only a table has keys")
+            raise InputError(path, key, "names a key within a value, not a table")
     return rig_from_table(table, path)
 
 

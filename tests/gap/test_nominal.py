@@ -124,7 +124,7 @@ def test_what_cannot_be_fitted_is_refused() -> None:
     record = moved([0.1] * 5)
     for key, why in (
         ("loader.mass", "unknown key"),
-        ("loader.servo_frequency_Hz", "lacks column_deflection_m"),
+        ("loader.servo_frequency_Hz", "they lack column_deflection_m"),
         ("loader.multiplier", "not a single number"),
         ("hand.mass_kg", "no number to fit"),
     ):
