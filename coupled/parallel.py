@@ -43,10 +43,20 @@ class HaltedError(Exception):
 
 @dataclass(frozen=True)
 class _Team:
-    """So many threads that may work at once, and whether they are to stop."""
+    """So many threads that may work at once, and whether they are to stop.
+
+    `places` are the threads that may still begin: one that waits for others gives its own up.
+    """
 
     threads: int = 1
+    places: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
     halt: threading.Event = field(default_factory=threading.Event)
+    above: _Team | None = None  # that within whose work this one works
+
+    @property
+    def halted(self) -> bool:
+        """Whether its work, or that of which it is a part, is not wanted any more."""
+        return self.halt.is_set() or (self.above is not None and self.above.halted)
 
 
 _ALONE = _Team()
@@ -56,7 +66,8 @@ _team: ContextVar[_Team] = ContextVar("_team", default=_ALONE)
 @contextmanager
 def threads(count: int) -> Iterator[None]:
     """Let `in_threads` use so many threads within; 0 is one a core."""
-    before = _team.set(_Team(cores(count)))
+    most = cores(count)
+    before = _team.set(_Team(most, threading.Semaphore(most - 1)))
     try:
         yield
     finally:
@@ -67,12 +78,14 @@ def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
     """Return what `work` gives of each item, in their order, by the threads that there are.
 
     What one raises is raised here, and halts the others (`go_on`), as an interruption does. Work
-    within work has no more threads. Compiled stages and large arrays run beside each other.
+    within work takes the threads that the outer one leaves idle. Compiled stages and large arrays
+    run beside each other.
     """
-    count = min(_team.get().threads, len(items))
-    if count < 2:
+    outer = _team.get()
+    if outer.threads < 2 or len(items) < 2:
         return [work(item) for item in items]
-    team, todo, done = _Team(), SimpleQueue[int](), dict[int, T]()
+    team = _Team(outer.threads, outer.places, above=outer)
+    todo, done = SimpleQueue[int](), dict[int, T]()
     faults: list[BaseException] = []
     for number in range(len(items)):
         todo.put(number)
@@ -92,24 +105,40 @@ def in_threads(work: Callable[[S], T], items: Sequence[S]) -> list[T]:
         finally:
             _team.reset(before)
 
-    helpers = [threading.Thread(target=some, daemon=True) for _ in range(count - 1)]
+    def help_out() -> None:
+        try:
+            some()
+        finally:
+            team.places.release()
+
+    helpers: list[threading.Thread] = []
     try:
-        for helper in helpers:
-            helper.start()
+        while len(helpers) < len(items) - 1 and team.places.acquire(blocking=False):
+            helpers.append(threading.Thread(target=help_out, daemon=True))
+            helpers[-1].start()
         some()
-        for helper in helpers:
-            while helper.is_alive():
-                helper.join(_ATTENTIVE_s)
+        if helpers:
+            _wait_for_all(helpers, team.places)
     finally:  # interrupted
         team.halt.set()
     for fault in faults:
         raise fault
+    go_on()  # what is not done was halted from without
     return [done[number] for number in range(len(items))]
+
+
+def _wait_for_all(helpers: Sequence[threading.Thread], places: threading.Semaphore) -> None:
+    """Wait for threads to end; meanwhile another may work in this one's place."""
+    places.release()
+    for helper in helpers:
+        while helper.is_alive():
+            helper.join(_ATTENTIVE_s)
+    places.acquire()
 
 
 def go_on() -> None:
     """Raise HaltedError where this thread's work is not wanted any more."""
-    if _team.get().halt.is_set():
+    if _team.get().halted:
         raise HaltedError
 
 

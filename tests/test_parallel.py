@@ -20,17 +20,44 @@ def test_threads_give_what_one_gives_in_the_same_order() -> None:
         assert in_threads(square, range(20)) == alone == [x * x for x in range(20)]
 
 
+def _idents() -> set[int]:
+    def at_work(_: int) -> int:
+        time.sleep(0.002)
+        return threading.get_ident()
+
+    return set(in_threads(at_work, range(4)))
+
+
 def test_two_threads_work_at_once_and_their_own_work_has_no_more() -> None:
     met = threading.Barrier(2, timeout=10.0)
 
-    def meet(_: int) -> list[int]:
+    def meet(_: int) -> set[int]:
         met.wait()  # breaks unless another is there
-        return in_threads(lambda _: threading.get_ident(), range(4))
+        inner = _idents()
+        met.wait()
+        return inner
 
     with threads(2):
-        inner = in_threads(meet, range(2))
-    assert all(len(set(each)) == 1 for each in inner)
-    assert inner[0] != inner[1]
+        one, other = in_threads(meet, range(2))
+    assert len(one) == len(other) == 1
+    assert one != other
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_work_within_work_takes_the_thread_that_is_done(first: int) -> None:
+    met = threading.Barrier(2, timeout=10.0)
+
+    def meet(number: int) -> bool:
+        met.wait()
+        until_s = time.monotonic() + 10.0
+        while number == first:
+            if len(_idents()) == 2:
+                return True
+            assert time.monotonic() < until_s
+        return False
+
+    with threads(2):
+        assert in_threads(meet, range(2)) == [first == 0, first == 1]
 
 
 def test_without_leave_there_is_one_thread() -> None:
@@ -56,6 +83,29 @@ def test_a_fault_is_raised_where_the_work_was_asked_for_and_halts_the_rest() -> 
         in_threads(one, range(2))
     assert halted.is_set()
     go_on()  # what comes after goes on
+
+
+def test_a_fault_halts_the_work_within_the_others_work() -> None:
+    met, halted = threading.Barrier(2, timeout=10.0), threading.Event()
+
+    def inner(_: int) -> None:
+        while True:
+            go_on()
+            time.sleep(0.001)
+
+    def one(x: int) -> None:
+        met.wait()
+        if x == 0:
+            raise KeyError("broken")
+        try:
+            in_threads(inner, range(2))
+        except HaltedError:
+            halted.set()
+            raise
+
+    with threads(2), pytest.raises(KeyError, match="broken"):
+        in_threads(one, range(2))
+    assert halted.is_set()
 
 
 def test_an_interruption_halts_the_helpers() -> None:
