@@ -13,8 +13,10 @@ laws, as JSBSim has them, and the surface is compared with the motion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +50,30 @@ COMPARED = (
     "sideslip_rad",
 )
 TRIM = "elevator_trim_rad"  # where the elevator stands in trim
-_KEPT = 8  # flights remembered
+_KEPT = 12  # flights remembered
+
+
+class Flights:
+    """The last flights of a record, by the aircraft, what its surfaces did, and how the air moved.
+
+    A rig that flies as another did need not be flown again.
+    """
+
+    def __init__(self) -> None:
+        self._known: list[tuple[tuple[Any, ...], Flown | None]] = []
+
+    def of(self, asked: tuple[Any, ...], fly: Callable[[], Flown]) -> Flown | None:
+        """Return what was asked for, as it is known or flown; None where the aircraft has none."""
+        for known, flown in self._known:
+            if known == asked:
+                return flown
+        made: Flown | None
+        try:
+            made = fly()
+        except InputError:  # no trim with such a mass, lift or moment
+            made = None
+        self._known[:] = [*self._known[1 - _KEPT :], (asked, made)]
+        return made
 
 
 @dataclass
@@ -59,22 +84,23 @@ class Model:
     moved: Sequence[Moved]
     compared: tuple[str, ...]
     air: Air | None
-    _flown: list[tuple[Flight, Flown | None]] = field(default_factory=list)
+    flights: Flights = field(default_factory=Flights)
 
     def flown(self, rig: Rig) -> Flown | None:
         """Return the compared channels and the trim as `rig` has them; None where it has none."""
         assert rig.flight is not None
         flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        for known, flown in self._flown:
-            if known == flight:
-                return flown
-        made: Flown | None
-        try:
-            made = self.fly(flight, self.moved)
-        except InputError:  # no trim with such a mass, lift or moment
-            made = None
-        self._flown[:] = [*self._flown[1 - _KEPT :], (flight, made)]
-        return made
+        asked = (flight, self.compared, _digest(self.moved))
+        return self.flights.of(asked, lambda: self.fly(flight, self.moved))
+
+    def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
+        """Return by how much errors of the surfaces' motion and of the air change the flight."""
+        assert self.rig.flight is not None
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        asked = (flight, self.compared, _digest(wrong), "with error")
+        flown = self.flights.of(asked, lambda: self.fly(flight, wrong, with_error=True))
+        assert flown is not None  # as without
+        return flown.motion - plain.motion
 
     def fly(self, flight: Flight, moved: Sequence[Moved], with_error: bool = False) -> Flown:
         """Return the flight that the surfaces make.
@@ -90,13 +116,28 @@ class Model:
         return fly_open_loop(flight, rate_Hz, controls, moved, self.compared, air)
 
 
+def _digest(moved: Sequence[Moved]) -> bytes:
+    """Return what tells one motion of the surfaces from another."""
+    found = sha256()
+    for one in moved:
+        found.update(repr((one.channel, one.trim, one.filed)).encode())
+        for values in (one.values, *(one.points or ())):
+            found.update(values.tobytes())
+    return found.digest()
+
+
 def needs(rig: Rig) -> tuple[str, ...]:
     """Return the channels without which the airframe cannot be judged."""
     return (RATE, surface_channel("column")) if "column" in rig.controls else (RATE,)
 
 
-def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
-    """Return the airframe's outputs; none for a bench or where its channels lack."""
+def airframe_outputs(
+    rig: Rig, record: Record, number: int = 0, flights: Flights | None = None
+) -> list[Output]:
+    """Return the airframe's outputs; none for a bench or where its channels lack.
+
+    `flights` are those of the same record that are known.
+    """
     if rig.flight is None or any(name not in record for name in needs(rig)):
         return []
     known = motion_channels(list(rig.controls), flown=True)
@@ -107,10 +148,11 @@ def airframe_outputs(rig: Rig, record: Record, number: int = 0) -> list[Output]:
     trims = {control: trim for control, trim in each.items() if trim is not None}
     places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
-    model = Model(rig, right, compared, vertical_air(record, 1.0 / rig.frame_rate))
+    air = vertical_air(record, 1.0 / rig.frame_rate)
+    model = Model(rig, right, compared, air, Flights() if flights is None else flights)
     flown = model.flown(rig)
     assert flown is not None  # as the rig is filed, it trims
-    carried = model.fly(rig.flight, wrong, with_error=True).motion - flown.motion
+    carried = model.carried(wrong, flown)
     outputs = []
     for i, name in enumerate(compared):
         noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])

@@ -9,6 +9,7 @@ from itertools import count
 import numpy as np
 
 from coupled.gap.case import Case
+from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.descent import Descent, leaves_noise
 from coupled.gap.effect import Effect, value_of
 from coupled.gap.fit import Fit, touched
@@ -21,10 +22,12 @@ from coupled.gap.thresholds import (
     HARDLY,
     RACE_BEHIND,
     RACE_EVALUATIONS,
+    RACE_FLIGHTS,
 )
 from coupled.parallel import in_threads
 
 Starts = list[dict[str, float]]
+Fits = list[tuple[Effect, Fit]]
 
 
 def fitted_candidates(
@@ -75,6 +78,7 @@ def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, fl
 
 
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
+FLOWN = Descent("wide", RACE_FLIGHTS)
 
 
 def _fitted(
@@ -87,25 +91,30 @@ def _fitted(
     tries = [(effect, start) for effect, starts in screened for start in starts]
     begun, many = count(), Counter(effect.name for effect, _ in tries)
 
+    def first(effect: Effect) -> Descent:
+        if STAGE_OF[effect.stage].flown:
+            return FLOWN
+        return BEGUN if many[effect.name] > 1 else WIDE
+
     def begin(tried: tuple[Effect, dict[str, float]]) -> tuple[Effect, Fit]:
         effect, start = tried
         if case.tell is not None:
             case.tell(f"fitting {effect.name}", next(begun), len(tries))
         values = {**current.values, **start}
-        first = BEGUN if many[effect.name] > 1 else WIDE
-        return effect, _beside(case, current, effect, values, first)
+        return effect, _beside(case, current, effect, values, first(effect))
 
     def go_on(begun: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
         effect, fitted = begun
-        if many[effect.name] == 1:
+        if first(effect) is WIDE:
             return begun
-        return effect, _beside(case, current, effect, fitted.values, WIDE)
+        return effect, _beside(case, current, effect, fitted.values, WIDE, fitted)
 
     def finish(near: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
         effect, fitted = near
-        return effect, _beside(case, current, effect, fitted.values, Descent("own"))
+        return effect, _beside(case, current, effect, fitted.values, Descent("own"), fitted)
 
-    fits = in_threads(go_on, _still_racing(case, in_threads(begin, tries)))
+    racing, given_up = _still_racing(case, in_threads(begin, tries))
+    fits = [*in_threads(go_on, racing), *given_up]
     found = _possible(case, list(_least(fits).values()))
     near = _near_the_best(case, current, found)
     far = [each for each in found if each not in near]
@@ -118,9 +127,10 @@ def _beside(
     effect: Effect,
     values: Mapping[str, float],
     descent: Descent,
+    near: Fit | None = None,
 ) -> Fit:
     """Return an effect fitted on every other stretch beside the current ones, from these values."""
-    return case.fit((*current.effects, effect), "fitted", values, effect, descent)
+    return case.fit((*current.effects, effect), "fitted", values, effect, descent, near)
 
 
 def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
@@ -133,18 +143,32 @@ def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
     return best
 
 
-def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
-    """Return the fits of each effect that are not far behind its best one.
+def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits, Fits]:
+    """Return the fits of each effect that are not far behind its best one, and the effects left.
 
-    Where that leaves noise alone, the others are given up.
+    Where that leaves noise alone, its others are given up. Of effects that have to be flown, one
+    is left as it is where another leaves noise alone of the same outputs, and it is far behind.
     """
     best = _least(begun)
-    behind = {name: 1.0 if _leaves_noise(case, *one) else RACE_BEHIND for name, one in best.items()}
-    return [
+    noise = {name for name, one in best.items() if _leaves_noise(case, *one)}
+    least = {
+        best[name][0].shows_in: best[name][1].cost
+        for name in sorted(noise, key=lambda name: -best[name][1].cost)
+    }
+    left = {
+        name
+        for name, (effect, fitted) in best.items()
+        if STAGE_OF[effect.stage].flown
+        and fitted.cost > RACE_BEHIND * least.get(effect.shows_in, np.inf)
+    }
+    racing = [
         (effect, fitted)
         for effect, fitted in begun
-        if fitted.cost <= behind[effect.name] * best[effect.name][1].cost
+        if effect.name not in left
+        and fitted.cost
+        <= (1.0 if effect.name in noise else RACE_BEHIND) * best[effect.name][1].cost
     ]
+    return racing, [best[name] for name in best if name in left]
 
 
 def _leaves_noise(case: Case, effect: Effect, fitted: Fit) -> bool:

@@ -163,15 +163,18 @@ class Case:
         start: Mapping[str, float] | None = None,
         only: Effect | None = None,
         descent: Descent = WHOLE,
+        near: Fit | None = None,
     ) -> Fit:
         """Return the effects fitted, with the settings free within their tolerance.
 
-        With `only`, just that one and what shares an output with it; the others stay.
+        With `only`, just that one and what shares an output with it; the others stay. `near` is a
+        fit of this case that ended at the start.
         """
         free = self.nuisances(effects)
         start = self._with_length(effects, free, start or {})
         given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
-        return fit(*given, replace(descent, known=self._known))
+        known = {} if near is None else near.slopes
+        return fit(*given, replace(descent, known=self._known, slopes=known))
 
     def _with_length(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]

@@ -75,7 +75,8 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
             break
         best = _simplest(case, settled, ranked)
         steps.append(_step(case, settled, best, ranked))
-        current = case.fit((*current.effects, best.effect), start=best.fit.values)
+        found = best.fit
+        current = case.fit((*current.effects, best.effect), start=found.values, near=found)
         idle -= set(best.effect.shows_in)
         even = even_reading(current.effects, current.values)
         if even is not None:
@@ -132,7 +133,7 @@ def _needless(case: Case, current: Fit) -> Effect | None:
     """Return the effect found earlier that those found since have made needless, if any."""
     if len(current.effects) < 2:
         return None
-    whole = case.fit(current.effects, "fitted", current.values)
+    whole = case.fit(current.effects, "fitted", current.values, near=current)
     least: tuple[float, Effect] | None = None
     for effect in current.effects[:-1]:
         rest = tuple(other for other in current.effects if other is not effect)

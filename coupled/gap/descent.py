@@ -6,7 +6,7 @@ residual by the loader's own steps least.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Literal, Protocol
@@ -15,19 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from coupled.gap.slopes import Ends, Floats, Slope, Slopes
 from coupled.gap.thresholds import (
-    DIFFERENCE,
-    DIFFERENCE_STEPS,
+    ENOUGH,
     FIT_ITERATIONS,
     NOISE_LEFT,
     RACE_BEHIND,
     RACE_EVALUATIONS,
     WIDE_DIFFERENCE,
 )
-from coupled.parallel import in_threads
 
-Floats = NDArray[np.float64]
-Ends = tuple[Floats, Floats]
+Rows = NDArray[np.bool_] | slice
+EVERY = slice(None)
 
 
 class Residual(Protocol):
@@ -38,50 +37,75 @@ class Residual(Protocol):
 
 
 @dataclass(frozen=True)
+class End:
+    """Where least squares end: scaled numbers, residual and Jacobian of the rows that were fitted.
+
+    `cost` is half the residual's sum of squares, `slope` what is known of all rows.
+    """
+
+    x: Floats
+    cost: float
+    fun: Floats
+    jac: Floats
+    slope: Slope | None
+
+
+@dataclass(frozen=True)
 class Descent:
     """By which `steps` of the loader, and by how many evaluations at `most` with each.
 
     By its `own` alone from a start that is near; by `wide` ones alone where the end is not needed.
-    `known` remembers what was fitted to the same outputs, so that none is fitted twice.
+    `known` remembers what was fitted to the same outputs, so that none is fitted twice; `slopes`
+    are those of a fit to them that ended at the start, by the keys of its numbers.
     """
 
     steps: Literal["wide", "own", "both"] = "both"
     most: int = FIT_ITERATIONS
     known: dict[Any, Any] | None = field(default=None, repr=False, compare=False)
+    slopes: Mapping[tuple[str, ...], Slope | None] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
-    def end(self, residual: Residual, firsts: Sequence[Floats], ends: Ends, stepped: bool) -> Any:
-        """Return the least that is reached from several starts, between two `ends`.
+    def end(
+        self,
+        residual: Residual,
+        firsts: Sequence[Floats],
+        ends: Ends,
+        stepped: bool,
+        rows: Rows = EVERY,
+        slope: Slope | None = None,
+    ) -> End:
+        """Return the least of some rows that is reached from several starts, between two `ends`.
 
-        Where nothing is `stepped` finer than the frames, all steps are alike.
+        Where nothing is `stepped` finer than the frames, all steps are alike. With a single start,
+        `slope` may be what another fit that ended there knew.
         """
         near = partial(residual, wide=True)
+        best: End | None = None
         if self.steps != "own" or not stepped:
             share = WIDE_DIFFERENCE if stepped else 0.0
-            best = self._raced(near, firsts, ends, share)
-            firsts = [best.x]
+            search = _Search(near, near, ends, rows, share, smooth=not stepped)
+            best = self._raced(search, firsts, slope)
         if self.steps != "wide" and stepped:
-            slopes = _Slopes(near, ends)
-            best = _descended(residual, slopes, firsts[0], ends, self.most)
+            first, known = (firsts[0], slope) if best is None else (best.x, best.slope)
+            best = _Search(residual, near, ends, rows).down(first, self.most, known)
+        assert best is not None
         return best
 
-    def _raced(self, near: Any, firsts: Sequence[Floats], ends: Ends, share: float) -> Any:
+    def _raced(self, search: _Search, firsts: Sequence[Floats], slope: Slope | None) -> End:
         """Return the least that is reached; a start soon far behind the best is given up."""
-
-        def down(first: Floats, most: int) -> Any:
-            return _descended(near, _Slopes(near, ends, share), first, ends, most)
-
         if len(firsts) == 1:
-            return down(firsts[0], self.most)
-        begun = [down(first, RACE_EVALUATIONS) for first in firsts]
-        begun.sort(key=lambda one: float(one.cost))
+            return search.down(firsts[0], self.most, slope)
+        begun = [search.down(first, RACE_EVALUATIONS) for first in firsts]
+        begun.sort(key=lambda one: one.cost)
         if self.most <= RACE_EVALUATIONS:
             return begun[0]
-        best = down(begun[0].x, self.most)
+        best = search.down(begun[0].x, self.most, begun[0].slope)
         for other in begun[1:]:
             behind = other.cost > RACE_BEHIND * begun[0].cost
             if behind or leaves_noise(best.cost, len(best.fun)):
                 break
-            best = min(best, down(other.x, self.most), key=lambda one: float(one.cost))
+            best = min(best, search.down(other.x, self.most, other.slope), key=lambda one: one.cost)
         return best
 
 
@@ -93,40 +117,36 @@ def leaves_noise(cost: float, frames: int) -> bool:
     return 2.0 * cost <= NOISE_LEFT**2 * frames
 
 
-def _descended(residual: Any, slopes: _Slopes, first: Floats, ends: Ends, most: int) -> Any:
-    """Return where least squares lead from a start, by slopes that may be another residual's."""
-    x0 = np.clip(first, ends[0] + 1e-9, ends[1] - 1e-9)
-    until = {"xtol": 1e-4, "ftol": 1e-5, "max_nfev": most}
-    return least_squares(residual, x0, slopes, bounds=ends, **until)
+@dataclass(frozen=True)
+class _Search:
+    """Least squares of some rows, by slopes that may be another residual's."""
 
+    residual: Any
+    sloping: Any
+    ends: Ends
+    rows: Rows
+    share: float = 0.0
+    smooth: bool = False
 
-class _Slopes:
-    """Derivatives by differences, over steps that change the residual by about a third of a floor.
+    def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
+        """Return where they lead from a start, by so many evaluations at most.
 
-    Friction, breakout and play move the residual in small jumps: a difference over less than
-    those says nothing of where the fit should go, nor of how well it knows. Far from the end the
-    jumps are larger: a difference is over no less than a `share` of the residual.
-    """
+        Slopes that were corrected by much are taken anew at the end, and may lead on.
+        """
+        slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
+        x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
+        frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
+        until = {"xtol": 5e-4, "ftol": max(1e-5, ENOUGH / max(frames, 1000))}
 
-    def __init__(self, residual: Any, ends: Ends, share: float = 0.0) -> None:
-        self._residual, self._share = residual, share
-        self._low, self._high = ends
-        self._step = np.full(len(self._low), 0.01)
+        def left(x: Floats) -> Floats:
+            return np.asarray(self.residual(x)[self.rows])
 
-    def __call__(self, x: Floats) -> Floats:
-        here = self._residual(x)
-        wanted = max(DIFFERENCE, self._share * float(np.sqrt(np.mean(here**2))))
-
-        def column(i: int) -> Floats:
-            value = x[i]
-            room = max(self._high[i] - value, value - self._low[i])
-            step = min(self._step[i], 0.5 * room)
-            there = x.copy()
-            there[i] = value + (step if self._high[i] - value > step else -step)
-            change = self._residual(there) - here
-            size = float(np.sqrt(np.mean(change**2)))
-            growth = np.clip(wanted / max(size, 1e-9), 0.1, 10.0)
-            self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
-            return np.asarray(change / (there[i] - value))
-
-        return np.column_stack(in_threads(column, range(len(x))))
+        while True:
+            found = least_squares(left, x0, slopes, bounds=self.ends, max_nfev=most, **until)
+            most -= found.nfev
+            if slopes.sure or most < 1:
+                break
+            slopes.renew()
+            x0 = found.x
+        known = None if slopes.last is None else slopes.last.kept()
+        return End(found.x, float(found.cost), found.fun, found.jac, known)

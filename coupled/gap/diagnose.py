@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import partial
 
 from coupled.errors import InputError
-from coupled.gap.airframe import airframe_outputs, trim_speed
+from coupled.gap.airframe import Flights, airframe_outputs, trim_speed
 from coupled.gap.answer import doubted, effects_of, settings_of, verdict_of
 from coupled.gap.budget import stage_budget
 from coupled.gap.case import Case, Tell
@@ -81,7 +81,8 @@ def _diagnose(
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]
     raised = list if baseline is None else baseline.raised
-    judged = _outputs(readers)
+    flights = [Flights() for _ in readers]
+    judged = _outputs(readers, flights)
     outputs = [output.halved(rig) for output in raised(judged)]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
@@ -97,7 +98,7 @@ def _diagnose(
         if not known or known[0][0] != other:
             flown = [one for one in judged if one.stage == "airframe"]
             anew = [replace(reader, rig=other) for reader in readers]
-            made = raised(_outputs(anew, flown if _fly_alike(rig, other) else None))
+            made = raised(_outputs(anew, flights, flown if _fly_alike(rig, other) else None))
             known[:] = [(other, made)]
         return known[0][1]
 
@@ -109,7 +110,8 @@ def _diagnose(
     effects = effects_of(case, choice, readers, stages)
     if unsure := doubted(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
-    fitted = case.fit(choice.fit.effects, "fitted", choice.fit.values, descent=Descent("own"))
+    last, own = choice.fit, Descent("own")
+    fitted = case.fit(last.effects, "fitted", last.values, descent=own, near=last)
     floors = floors_of(case, choice)
     budgets = [
         stage_budget(stage.name, case, choice.settled, choice.fit, floors)
@@ -138,11 +140,16 @@ def _diagnose(
     )
 
 
-def _outputs(readers: Sequence[Reader], flown: Sequence[Output] | None = None) -> list[Output]:
+def _outputs(
+    readers: Sequence[Reader], flights: Sequence[Flights], flown: Sequence[Output] | None = None
+) -> list[Output]:
     """Return the outputs that records let judge; `flown` are the airframe's, where known."""
     makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
     if flown is None:
-        makers += [partial(airframe_outputs, r.rig, r.record, r.number) for r in readers]
+        makers += [
+            partial(airframe_outputs, r.rig, r.record, r.number, known)
+            for r, known in zip(readers, flights, strict=True)
+        ]
     made = in_threads(lambda make: make(), makers)
     return [output for each in [*made, flown or []] for output in each]
 

@@ -19,6 +19,7 @@ from scipy.stats import t as student
 from coupled.gap.descent import WHOLE, Descent
 from coupled.gap.effect import Effect, Parameter, possible
 from coupled.gap.output import Output, Part, memory
+from coupled.gap.slopes import Slope
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -40,6 +41,10 @@ class Fit:
     cost: float  # half the sum of squares, in floors
     # {keys of parameters fitted together: JᵀJ in their own units}, J in floors
     information: Mapping[tuple[str, ...], Floats] = field(default_factory=dict, compare=False)
+    # {the same: the slopes of all frames where it ended}, to begin another fit by
+    slopes: Mapping[tuple[str, ...], Slope | None] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
 
 def touched(outputs: Sequence[Output], effects: Sequence[Effect]) -> list[Output]:
@@ -74,6 +79,7 @@ def fit(
     high: dict[str, float] = {}
     bound: tuple[str, ...] = ()
     cost, information = 0.0, dict[tuple[str, ...], Floats]()
+    slopes = dict[tuple[str, ...], Slope | None]()
     for group in _groups(every):
         if only is None or only in group:
             ours = touched(outputs, group)
@@ -82,6 +88,7 @@ def fit(
             low, high, bound = low | found.low, high | found.high, bound + found.at_bound
             values, cost = values | found.values, cost + found.cost
             information[tuple(found.values)] = found.information
+            slopes[tuple(found.values)] = found.slope
             continue
         keys, frees = _free(group)
         values |= dict(zip(keys, _starts(keys, frees, start or {})[0], strict=True))
@@ -92,7 +99,7 @@ def fit(
     rig = possible(nominal, control, every, values)
     if rig is None:
         rig, bound = nominal, tuple(values)
-    return Fit(tuple(effects), values, low, high, bound, rig, cost, information)
+    return Fit(tuple(effects), values, low, high, bound, rig, cost, information, slopes)
 
 
 def _groups(effects: Sequence[Effect]) -> list[list[Effect]]:
@@ -120,6 +127,7 @@ class _Group:
     at_bound: tuple[str, ...]
     cost: float
     information: Floats
+    slope: Slope | None = None
 
 
 # {effects, which are nuisances, part, whether by wide steps, evaluations, values at the starts:
@@ -166,7 +174,7 @@ def _fit(
 ) -> _Group:
     keys, frees = _free(effects)
     scale = np.array([_scale(p) for p in frees])
-    frames = sum(int(output.rows(part).sum()) for output in ours)
+    frames = sum(len(output.measured) for output in ours)
 
     def residual(scaled: Floats, wide: bool = False) -> Floats:
         go_on()
@@ -174,19 +182,22 @@ def _fit(
         rig = possible(nominal, control, effects, values)
         if rig is None:
             return np.full(frames, _FAR)
-        return np.concatenate([output.residual(rig, part, wide) for output in ours])
+        return np.concatenate([output.residual(rig, wide=wide) for output in ours])
 
     if not ours:
         known = dict(zip(keys, _starts(keys, frees, start)[0], strict=True))
         return _Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
+    rows = np.concatenate([output.rows(part) for output in ours])
     if not keys:
-        left = residual(np.array([]))
+        left = residual(np.array([]))[rows]
         return _Group({}, {}, {}, (), 0.5 * float(left @ left), np.zeros((0, 0)))
     ends = np.array([p.bounds(nominal, control) for p in frees]).T
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
     firsts = [np.array(first) / scale for first in _starts(keys, frees, start)]
-    best = descent.end(residual, firsts, (low, high), stepped)
+    best = descent.end(
+        residual, firsts, (low, high), stepped, rows, descent.slopes.get(tuple(keys))
+    )
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     within = {one.value_key(p) for one in nuisances for p in one.free}
     known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
@@ -205,8 +216,9 @@ def _fit(
         dict(zip(keys, (values - half).tolist(), strict=True)),
         dict(zip(keys, (values + half).tolist(), strict=True)),
         tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
-        float(best.cost),
+        best.cost,
         np.asarray(best.jac.T @ best.jac) / np.outer(scale, scale),
+        best.slope,
     )
 
 

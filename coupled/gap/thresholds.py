@@ -137,9 +137,17 @@ WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 17 blind records (s
 WIDE_NEAR = 0.25  # floors; 26 blind records (seed 101) stand under 0.16, an oscillator's above 0.35
 WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
 RACE_EVALUATIONS = 6  # chosen: of each start, after which they are compared,
+RACE_FLIGHTS = 3  # chosen: the same where each is a flight, which is nearly linear in its numbers
 NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
 RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
+BELIEVED = 0.3  # chosen: of a smooth move, by which slopes may miss it and be corrected by that,
+MOST_CORRECTIONS = 6  # chosen: and how often, before differences are taken anew
+MOVED_LEAST = 1e-3  # chosen: floors of such a move, under which they stay
+SURE_OF = 0.05  # chosen: share of it, up to which they say as much as new ones
+MOVED_LITTLE = 0.1  # chosen: floors by which what jumps has moved, under which its slopes stay
+ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
+SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
 
 # A nominal rig from records (`nominal`).
 ALIKE = 0.05  # least eigenvalue of signatures' cosines: two at cosine 0.95 are one answer together

@@ -1,0 +1,126 @@
+"""Slopes of a residual, by differences, and how long they are believed.
+
+A difference costs a replay for each number. Where a residual that jumps has hardly moved, slopes
+are as good as new ones: over less than a difference, there is nothing to be learnt. A smooth one is
+seen to go as the slopes say, and they are corrected by what they missed of its last move (Broyden,
+Math. Comp. 19, 1965).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.thresholds import (
+    BELIEVED,
+    DIFFERENCE,
+    DIFFERENCE_STEPS,
+    MOST_CORRECTIONS,
+    MOVED_LEAST,
+    MOVED_LITTLE,
+    SLOPES_KEPT,
+    SURE_OF,
+)
+from coupled.parallel import in_threads
+
+Floats = NDArray[np.float64]
+Ends = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Slope:
+    """A residual of all frames where it was known last, and what each scaled number changes it by.
+
+    `left` has shape (frames,), in floors, `jacobian` (frames, numbers).
+    """
+
+    at: Floats
+    left: Floats
+    jacobian: Floats
+
+    def kept(self) -> Slope | None:
+        """Return it, to begin another fit by; None where it would take much memory."""
+        return self if self.jacobian.size <= SLOPES_KEPT else None
+
+
+class Slopes:
+    """Derivatives by differences, over steps that change the residual by about a third of a floor.
+
+    Friction, breakout and play move the residual in small jumps: a difference over less than
+    those says nothing of where the fit should go, nor of how well it knows. Far from the end the
+    jumps are larger: a difference is over no less than a `share` of the residual. One that has
+    none is `smooth`. `last` is what was known last, from another fit of the same numbers to the
+    same frames too.
+    """
+
+    def __init__(
+        self,
+        residual: Callable[[Floats], Floats],
+        ends: Ends,
+        rows: NDArray[np.bool_] | slice,
+        share: float = 0.0,
+        last: Slope | None = None,
+        smooth: bool = False,
+    ) -> None:
+        self._residual, self._rows, self._share = residual, rows, share
+        self._smooth = smooth
+        self._low, self._high = ends
+        self._step = np.full(len(self._low), 0.01)
+        self.last = last
+        self.corrections = 0  # since the last differences
+        self.sure = True  # they missed little
+
+    def __call__(self, x: Floats) -> Floats:
+        """Return the slopes of the rows fitted, shape (rows, numbers)."""
+        here = self._residual(x)
+        jacobian = self._believed(x, here)
+        if jacobian is None:
+            jacobian = self._differences(x, here)
+            self.last, self.corrections = Slope(x.copy(), here, jacobian), 0
+            self.sure = True
+        return np.asarray(jacobian[self._rows])
+
+    def renew(self) -> None:
+        """Forget what was known, so that differences are taken next."""
+        self.last = None
+
+    def _believed(self, x: Floats, here: Floats) -> Floats | None:
+        """Return the slopes by what was known last; None where that says too little."""
+        last = self.last
+        if last is None or len(last.left) != len(here):
+            return None
+        moved, step = here - last.left, x - last.at
+        size = _rms(moved)
+        if not self._smooth or size <= MOVED_LEAST:
+            return last.jacobian if size <= MOVED_LITTLE else None
+        missed = _rms(moved - last.jacobian @ step)
+        if self.corrections >= MOST_CORRECTIONS or missed > BELIEVED * size:
+            return None
+        change = np.outer(moved - last.jacobian @ step, step / float(step @ step))
+        self.last = Slope(x.copy(), here, last.jacobian + change)
+        self.corrections += 1
+        self.sure = self.sure and missed <= SURE_OF * size
+        return self.last.jacobian
+
+    def _differences(self, x: Floats, here: Floats) -> Floats:
+        wanted = max(DIFFERENCE, self._share * _rms(here[self._rows]))
+
+        def column(i: int) -> Floats:
+            value = x[i]
+            room = max(self._high[i] - value, value - self._low[i])
+            step = min(self._step[i], 0.5 * room)
+            there = x.copy()
+            there[i] = value + (step if self._high[i] - value > step else -step)
+            change = self._residual(there) - here
+            growth = np.clip(wanted / max(_rms(change[self._rows]), 1e-9), 0.1, 10.0)
+            self._step[i] = float(np.clip(step * growth, *DIFFERENCE_STEPS))
+            return np.asarray(change / (there[i] - value))
+
+        return np.column_stack(in_threads(column, range(len(x))))
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
