@@ -136,7 +136,7 @@ class _Search:
         slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
         x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
-        until = {"xtol": 5e-4, "ftol": max(1e-5, ENOUGH / max(frames, 1000))}
+        until = {"xtol": 1e-4, "ftol": max(1e-5, ENOUGH / max(frames, 1000))}
 
         def left(x: Floats) -> Floats:
             return np.asarray(self.residual(x)[self.rows])

@@ -81,8 +81,7 @@ def _diagnose(
         Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
     ]
     raised = list if baseline is None else baseline.raised
-    flights = [Flights() for _ in readers]
-    judged = _outputs(readers, flights)
+    judged = _outputs(readers, flights := [Flights() for _ in readers])
     outputs = [output.halved(rig) for output in raised(judged)]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
@@ -110,8 +109,8 @@ def _diagnose(
     effects = effects_of(case, choice, readers, stages)
     if unsure := doubted(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
-    last, own = choice.fit, Descent("own")
-    fitted = case.fit(last.effects, "fitted", last.values, descent=own, near=last)
+    last = choice.fit
+    fitted = case.fit(last.effects, "fitted", last.values, descent=Descent("own"), near=last)
     floors = floors_of(case, choice)
     budgets = [
         stage_budget(stage.name, case, choice.settled, choice.fit, floors)
@@ -146,10 +145,8 @@ def _outputs(
     """Return the outputs that records let judge; `flown` are the airframe's, where known."""
     makers: list[Callable[[], list[Output]]] = [reader.outputs for reader in readers]
     if flown is None:
-        makers += [
-            partial(airframe_outputs, r.rig, r.record, r.number, known)
-            for r, known in zip(readers, flights, strict=True)
-        ]
+        pairs = zip(readers, flights, strict=True)
+        makers += [partial(airframe_outputs, r.rig, r.record, r.number, one) for r, one in pairs]
     made = in_threads(lambda make: make(), makers)
     return [output for each in [*made, flown or []] for output in each]
 

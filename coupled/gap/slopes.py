@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.thresholds import (
-    BELIEVED,
     DIFFERENCE,
     DIFFERENCE_STEPS,
+    MISSED_LITTLE,
+    MISSED_MOST,
     MOST_CORRECTIONS,
     MOVED_LEAST,
     MOVED_LITTLE,
     SLOPES_KEPT,
-    SURE_OF,
 )
 from coupled.parallel import in_threads
 
@@ -76,7 +76,7 @@ class Slopes:
     def __call__(self, x: Floats) -> Floats:
         """Return the slopes of the rows fitted, shape (rows, numbers)."""
         here = self._residual(x)
-        jacobian = self._believed(x, here)
+        jacobian = self._still_good(x, here)
         if jacobian is None:
             jacobian = self._differences(x, here)
             self.last, self.corrections = Slope(x.copy(), here, jacobian), 0
@@ -87,7 +87,7 @@ class Slopes:
         """Forget what was known, so that differences are taken next."""
         self.last = None
 
-    def _believed(self, x: Floats, here: Floats) -> Floats | None:
+    def _still_good(self, x: Floats, here: Floats) -> Floats | None:
         """Return the slopes by what was known last; None where that says too little."""
         last = self.last
         if last is None or len(last.left) != len(here):
@@ -97,12 +97,12 @@ class Slopes:
         if not self._smooth or size <= MOVED_LEAST:
             return last.jacobian if size <= MOVED_LITTLE else None
         missed = _rms(moved - last.jacobian @ step)
-        if self.corrections >= MOST_CORRECTIONS or missed > BELIEVED * size:
+        if self.corrections >= MOST_CORRECTIONS or missed > MISSED_MOST * size:
             return None
         change = np.outer(moved - last.jacobian @ step, step / float(step @ step))
         self.last = Slope(x.copy(), here, last.jacobian + change)
         self.corrections += 1
-        self.sure = self.sure and missed <= SURE_OF * size
+        self.sure = self.sure and missed <= MISSED_LITTLE * size
         return self.last.jacobian
 
     def _differences(self, x: Floats, here: Floats) -> Floats:

@@ -141,11 +141,12 @@ RACE_FLIGHTS = 3  # chosen: the same where each is a flight, which is nearly lin
 NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
 RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of a parameter's scale
-BELIEVED = 0.3  # chosen: of a smooth move, by which slopes may miss it and be corrected by that,
+MISSED_MOST = 0.3  # chosen: of a smooth move, by which slopes may miss it and be corrected by that,
 MOST_CORRECTIONS = 6  # chosen: and how often, before differences are taken anew
 MOVED_LEAST = 1e-3  # chosen: floors of such a move, under which they stay
-SURE_OF = 0.05  # chosen: share of it, up to which they say as much as new ones
-MOVED_LITTLE = 0.1  # chosen: floors by which what jumps has moved, under which its slopes stay
+MISSED_LITTLE = 0.05  # chosen: share of it, up to which they say as much as new ones
+MOVED_LITTLE = 0.02  # floors by which what jumps has moved, under which its slopes stay; by 0.1 one
+# of 24 blind records (seed 101) was led into a hollow
 ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
 SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
 
