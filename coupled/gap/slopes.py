@@ -1,4 +1,4 @@
-"""Slopes of a residual, by differences, and how long they are believed.
+"""Slopes of a residual, by differences, and how long they hold.
 
 A difference costs a replay for each number. Where a residual that jumps has hardly moved, slopes
 are as good as new ones: over less than a difference, there is nothing to be learnt. A smooth one is
