@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from coupled.errors import InputError, nearest
@@ -13,6 +14,12 @@ def _shipped(kind: str) -> Path:
     package = Path(__file__).parent
     installed = package / "shipped" / kind
     return installed if installed.is_dir() else package.parent / kind
+
+
+@lru_cache(maxsize=8)
+def _files(folder: Path, pattern: str) -> dict[str, Path]:
+    """Return shipped files by name; they stay, and each flight of a sweep asks for its rig."""
+    return {path.stem: path for path in sorted(folder.glob(pattern))}
 
 
 def aircraft_folder() -> Path:
@@ -27,17 +34,17 @@ def runs_folder() -> Path:
 
 def shipped_rigs() -> dict[str, Path]:
     """Return the shipped rig files by name."""
-    return {p.stem: p for p in sorted(aircraft_folder().glob("*/*.toml"))}
+    return _files(aircraft_folder(), "*/*.toml").copy()
 
 
 def shipped_runs() -> dict[str, Path]:
     """Return the shipped run files by name."""
-    return {p.stem: p for p in sorted(runs_folder().glob("*.toml"))}
+    return _files(runs_folder(), "*.toml").copy()
 
 
 def shipped_sweeps() -> dict[str, Path]:
     """Return the shipped sweep files by name."""
-    return {p.stem: p for p in sorted(runs_folder().glob("sweeps/*.toml"))}
+    return _files(runs_folder(), "sweeps/*.toml").copy()
 
 
 def starter(name: str) -> Path:

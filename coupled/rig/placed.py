@@ -9,11 +9,13 @@ that put the motion beside the arrays and call one frame step, which is compiled
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.record.channels import WHOLE_MOTION
+from coupled.record.channels import LONGITUDINAL, WHOLE_MOTION
 from coupled.rig.compiled import bound, call_at, carray, entry, machine_code, pointer
 from coupled.rig.control import CONTROL, ControlArray
 from coupled.rig.frame import host_frames, serve_frame, step_frame
@@ -34,9 +36,6 @@ class Placed:
     behind it, and returns three commands.
     """
 
-    run_column: Callable[..., float]
-    run_all: Callable[..., Commands]
-
     def __init__(
         self,
         controls: ControlArray,
@@ -46,6 +45,7 @@ class Placed:
         elsewhere: bool = False,
     ) -> None:
         assert all(array.flags.c_contiguous for array in (controls, script, record))
+        kernels = _kernels()
         beside = np.zeros(_BESIDE)
         beside[-1] = frame_rate_Hz
         self._kept = (controls, script, record, beside)
@@ -54,12 +54,11 @@ class Placed:
                 *(controls.ctypes.data, len(controls)),
                 *(script.ctypes.data, script.shape[2]),
                 *(record.ctypes.data, *record.shape),
-                *(elsewhere, beside.ctypes.data, machine_code(step_frame_at, 0, 0)),
+                *(elsewhere, beside.ctypes.data, kernels.step_frame),
             ]
         )
         self.address = int(self._place.ctypes.data)
-        self.run_column = bound(_run_column, 0, 0, *(0.0,) * 8)
-        self.run_all = bound(_run_all, 0, 0, *(0.0,) * WHOLE_MOTION)
+        self.run_column, self.run_all = kernels.run_column, kernels.run_all
 
     def frame(self, k: int, motion: tuple[float, ...]) -> Commands:
         """Run frame k under the whole motion, and return the surface commands of all controls."""
@@ -140,3 +139,19 @@ def _run_all(
     b[12], b[13], b[14] = beta, roll, heading
     first: float = call_at(at[9], address, k)
     return first, b[15], b[16]
+
+
+class Kernels(NamedTuple):
+    """The machine code of the entries; `step_frame` is where it lies."""
+
+    step_frame: int
+    run_column: Callable[..., float]
+    run_all: Callable[..., Commands]
+
+
+@lru_cache(maxsize=1)
+def _kernels() -> Kernels:
+    """Return the machine code, which numba takes a third of a millisecond to find."""
+    along, whole = (0.0,) * len(LONGITUDINAL), (0.0,) * WHOLE_MOTION
+    code = machine_code(step_frame_at, 0, 0)
+    return Kernels(code, bound(_run_column, 0, 0, *along), bound(_run_all, 0, 0, *whole))

@@ -17,7 +17,7 @@ from coupled.flight.runfile import read_run
 from coupled.record.channels import record_channels
 from coupled.record.record import FORMAT, manifest_path, read_record, write_record
 from coupled.resources import shipped_rigs
-from coupled.rig.compiled import bound
+from coupled.rig import placed
 from coupled.rig.placed import step_frame_at
 from coupled.rig.rigfile import read_rig, rig_from_table
 from tests.support.runs import shortened
@@ -111,17 +111,13 @@ def test_a_state_that_is_not_finite_ends_the_flight(
     flown = manoeuvre(tmp_path, 'kind = "step"\nforce_N = 10.0')
     calls = 0
 
-    def breaking(kernel: Any, *arguments: Any) -> Any:
-        whole = bound(kernel, *arguments)
+    def broken(*now: Any) -> float:
+        nonlocal calls
+        calls += 1
+        return float("nan") if calls == 100 else whole.run_column(*now)
 
-        def broken(*now: Any) -> Any:
-            nonlocal calls
-            calls += 1
-            return float("nan") if calls == 100 else whole(*now)
-
-        return broken
-
-    monkeypatch.setattr("coupled.rig.placed.bound", breaking)
+    whole = placed._kernels()
+    monkeypatch.setattr(placed, "_kernels", lambda: whole._replace(run_column=broken))
     record = fly(flown)
     ended = record.manifest["ended_early"]
     assert ended["reason"] == "the state is not finite"
