@@ -9,7 +9,7 @@ from coupled.gap.effect import Effect, value_of
 from coupled.gap.fit import Fit
 from coupled.gap.gain import Candidate, ranked_by_gain
 from coupled.gap.library import EFFECTS
-from coupled.gap.thresholds import LEAST_GAIN
+from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
 
 ORDER = [effect.name for effect in EFFECTS]
 
@@ -17,17 +17,36 @@ ORDER = [effect.name for effect in EFFECTS]
 def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -> list[Candidate]:
     """Return the candidates whose intervals say something, by their gain.
 
-    Where none of them gains, one of a single number may, whose interval on half of the record is
-    as wide as what the others leave: the whole record judges it in the end.
+    Half of a record has few stretches for its intervals to go by: one that says nothing there, but
+    foretells the other half far better than any that does, is asked on all of it. Where none gains,
+    one of a single number may, whose interval is as wide as what the others leave: the whole record
+    judges it in the end.
     """
     open_ones = [one for one in found if says_nothing(case, *one)]
-    ranked = ranked_by_gain(case.outputs, current, [one for one in found if one not in open_ones])
+    told = [one for one in found if one not in open_ones]
+    ranked = ranked_by_gain(case.outputs, current, told)
+    asked = _told_by_all(case, current, ranked, open_ones)
+    if asked:
+        ranked = ranked_by_gain(case.outputs, current, [*told, *asked])
     if ranked and ranked[0].gain >= LEAST_GAIN:
         return ranked
     single = [one for one in open_ones if len(one[0].free) == 1]
     others = ranked_by_gain(case.outputs, current, single) if single else ranked
     # Two that are one law differ by rounding alone: the library's order settles it.
     return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
+
+
+def _told_by_all(
+    case: Case, current: Fit, told: Sequence[Candidate], open_ones: Sequence[tuple[Effect, Fit]]
+) -> list[tuple[Effect, Fit]]:
+    """Return those of the open ones that gain far more, and say something on all of the record."""
+    least = max([LEAST_GAIN, *(one.gain for one in told)]) + RIVAL_GAIN
+    better = [one for one in ranked_by_gain(case.outputs, current, open_ones) if one.gain > least]
+    return [
+        (one.effect, one.fit)
+        for one in better
+        if not says_nothing(case, one.effect, case.fit(one.fit.effects, start=one.fit.values))
+    ]
 
 
 def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:

@@ -1,7 +1,7 @@
 """A control-loading rig, whole: its data, what the physics refuses of them, and changes to them.
 
 Beyond each value's own bounds a rig is refused for what the physics cannot give: a gradient
-stiffer than the structure (K·G_T ≥ 1, where eq. (12) is singular), a table that does
+stiffer than the structure (K̂·G_T ≥ 1, where eq. (12) is singular), a table that does
 not rise, a converter that the signal would overflow.
 """
 
@@ -237,11 +237,13 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             f"{key}.break_deflection_{d}",
             f"a second segment needs both break_deflection_{d} and second_gradient_N_per_{d}",
         )
-    bends = {
-        f"{path}.loader.bend_{d}_per_N": control.loader.bend,
-        f"{path}.loader.bend_push_{d}_per_N": control.loader.bend_push or 0.0,
-        f"{path}.compensation.bend_{d}_per_N": control.compensation.bend,
-    }
+    # The host corrects for K̂. A real structure may be softer than that, or none would be found so.
+    bends = {f"{path}.compensation.bend_{d}_per_N": control.compensation.bend}
+    if control.compensation.bend == 0.0:
+        bends = {
+            f"{path}.loader.bend_{d}_per_N": control.loader.bend,
+            f"{path}.loader.bend_push_{d}_per_N": control.loader.bend_push or 0.0,
+        }
     for table_key, gradient in tables.items():
         if len(gradient) != len(pressures):
             raise InputError(

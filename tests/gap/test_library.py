@@ -85,7 +85,7 @@ def test_no_other_module_spells_an_effect() -> None:
 
 
 def test_numbers_that_the_physics_cannot_give_are_refused_as_a_file_would_be() -> None:
-    rig = bench()
+    rig = bench({"controls.column.compensation.bend_m_per_N": 0.0})
     stiff = {"bend.bend_{d}_per_N": 5e-4}  # K·G_T = 1.09
     with pytest.raises(InputError, match=r"K·G_T = 1\.09"):
         apply(rig, "column", [BY_NAME["bend"]], stiff)

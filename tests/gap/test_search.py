@@ -6,15 +6,17 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from coupled.gap import choose
+from coupled.gap import choose, information
 from coupled.gap.case import Case
 from coupled.gap.choose import searched
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effect import Effect
 from coupled.gap.fit import Fit, _half_width, fit
 from coupled.gap.gain import Candidate
 from coupled.gap.information import may_be_plainer, says_nothing
@@ -80,6 +82,29 @@ def test_a_loop_may_leave_the_bend_as_it_is_filed(share: tuple[float, float], si
         (loop,), {key: 0.5 * (low[key] + high[key]) for key in low}, low, high, (), rig, 1.0
     )
     assert says_nothing(Case(rig, "column", []), loop, found) is silent
+
+
+@pytest.mark.parametrize(("gain", "asked"), [(40.0, True), (32.0, False)])
+def test_what_half_a_record_leaves_open_is_asked_on_all_of_it_if_it_gains_far_more(
+    gain: float, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Few stretches give an interval hardly any freedom: what foretells the rest is something."""
+    gains = {"relaxation": gain, "viscous_damping": 30.0}
+    half = Fit((), {}, {}, {}, (), bench(), 1.0)
+    found = [(BY_NAME[name], half) for name in gains]
+    case = SimpleNamespace(outputs=[], fit=lambda *_, **__: replace(half, cost=2.0))
+
+    def ranked(_: object, __: object, some: list[tuple[Effect, Fit]]) -> list[Candidate]:
+        each = [Candidate(gains[effect.name], effect, fitted) for effect, fitted in some]
+        return sorted(each, key=lambda one: -one.gain)
+
+    def is_open(_: object, effect: Effect, fitted: Fit) -> bool:
+        return effect.name == "relaxation" and fitted.cost == 1.0
+
+    monkeypatch.setattr(information, "ranked_by_gain", ranked)
+    monkeypatch.setattr(information, "says_nothing", is_open)
+    names = [one.effect.name for one in information.informative(cast(Case, case), half, found)]
+    assert names == (["relaxation", "viscous_damping"] if asked else ["viscous_damping"])
 
 
 @pytest.mark.parametrize(("breakaway_N", "plain"), [((-7.9, 25.1), True), ((4.2, 5.0), False)])

@@ -19,6 +19,8 @@ from coupled.rig.rig import Rig
 from coupled.rig.standalone import nodes_of, run_control
 from tests.support.rigs import G_STIFF, K_REPORT, amounts, bench
 
+HOST = "controls.column.compensation"
+
 Floats = np.ndarray
 
 
@@ -48,7 +50,7 @@ def test_the_slope_is_that_of_the_side(limit: float) -> None:
 
 def test_a_push_bend_that_no_gradient_allows_is_refused() -> None:
     with pytest.raises(InputError, match=r"loader\.bend_push_m_per_N: K·G_T"):
-        bench({"bend_push_m_per_N": 1.01 / G_STIFF})
+        bench({f"{HOST}.bend_m_per_N": 0.0, "bend_push_m_per_N": 1.01 / G_STIFF})
 
 
 @given(

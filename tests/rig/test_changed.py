@@ -17,6 +17,7 @@ from coupled.schema import load_toml
 from tests.support.rigs import BENCH, amounts, bench
 
 LOADER = "controls.column.loader"
+HOST = "controls.column.compensation"
 
 # A change, and the key and words of the fault that it makes.
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
@@ -25,7 +26,7 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({f"{LOADER}.mass_kg": "4"}, f"{LOADER}.mass_kg", "valid number"),
     ({f"{LOADER}.play_mm": 1.0}, f"{LOADER}.play_mm", "wrong unit: give play_m"),
     ({f"{LOADER}.mass_kg.x": 1.0}, f"{LOADER}.mass_kg.x", "not a table"),
-    ({f"{LOADER}.bend_m_per_N": 1e-3}, f"{LOADER}.bend_m_per_N", "K·G_T"),
+    ({f"{HOST}.bend_m_per_N": 1e-3}, f"{HOST}.bend_m_per_N", "K·G_T"),
     ({"controls.wheel.loader.play_rad": 0.1}, "controls.wheel", "has no wheel"),
     ({"noise": {"column_force": 1.0}}, "noise.column_force", "no such channel"),
     ({"frame_rate_Hz": 1e13}, "frame_rate_Hz", "larger than any real one"),

@@ -121,13 +121,19 @@ def test_a_converter_is_held_against_what_the_scale_makes_of_the_travel() -> Non
 @pytest.mark.parametrize("where", [LOADER, HOST])
 @pytest.mark.parametrize("table", ["total_gradient_N_per_m", "second_gradient_N_per_m"])
 def test_no_gradient_stiffer_than_the_structure(where: str, table: str) -> None:
-    changes: dict[str, Any] = {f"{where}.bend_m_per_N": 1 / 2500.0}
+    changes: dict[str, Any] = {f"{HOST}.bend_m_per_N": 0.0, f"{where}.bend_m_per_N": 1 / 2500.0}
     changes[f"{SCHEDULE}.{table}"] = [560.0, 2600.0]
     if table.startswith("second"):
         changes[f"{SCHEDULE}.break_deflection_m"] = 0.05
         changes[f"{SCHEDULE}.total_gradient_N_per_m"] = [560.0, 2000.0]
     with pytest.raises(InputError, match=r"K·G_T = 1\.04 at 3000 Pa.*must stay below 0\.000385"):
         bench(changes)
+
+
+def test_a_structure_softer_than_the_host_assumes_may_be_as_soft_as_it_is() -> None:
+    """Eq. (12) is singular in K̂ alone: a real K beyond it is what a diagnosis has to find."""
+    soft = {f"{LOADER}.bend_m_per_N": 1 / 2500.0, f"{SCHEDULE}.total_gradient_N_per_m": [560, 2600]}
+    assert bench(soft).controls["column"].loader.bend == 1 / 2500.0
 
 
 def test_files_that_are_no_rigs(tmp_path: Path) -> None:
