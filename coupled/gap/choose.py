@@ -31,7 +31,7 @@ from coupled.gap.thresholds import (
     SIMPLER_GAIN,
     SIMPLER_SHARE,
 )
-from coupled.gap.twolaws import even_reading, yielding_reading
+from coupled.gap.twolaws import even_reading, plain_reading, yielding_reading
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
         margin = max(SIMPLER_GAIN, share) if doubtful else RIVAL_GAIN
         if other.gain > ranked[0].gain - margin:
             best = other
-    return best
+    return plain_reading(best, ranked)
 
 
 def _round(

@@ -50,14 +50,31 @@ def quiet_noise(residual: Floats) -> Noise | None:
         return None
     first = int(np.searchsorted(omega, NOISE_FROM * math.pi))
     while True:
-        memory, level = _fitted(omega[first:], logs[first:], variance)
+        memory, level, _ = _fitted(omega[first:], logs[first:], variance)
         if first == 0:
             break
         next_one = level + float(_shape(omega[first - 1], np.array(memory)))
         if logs[first - 1] - next_one > QUIET_FOLLOWS_ON * math.sqrt(variance):
+            memory, level = _coloured_from_below(omega, logs, variance, first) or (memory, level)
             break
         first -= 1
     return Noise(math.sqrt(math.exp(level) / (1.0 - memory**2)), memory)
+
+
+def _coloured_from_below(
+    omega: Floats, logs: Floats, variance: float, first: int
+) -> tuple[float, float] | None:
+    """Return the colour and level that explain more frequencies than those from `first` on.
+
+    Far above its corner coloured noise may pass for white, beside which the rest stands out. None
+    where no colour explains them to the end as chance would have it.
+    """
+    for begin in range(first):
+        memory, level, misfit = _fitted(omega[begin:], logs[begin:], variance)
+        free = len(logs) - begin - 2
+        if memory > 0.0 and misfit < free + QUIET_FOLLOWS_ON * math.sqrt(2.0 * free):
+            return memory, level
+    return None
 
 
 def noise_of_input(signal: Floats) -> Noise | None:
@@ -115,8 +132,8 @@ def _shape(omega: Floats | float, memory: Floats) -> Floats:
     return np.asarray(-np.log(1.0 + memory**2 - 2.0 * memory * np.cos(omega)))
 
 
-def _fitted(omega: Floats, logs: Floats, variance: float) -> tuple[float, float]:
-    """Return the correlation by frames, 0 where white noise explains it as well, and the level."""
+def _fitted(omega: Floats, logs: Floats, variance: float) -> tuple[float, float, float]:
+    """Return the correlation by frames, 0 where white noise explains it as well, level and χ²."""
     left = logs - _shape(omega, _SHAPES)
     middle = np.median(left, axis=1, keepdims=True)
     near = np.abs(left - middle) < OUTLYING * math.sqrt(variance)
@@ -125,4 +142,4 @@ def _fitted(omega: Floats, logs: Floats, variance: float) -> tuple[float, float]
     if misfit[0] - misfit[best] < COLOURED_BY:
         best = 0
     level = float(np.mean(left[best][near[best]])) if near[best].any() else float(middle[best, 0])
-    return COLOURS[best], level
+    return COLOURS[best], level, float(misfit[best])

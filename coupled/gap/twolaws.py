@@ -1,4 +1,4 @@
-"""Two readings of one law: friction by direction or by how it yields, and plain friction.
+"""Two readings of one law: friction by direction or by how it yields, and a force that is late.
 
 Dry friction of a with the pull and b with the push is friction of (a + b)/2 with a constant
 force of (b − a)/2 beside it, moving and at rest alike: no record of force and deflection
@@ -6,19 +6,23 @@ separates them, and one reading is given. Where one direction has less than twic
 the other it is the even one with an offset, which a bearing with an amplifier's zero has; where it
 has more, friction by direction.
 
+Where nothing bends, a force that is felt late is one that is stamped early: the first is named,
+which a machine has more often, and the other beside it.
+
 How far a contact yields before it slips is a setting beside any dry friction (`settings`). Where
 the records show that it does, plain friction is read as friction that yields, with those numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from coupled.gap.case import Case
 from coupled.gap.effect import Effect, value_of
 from coupled.gap.fit import Fit
+from coupled.gap.gain import Candidate
 from coupled.gap.library import BY_NAME
-from coupled.gap.thresholds import YIELDED
+from coupled.gap.thresholds import RIVAL_GAIN, YIELDED
 
 UNEVEN = 2.0  # times the other direction's friction
 
@@ -43,6 +47,13 @@ def even_reading(
     read[even.value_key(even.free[0])] = 0.5 * (pull + push)
     read[offset.value_key(offset.free[0])] = 0.5 * (push - pull)
     return (*others, even, offset), read
+
+
+def plain_reading(best: Candidate, ranked: Sequence[Candidate]) -> Candidate:
+    """Return the best candidate, or another that is the same law where nothing tells them apart."""
+    least = best.gain - RIVAL_GAIN
+    same = (o for o in ranked if best.effect.name in o.effect.swallows and o.gain > least)
+    return next(same, best)
 
 
 def yielding_reading(case: Case, found: Fit) -> tuple[Effect, Effect, dict[str, float]] | None:

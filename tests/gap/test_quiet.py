@@ -36,6 +36,15 @@ def test_what_happens_now_and_then_is_no_noise(memory: float) -> None:
     assert abs(math.log(plain.rms / noise.rms)) > 0.2  # by the motion itself
 
 
+@pytest.mark.parametrize("seed", [23, 48, 83])
+def test_colour_that_looks_white_far_above_its_corner_is_heard_whole(seed: int) -> None:
+    """Of 120 samples with a corner at 20 Hz these three were heard as 0.74 to 0.78 of their rms."""
+    noise = Noise(1.0, math.exp(-2.0 * math.pi * 20.0 / RATE_Hz))
+    found = quiet_noise(noise.sample(FRAMES, np.random.default_rng([20, seed])))
+    assert found is not None
+    assert found.rms == pytest.approx(1.0, rel=0.1)
+
+
 @pytest.mark.parametrize("memory", [0.0, 0.3, 0.6])
 def test_a_forces_colour_is_told_from_the_force(memory: float) -> None:
     rng = np.random.default_rng(4)

@@ -6,8 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coupled.gap.fit import Fit
+from coupled.gap.gain import Candidate
 from coupled.gap.library import BY_NAME
-from coupled.gap.twolaws import UNEVEN, even_reading
+from coupled.gap.twolaws import UNEVEN, even_reading, plain_reading
+from tests.support.rigs import bench
 
 [UNEVEN_LAW] = [effect for effect in BY_NAME.values() if effect.even is not None]
 PULL, PUSH = (UNEVEN_LAW.value_key(number) for number in UNEVEN_LAW.free)
@@ -33,3 +36,14 @@ def test_uneven_friction_and_a_friction_named_already_stay() -> None:
     even = BY_NAME[UNEVEN_LAW.even[0]]
     assert even_reading((even, UNEVEN_LAW), {PULL: 1.0, PUSH: 1.2}) is None
     assert even_reading((even,), {}) is None
+
+
+def test_a_force_that_is_felt_late_is_named_before_one_that_is_stamped_early() -> None:
+    fitted = Fit((), {}, {}, {}, (), bench(), 1.0)
+    [late] = [effect for effect in BY_NAME.values() if effect.swallows]
+    stamped = Candidate(100.0, BY_NAME[late.swallows[0]], fitted)
+    near, far = (Candidate(gain, late, fitted) for gain in (99.9, 90.0))
+    other = Candidate(99.95, BY_NAME["inertia"], fitted)
+    assert plain_reading(stamped, [stamped, other, near]) is near
+    assert plain_reading(stamped, [stamped, far]) is stamped
+    assert plain_reading(near, [stamped, near]) is near
