@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from coupled.gap.contact import contact_start
 from coupled.gap.course import Bounds
 from coupled.gap.descent import WHOLE, Descent
 from coupled.gap.effect import Effect, possible
 from coupled.gap.fit import Fit, fit, touched
 from coupled.gap.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.settings import contact, is_dry, settings
-from coupled.gap.thresholds import HEARD_ANEW, LENGTHS, SETTLE_FROM
+from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.gap.timed import Timing, timed
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -171,30 +172,32 @@ class Case:
         fit of this case that ended at the start.
         """
         free = self.nuisances(effects)
-        start = self._with_length(effects, free, start or {})
+        start = self._with_contact(effects, free, start or {})
         given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
         known = {} if near is None else near.slopes
         return fit(*given, replace(descent, known=self._known, slopes=known))
 
-    def _with_length(
+    def _with_contact(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
     ) -> dict[str, float]:
-        """Return where a fit starts, with the contact's length that leaves least of a few.
-
-        From a tenth of a length a fit does not find it: with each, the control sticks elsewhere.
-        """
+        """Return where a fit starts, with the contact that leaves least where none is known."""
         known = dict(start)
-        length = next(iter(self.contact), None)
-        if length is None or length not in free or length.value_key(length.free[0]) in known:
+        if not self.contact or self.contact[0] not in free:
             return known
-        key, most = length.value_key(length.free[0]), length.free[0].high
+        numbers = [one.free[0] for one in self.contact]
+        keys = [one.value_key(one.free[0]) for one in self.contact]
+        if keys[0] in known:
+            return known
         begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
-        ours = touched(self.outputs, [length])
-        best = np.inf
-        for share in LENGTHS:
-            values = {**self.neutral, **begun, **start, key: share * most}
+        ours = touched(self.outputs, self.contact)
+
+        def left(*contact: float) -> float:
+            values = {**self.neutral, **begun, **start, **dict(zip(keys, contact, strict=True))}
             rig = possible(self.nominal, self.control, [*effects, *free], values)
-            left = sum(output.gap(rig) ** 2 for output in ours) if rig is not None else np.inf
-            if left < best:
-                best, known[key] = left, share * most
-        return known
+            if rig is None:
+                return np.inf
+            each = [output.residual(rig, wide=True) for output in ours]
+            return sum(float(np.mean(one**2)) for one in each)
+
+        found = contact_start(left, *(number.high for number in numbers))
+        return known | dict(zip(keys, found, strict=True))

@@ -1,0 +1,30 @@
+"""Where the fit of a contact starts: by a search that hollows do not hold."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from coupled.gap.contact import contact_start
+
+
+@pytest.mark.parametrize("length", [2.3e-5, 1.4e-4, 5e-4])
+@pytest.mark.parametrize("share", [0.0, 0.45, 0.95])
+def test_a_contact_is_found_between_hollows(length: float, share: float) -> None:
+    """Of a bowl with ripples, whose slopes lead from no start of a grid to its least."""
+
+    def left(tried: float, part: float) -> float:
+        far, off = math.log(tried / length), part - share
+        ripples = 0.02 * (math.sin(80.0 * far) ** 2 + math.sin(60.0 * off) ** 2)
+        return 1.0 + far**2 + 2.0 * off**2 + ripples
+
+    found = contact_start(left, 5e-4, 0.95)
+    assert found[0] == pytest.approx(length, rel=0.15)
+    assert found[1] == pytest.approx(share, abs=0.12)
+    assert left(*found) < 1.05
+
+
+def test_a_contact_stays_within_its_bounds() -> None:
+    assert contact_start(lambda length, share: -length - share, 5e-4, 0.95) == (5e-4, 0.95)
+    assert contact_start(lambda length, share: length + share, 5e-4, 0.95) == (5e-7, 0.0)
