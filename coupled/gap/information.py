@@ -23,11 +23,11 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     judges it in the end.
     """
     open_ones = [one for one in found if says_nothing(case, *one)]
-    told = [one for one in found if one not in open_ones]
-    ranked = ranked_by_gain(case.outputs, current, told)
-    asked = _told_by_all(case, current, ranked, open_ones)
+    clear = [one for one in found if one not in open_ones]
+    ranked = ranked_by_gain(case.outputs, current, clear)
+    asked = _clear_on_all(case, current, ranked, open_ones)
     if asked:
-        ranked = ranked_by_gain(case.outputs, current, [*told, *asked])
+        ranked = ranked_by_gain(case.outputs, current, [*clear, *asked])
     if ranked and ranked[0].gain >= LEAST_GAIN:
         return ranked
     single = [one for one in open_ones if len(one[0].free) == 1]
@@ -36,11 +36,11 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
 
 
-def _told_by_all(
-    case: Case, current: Fit, told: Sequence[Candidate], open_ones: Sequence[tuple[Effect, Fit]]
+def _clear_on_all(
+    case: Case, current: Fit, clear: Sequence[Candidate], open_ones: Sequence[tuple[Effect, Fit]]
 ) -> list[tuple[Effect, Fit]]:
     """Return those of the open ones that gain far more, and say something on all of the record."""
-    least = max([LEAST_GAIN, *(one.gain for one in told)]) + RIVAL_GAIN
+    least = max([LEAST_GAIN, *(one.gain for one in clear)]) + RIVAL_GAIN
     better = [one for one in ranked_by_gain(case.outputs, current, open_ones) if one.gain > least]
     return [
         (one.effect, one.fit)
