@@ -50,9 +50,17 @@ ORDER += [
     "export",
     "campaign",
     "calibration",
-    "gap",
 ]
 ORDER += [
+    "gap/thresholds",
+    "gap/chain",
+    "gap/noise",
+    "gap/signals",
+    "gap/effects",
+    "gap/stages",
+    "gap/search",
+    "gap/findings",
+    "gap",
     "blind/twin",
     "blind/trials",
     "plots",

@@ -16,8 +16,8 @@ from rich.table import Table
 from coupled.cli.tables import gaps
 from coupled.cli.tables.whole import print_whole
 from coupled.display import in_system, split_unit
-from coupled.gap.power import EffectPower
-from coupled.gap.result import EffectResult, ParameterEstimate
+from coupled.gap.findings.power import EffectPower
+from coupled.gap.findings.result import EffectResult, ParameterEstimate
 from coupled.plots.maps import draw_losses
 from tests.support.commands import coupled
 

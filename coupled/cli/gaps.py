@@ -21,7 +21,7 @@ from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
     from coupled.display import System
-    from coupled.gap.diagnosis import Diagnosis
+    from coupled.gap.findings.diagnosis import Diagnosis
     from coupled.record.record import Record
 
 
@@ -174,7 +174,7 @@ def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
     from coupled.files import read_text
-    from coupled.gap.summary import change, plain
+    from coupled.gap.findings.summary import change, plain
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
 

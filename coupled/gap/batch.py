@@ -22,7 +22,7 @@ import coupled
 from coupled.errors import InputError, collected, nearest, together
 from coupled.files import check_target, sha256, write_text
 from coupled.gap.diagnose import diagnose
-from coupled.gap.result import FORMAT
+from coupled.gap.findings.result import FORMAT
 from coupled.parallel import as_done, cores, executor
 from coupled.record.channels import ControlName
 from coupled.record.record import Record, read_record

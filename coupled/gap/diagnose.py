@@ -13,24 +13,24 @@ from dataclasses import replace
 from functools import partial
 
 from coupled.errors import InputError
-from coupled.gap.airframe import Flights, airframe_outputs, trim_speed
-from coupled.gap.answer import doubted, effects_of, settings_of, verdict_of
-from coupled.gap.budget import stage_budget
-from coupled.gap.case import Case, Tell
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.counts import as_counted
-from coupled.gap.descent import Descent
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.drives import as_driven
-from coupled.gap.healthy import Baseline
-from coupled.gap.imposed import under_motion
-from coupled.gap.judge import Judge
-from coupled.gap.library import EFFECTS
-from coupled.gap.output import Output
-from coupled.gap.search import search
-from coupled.gap.shrink import floors_of, shrink
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.library import EFFECTS
+from coupled.gap.findings.answer import doubted, effects_of, settings_of, verdict_of
+from coupled.gap.findings.budget import stage_budget
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.healthy import Baseline
+from coupled.gap.findings.judge import Judge
+from coupled.gap.findings.shrink import floors_of, shrink
+from coupled.gap.search.case import Case, Tell
+from coupled.gap.search.descent import Descent
+from coupled.gap.search.search import search
+from coupled.gap.signals.counts import as_counted
+from coupled.gap.signals.drives import as_driven
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
+from coupled.gap.stages.imposed import under_motion
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record

@@ -16,17 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.airframe import airframe_outputs
-from coupled.gap.case import Tell
 from coupled.gap.checks import check_record
-from coupled.gap.drives import as_driven
-from coupled.gap.effect import Effect
-from coupled.gap.fit import Fit, fit, touched
-from coupled.gap.freed import default_keys, freed
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.freed import default_keys, freed
 from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
-from coupled.gap.output import Output
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.search.case import Tell
+from coupled.gap.search.fit import Fit, fit, touched
+from coupled.gap.signals.drives import as_driven
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import ALIKE, SHARES_IN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from coupled.gap.chain import STAGES
-from coupled.gap.output import Output
-from coupled.gap.result import StageResult
+from coupled.gap.findings.result import StageResult
+from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_label, residual_shown

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.plots.chain import draw_stages
 from coupled.plots.gapview import View
 from coupled.plots.ladder import draw_ladder

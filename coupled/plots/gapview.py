@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from coupled.gap.case import Case
 from coupled.gap.chain import stage_of
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.effect import Effect
-from coupled.gap.output import Floats, Output
-from coupled.gap.result import StageResult
-from coupled.gap.stages import Reader
-from coupled.gap.summary import plain
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.effect import Effect
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.result import StageResult
+from coupled.gap.findings.summary import plain
+from coupled.gap.search.case import Case
+from coupled.gap.signals.output import Floats, Output
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import GUILTY_FROM
 from coupled.record.channels import CONTROL_NAMES
 from coupled.record.record import Record

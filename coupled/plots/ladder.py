@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.gap.chain import CHAIN, stage_of
-from coupled.gap.choose import Found
-from coupled.gap.library import EFFECTS
-from coupled.gap.output import stage_gaps
-from coupled.gap.summary import figure as written
-from coupled.gap.summary import plain
+from coupled.gap.effects.library import EFFECTS
+from coupled.gap.findings.summary import figure as written
+from coupled.gap.findings.summary import plain
+from coupled.gap.search.choose import Found
+from coupled.gap.signals.output import stage_gaps
 from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupled.gap.air import vertical_air
-from coupled.gap.openloop import command_of
-from coupled.gap.output import Floats, Output
-from coupled.gap.smooth import rate_of, smoothed
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_channel, surface_points
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.air import vertical_air
+from coupled.gap.signals.output import Floats, Output
+from coupled.gap.stages.openloop import command_of
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_channel, surface_points
 from coupled.record.channels import channel, unit_of
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.rig.parameters import Loader

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from coupled.gap.output import Floats, Output
-from coupled.gap.smooth import rate_of, smoothed
-from coupled.gap.summary import plain
+from coupled.gap.findings.summary import plain
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.output import Floats, Output
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_label, residual_shown, unit_shown
 from coupled.record.channels import unit_of

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.power import EffectPower
-from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.shrink import ChannelShrink
-from coupled.gap.summary import figure, in_figures, plain
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.power import EffectPower
+from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.findings.shrink import ChannelShrink
+from coupled.gap.findings.summary import figure, in_figures, plain
 from coupled.plots.gaps import draw_diagnosis
 from coupled.plots.gapview import channel_label, unit_shown
 from coupled.plots.saving import svg_text

@@ -23,7 +23,7 @@ from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.errors import InputError
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME
 from coupled.record.record import read_record
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.rigfile import read_rig

@@ -9,7 +9,7 @@ from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.readings import same_law
 from coupled.blind.trials.shares import _judged, _shared
 from coupled.blind.trials.trial import Plan, draw_trial
-from coupled.gap.output import Output
+from coupled.gap.signals.output import Output
 from tests.support.rigs import bench
 
 

@@ -29,7 +29,7 @@ from coupled.blind.twin.twin import STIFF, airframe, fly_twin, nominal_twin
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME
 from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

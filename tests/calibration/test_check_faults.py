@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from coupled.calibration.documentation import check_feel
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
 from tests.support.rigs import K_REPORT, bench
 
 # Each fault of the library on the column of a test bench, at a size beyond its tolerance.

@@ -9,7 +9,7 @@ import pytest
 
 from coupled.flight import loop
 from coupled.gap.diagnose import diagnose
-from coupled.gap.flown import fly_force
+from coupled.gap.findings.flown import fly_force
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from coupled.gap import choose
-from coupled.gap.case import Case
-from coupled.gap.choose import searched
-from coupled.gap.effect import Effect
-from coupled.gap.fit import Fit
-from coupled.gap.gain import Candidate
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search import choose
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import searched
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate
 from tests.support import gaps
 
 RIG = gaps.nominal_rig(False)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from coupled.gap.contact import contact_start
+from coupled.gap.search.contact import contact_start
 
 
 @pytest.mark.parametrize("length", [2.3e-5, 1.4e-4, 5e-4])

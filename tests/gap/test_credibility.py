@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.gap.answer import verdict_of
-from coupled.gap.credibility import Credibility, Regime, remainder
-from coupled.gap.result import EffectResult, StageResult
+from coupled.gap.findings.answer import verdict_of
+from coupled.gap.findings.credibility import Credibility, Regime, remainder
+from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.thresholds import REMAINDER
 
 BOUND = 1.2

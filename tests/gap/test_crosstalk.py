@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.flown import fly_force
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.flown import fly_force
 from coupled.record.record import Record
 from tests.support.gaps import pushes
 from tests.support.joined import joined

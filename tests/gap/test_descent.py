@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.descent import Descent, leaves_noise
-from coupled.gap.output import Output
-from coupled.gap.steps import widely_stepped
+from coupled.gap.search.descent import Descent, leaves_noise
+from coupled.gap.signals.output import Output
+from coupled.gap.signals.steps import widely_stepped
 from coupled.gap.thresholds import RACE_EVALUATIONS, WIDE_STEPS_Hz
 from coupled.rig.rig import Rig
 from tests.support import gaps

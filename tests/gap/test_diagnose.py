@@ -12,11 +12,11 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME, EFFECTS
-from coupled.gap.output import white
-from coupled.gap.smooth import smoothed
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.output import white
 from coupled.record.record import Record, write_record
 from coupled.rig.rigfile import read_rig
 from tests.support.commands import ROOT, coupled

@@ -17,8 +17,8 @@ from coupled.errors import InputError
 from coupled.gap import batch
 from coupled.gap.batch import jobs, run_all
 from coupled.gap.diagnose import diagnose
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.result import FORMAT, StageResult
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.result import FORMAT, StageResult
 from coupled.record.channels import ControlName
 from coupled.record.record import Record, write_record
 from coupled.rig.rig import Rig

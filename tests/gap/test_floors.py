@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.flexible import free_share
-from coupled.gap.noise import Noise, noise_of
-from coupled.gap.output import Output, spread
-from coupled.gap.smooth import Smoother
-from coupled.gap.summary import in_figures
+from coupled.gap.findings.flexible import free_share
+from coupled.gap.findings.summary import in_figures
+from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.smooth import Smoother
+from coupled.gap.signals.output import Output, spread
 
 Floats = NDArray[np.float64]
 RATE_Hz = 120.0

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from coupled.gap.airframe import airframe_outputs
-from coupled.gap.choose import Choice, Found
 from coupled.gap.diagnose import diagnose
-from coupled.gap.diagnosis import Diagnosis
-from coupled.gap.effect import Effect, apply
-from coupled.gap.fit import Fit
-from coupled.gap.gain import Candidate
-from coupled.gap.library import BY_NAME, EFFECTS
-from coupled.gap.output import Output, stage_gaps
-from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.shrink import ChannelShrink, Shrink
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.effect import Effect, apply
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.findings.shrink import ChannelShrink, Shrink
+from coupled.gap.search.choose import Choice, Found
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate
+from coupled.gap.signals.output import Output, stage_gaps
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.plots.gaps import FIGURES, draw_diagnosis
 from coupled.plots.gapview import View, channel_label, unit_shown
 from coupled.plots.saving import save

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupled.gap.air import vertical_air
-from coupled.gap.case import Case
 from coupled.gap.diagnose import diagnose
-from coupled.gap.library import BY_NAME, EFFECTS
-from coupled.gap.output import Output, echoed, white
-from coupled.gap.screen import screen
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.case import Case
+from coupled.gap.search.screen import screen
+from coupled.gap.signals.air import vertical_air
+from coupled.gap.signals.output import Output, echoed, white
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import STRETCH_s
 from coupled.record.record import write_record
 from coupled.rig.rig import Rig
@@ -145,7 +145,7 @@ def test_an_effect_without_a_number_is_always_tried(
 ) -> None:
     record = made(tmp_path, RIG, {"inertia": {"factor": 1.4}}, 4)
     case = Case(RIG, "column", Reader(RIG, record, "column", surface_points).outputs())
-    monkeypatch.setattr("coupled.gap.screen.SCREENED", 1)
+    monkeypatch.setattr("coupled.gap.search.screen.SCREENED", 1)
     kept = screen(case, case.fit(()), [e for e in EFFECTS if e.stage == "loader"])
     assert len(kept) == 2
     assert kept[0][0].free

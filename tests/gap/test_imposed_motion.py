@@ -8,10 +8,10 @@ from __future__ import annotations
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.drives import as_driven
-from coupled.gap.imposed import under_motion
-from coupled.gap.library import EFFECTS
+from coupled.gap.effects.library import EFFECTS
 from coupled.gap.nominal import fit_nominal
+from coupled.gap.signals.drives import as_driven
+from coupled.gap.stages.imposed import under_motion
 from tests.support.machines import damper, damper_rig
 
 

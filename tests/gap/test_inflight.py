@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.gap.case import Case
-from coupled.gap.effect import apply
-from coupled.gap.fit import Fit
-from coupled.gap.flown import Again, fly_force
-from coupled.gap.inflight import EffectInFlight, in_flight, in_words
-from coupled.gap.library import BY_NAME
-from coupled.gap.shapley import shapley_weights
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.flown import Again, fly_force
+from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
+from coupled.gap.findings.shapley import shapley_weights
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.gap.choose import Choice, Found
-from coupled.gap.fit import Fit
-from coupled.gap.judge import Judge
-from coupled.gap.library import BY_NAME
-from coupled.gap.output import Output
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.judge import Judge
+from coupled.gap.search.choose import Choice, Found
+from coupled.gap.search.fit import Fit
+from coupled.gap.signals.output import Output
 from tests.support.gaps import nominal_rig
 
 

@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effect import apply
-from coupled.gap.flown import closed_loop, fly_force
-from coupled.gap.library import BY_NAME
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.flown import closed_loop, fly_force
+from coupled.gap.stages.surfaces import surface_points
 from coupled.record.channels import ControlName, noisy_channels
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder

@@ -9,12 +9,12 @@ from __future__ import annotations
 import pytest
 
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
-from coupled.gap.airframe import airframe_outputs
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effect import apply
-from coupled.gap.flown import fly_force
-from coupled.gap.library import BY_NAME
-from coupled.gap.surfaces import _moves_itself, surface_points
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.findings.flown import fly_force
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.surfaces import _moves_itself, surface_points
 from coupled.models.draft import draft
 from coupled.models.survey import survey
 from coupled.record.channels import LONGITUDINAL

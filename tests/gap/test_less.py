@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from coupled.gap.case import Case
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME
-from coupled.gap.output import Output
-from coupled.gap.screen import screen
-from coupled.gap.stages import Reader
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.search.screen import screen
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.stages import Reader
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig

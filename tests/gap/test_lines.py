@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from coupled.blind.twin.setting import coloured
 from coupled.gap.diagnose import diagnose
-from coupled.gap.lines import lines_in, seen_as, tone_of
-from coupled.gap.output import white
-from coupled.gap.smooth import smoothed
+from coupled.gap.noise.lines import lines_in, seen_as, tone_of
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.output import white
 from coupled.record.record import Record
 from tests.support.gaps import made, nominal_rig
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.floors import floor_from
-from coupled.gap.reading import worth_recording
+from coupled.gap.signals.floors import floor_from
+from coupled.gap.signals.reading import worth_recording
 from tests.support.gaps import nominal_rig
 from tests.support.machines import CUBIC, DAMPING, duffing, duffing_rig
 

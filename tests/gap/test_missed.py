@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.missed import Missed, missed_in
+from coupled.gap.signals.missed import Missed, missed_in
 from coupled.record.record import Record
 from tests.support.gaps import made, nominal_rig
 

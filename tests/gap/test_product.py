@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.floors import without_echo
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.signals.floors import without_echo
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from tests.support.gaps import made, nominal_rig
 
 

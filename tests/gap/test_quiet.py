@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.floors import left_noise
-from coupled.gap.noise import Noise, noise_of
-from coupled.gap.quiet import noise_of_input, quiet_noise
+from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.quiet import noise_of_input, quiet_noise
+from coupled.gap.signals.floors import left_noise
 
 FRAMES, RATE_Hz = 4800, 120.0
 TIME = np.arange(FRAMES) / RATE_Hz

@@ -10,10 +10,10 @@ import pytest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
-from coupled.gap.fit import fit
-from coupled.gap.library import BY_NAME
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.fit import fit
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig

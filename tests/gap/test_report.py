@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from coupled.flight.gusts import dryden
-from coupled.gap.air import vertical_air
 from coupled.gap.diagnose import diagnose
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.signals.air import vertical_air
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text

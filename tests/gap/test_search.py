@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from coupled.gap import choose, information
-from coupled.gap.case import Case
-from coupled.gap.choose import searched
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effect import Effect
-from coupled.gap.fit import Fit, _half_width, fit
-from coupled.gap.gain import Candidate
-from coupled.gap.information import may_be_plainer, says_nothing
-from coupled.gap.library import BY_NAME
-from coupled.gap.output import Output
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search import choose, information
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import searched
+from coupled.gap.search.fit import Fit, _half_width, fit
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.signals.output import Output
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.gap.counts import as_counted
 from coupled.gap.diagnose import diagnose
-from coupled.gap.drives import as_driven, in_set_points
 from coupled.gap.nominal import fit_nominal
+from coupled.gap.signals.counts import as_counted
+from coupled.gap.signals.drives import as_driven, in_set_points
 from coupled.record.record import Record
 from tests.support.machines import servo, servo_rig, set_points
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME
-from coupled.gap.settings import contact, settings
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.effects.settings import contact, settings
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.airframe import Flights
-from coupled.gap.descent import Descent
-from coupled.gap.openloop import Flown
-from coupled.gap.slopes import Slope, Slopes
+from coupled.gap.search.descent import Descent
+from coupled.gap.search.slopes import Slope, Slopes
+from coupled.gap.stages.airframe import Flights
+from coupled.gap.stages.openloop import Flown
 
 Floats = NDArray[np.float64]
 RNG = np.random.default_rng(9)

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from coupled.gap import fit as fitting
-from coupled.gap.case import Case
 from coupled.gap.diagnose import diagnose
-from coupled.gap.library import BY_NAME
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search import fit as fitting
+from coupled.gap.search.case import Case
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from tests.support import gaps
 

@@ -10,13 +10,13 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
-from coupled.gap.airframe import TRIM, airframe_outputs
-from coupled.gap.case import Case
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME
-from coupled.gap.openloop import Moved, about, command_of, fly_open_loop
-from coupled.gap.surfaces import own_trim, surface_points
-from coupled.gap.trim import WEIGHED, trim_of
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.stages.airframe import TRIM, airframe_outputs
+from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
+from coupled.gap.stages.surfaces import own_trim, surface_points
+from coupled.gap.stages.trim import WEIGHED, trim_of
 from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupled.gap.fit import Fit
-from coupled.gap.gain import Candidate
-from coupled.gap.library import BY_NAME
-from coupled.gap.twolaws import UNEVEN, even_reading, plain_reading
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.twolaws import UNEVEN, even_reading, plain_reading
 from tests.support.rigs import bench
 
 [UNEVEN_LAW] = [effect for effect in BY_NAME.values() if effect.even is not None]

@@ -10,7 +10,7 @@ from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.setting import draw_setting
 from coupled.blind.twin.twin import Bristles, fly_twin, nominal_twin, set_friction
 from coupled.gap.diagnose import diagnose
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME
 
 pytestmark = pytest.mark.slow
 LAWS = {"coulomb_friction", "presliding_friction"}

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete, dlsim
 
 from coupled.errors import InputError
-from coupled.gap.flown import fly_force
+from coupled.gap.findings.flown import fly_force
 from coupled.rig.replay import drive_linkage, replay_linkage
 from coupled.rig.rig import Rig
 from tests.support.rigs import bench

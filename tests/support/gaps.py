@@ -12,8 +12,8 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.effect import apply
-from coupled.gap.library import BY_NAME
+from coupled.gap.effects.effect import apply
+from coupled.gap.effects.library import BY_NAME
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.records import NOISE

@@ -16,7 +16,7 @@ from coupled.blind.twin.kernel import NODES
 from coupled.blind.twin.setting import draw_setting
 from coupled.blind.twin.twin import Bristles, fly_twin, nominal_twin, set_friction
 from coupled.gap.diagnose import diagnose
-from coupled.gap.diagnosis import Diagnosis
+from coupled.gap.findings.diagnosis import Diagnosis
 
 FRICTIONS_N = (1.0, 2.0, 4.0, 8.0, 12.0)
 TRAVELS_m = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3.5e-4, 5e-4)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from coupled.gap.airframe import airframe_outputs
-from coupled.gap.fit import fit
-from coupled.gap.library import BY_NAME
-from coupled.gap.output import Output
-from coupled.gap.stages import Reader
-from coupled.gap.surfaces import surface_points
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.fit import fit
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
-from coupled.gap.case import Case
-from coupled.gap.fit import Fit
-from coupled.gap.library import BY_NAME
-from coupled.gap.output import Output, memory
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.signals.output import Output, memory
 from coupled.gap.thresholds import NO_GAP_LEFT, RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.table import Table
 
 from coupled.cli.tables.whole import print_whole
+from coupled.gap.findings.summary import figure
 from coupled.gap.nominalfit import ChannelFit, NominalFit
-from coupled.gap.summary import figure
 
 
 def print_numbers(console: Console, fitted: NominalFit) -> None:

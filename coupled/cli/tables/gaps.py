@@ -12,15 +12,15 @@ from rich.table import Table
 from coupled.cli.tables.whole import print_whole
 from coupled.display import System, in_system, split_unit
 from coupled.gap.batch import Row
-from coupled.gap.budget import StageBudget
-from coupled.gap.flown import ChannelAgain
-from coupled.gap.inflight import EffectInFlight
-from coupled.gap.power import EffectPower
-from coupled.gap.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.summary import change, figure, in_figures, plain
+from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.flown import ChannelAgain
+from coupled.gap.findings.inflight import EffectInFlight
+from coupled.gap.findings.power import EffectPower
+from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
+from coupled.gap.findings.summary import change, figure, in_figures, plain
 
 if TYPE_CHECKING:
-    from coupled.gap.diagnosis import Diagnosis
+    from coupled.gap.findings.diagnosis import Diagnosis
 
 
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:

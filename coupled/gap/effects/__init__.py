@@ -1,0 +1,1 @@
+"""The library of effects: what a rig may have and its nominal model lacks."""

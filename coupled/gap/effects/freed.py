@@ -1,0 +1,93 @@
+"""Any number of a rig, freed for a fit: its key as a parameter, between what it may be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from coupled.errors import InputError, nearest
+from coupled.gap.effects.effect import Effect, Parameter, Signature
+from coupled.gap.effects.library import EFFECTS
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.rig import Rig
+from coupled.schema import LARGEST, Section, file_keys
+
+# The stage in which a number acts, by its section, and in the loader's by how its key begins.
+STAGE_OF_SECTION = {
+    "loader": "loader",
+    "schedule": "schedule",
+    "sensing": "sensing",
+    "rigging": "surface",
+    "flight": "airframe",
+}
+OF_LINKAGE = ("servo", "bend", "play", "arc", "structur", "contact")
+# What is fitted where nothing is asked for, by the stage that the records judge.
+USUAL = {
+    "loader": ("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
+    "linkage": ("servo_frequency", "servo_damping_ratio", "bend", "play"),
+}
+FAR = 1e3  # times where a fit starts: as far as a number without a bound may go
+
+
+def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str, ...]:
+    """Return the keys that are usually fitted, of the stages that records judge.
+
+    A basic gradient of 0 is no spring, and stays so.
+    """
+    fields = {f: key for key, f in _fields(rig, control, "loader").items()}
+    loader, drive = rig.controls[control].loader, rig.controls[control].drive
+    found = []
+    for stage, names in USUAL.items():
+        wanted = names if stage in stages else ()
+        if stage == "linkage" and drive == "setpoint":
+            wanted = (*wanted, "servo_delay")  # of a bus, or of the servo's own cycle
+        absent = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
+        found += [f"loader.{fields[name]}" for name in wanted if name not in absent]
+    return tuple(found)
+
+
+def freed(rig: Rig, control: ControlName, key: str) -> Effect:
+    """Return the number of a key as what a fit may free. Raises InputError where it is none."""
+    section, _, last = key.partition(".")
+    if section not in STAGE_OF_SECTION or (section == "flight" and rig.flight is None):
+        hint = nearest(section, STAGE_OF_SECTION)
+        raise InputError("--free", key, f'is no number to fit: give "loader.mass_kg"; {hint}')
+    fields = _fields(rig, control, section)
+    if last not in fields:
+        raise InputError("--free", key, f"unknown key; {nearest(last, fields)}")
+    holder: Any = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+    filed = getattr(holder, fields[last])
+    if not isinstance(filed, float):
+        raise InputError("--free", key, "is not a single number; only such are fitted")
+    stage = STAGE_OF_SECTION[section]
+    if stage == "loader" and last.startswith(OF_LINKAGE):
+        stage = "linkage"
+    start = filed or _usual_start(key, control)
+    low, high = _bounds(holder, fields[last], start)
+    number = Parameter("", key, "value", low, high, (min(max(start, low), high),))
+    return Effect(key, stage, (number,), Signature("", ""))
+
+
+def _fields(rig: Rig, control: ControlName, section: str) -> dict[str, str]:
+    holder = rig.flight if section == "flight" else getattr(rig.controls[control], section)
+    assert isinstance(holder, Section)
+    return file_keys(type(holder), unit_of(control))
+
+
+def _usual_start(key: str, control: ControlName) -> float:
+    """Return where the library's fits of a number begin, for one that is 0 in the file."""
+    for effect in EFFECTS:
+        for p in effect.free:
+            if p.key_on(control) == key and p.mode in ("added", "value") and not p.inverse:
+                return p.starts[0]
+    return 1.0
+
+
+def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
+    """Return between which values a field may lie, as its declaration has it."""
+    far = FAR * abs(start)
+    low, high = -far, far
+    for bound in type(holder).model_fields[field].metadata:
+        low = max(low, float(getattr(bound, "ge", low)))
+        low = max(low, 1e-3 * abs(start) if hasattr(bound, "gt") else low)
+        high = min(high, float(getattr(bound, "le", getattr(bound, "lt", high))))
+    return low, min(high, LARGEST)

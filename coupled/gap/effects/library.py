@@ -1,0 +1,129 @@
+"""The library of effects: what a rig may have and its nominal model lacks.
+
+An entry is data, and all that a diagnosis knows of its effect: a name, the stage where it acts,
+the numbers of the rig file that it frees, with their bounds and where a fit starts, and the
+traits by which it is scanned, judged, distinguished from its like and drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coupled.gap.effects.effect import Effect, setting_of
+from coupled.gap.effects.entries import added, factor, limit, one, value
+from coupled.gap.effects.linkage import LINKAGE
+from coupled.gap.effects.loader import LOADER
+from coupled.gap.effects.sensing import COMPENSATION, SENSING
+from coupled.gap.signals.air import NEEDS as AIR
+from coupled.gap.signals.air import spread_of_air
+
+WHOLE_s = 1e4  # a zoom that shows the whole record
+
+
+EFFECTS: tuple[Effect, ...] = (
+    one(
+        "schedule",
+        "pressure_lag",
+        value("lag_s", "schedule.pressure_lag_s", 0, 10, 0.3),
+        *("pressure", "gradient", "loop", 6.0),
+    ),
+    one(
+        "schedule",
+        "pressure_scale",
+        factor("schedule.pressure_scale", 1.05),
+        *("pressure", "gradient", "law", WHOLE_s),
+    ),
+    one(
+        "schedule",
+        "schedule_slope",
+        factor("schedule.slope", 1.05),
+        *("pressure", "gradient", "law", WHOLE_s),
+    ),
+    *LOADER,
+    *SENSING,
+    *LINKAGE,
+    *COMPENSATION,
+    one(
+        "surface",
+        "cable_stretch",
+        added("loss_per_Pa", "rigging.stretch_loss_per_Pa", 0, 1e-2, 1e-5),
+        *("pressure", "ratio"),
+    ),
+    one(
+        "surface",
+        "surface_lag",
+        added("lag_s", "rigging.lag_s", 0, 3, 0.05),
+        *("wanted_rate", "answer_left", "law", 1.5),
+    ),
+    one(
+        "surface",
+        "surface_rate_limit",
+        limit("rate_norm_per_s", "rigging.rate_limit_norm_per_s", 1e-2, 50, 0.3, 0.55),
+        *("wanted_rate", "answer_rate", "law", 1.5),
+    ),
+    one(
+        "surface",
+        "surface_freeplay",
+        added("play_norm", "rigging.play_norm", 0, 0.5, 0.01),
+        *("wanted", "answer_left", "loop"),
+    ),
+    one(
+        "airframe",
+        "elevator_effectiveness",
+        factor("flight.elevator_effectiveness", 0.9),
+        *("elevator", "pitch_rate", "loop", 4.0),
+    ),
+    one(
+        "airframe",
+        "pitch_damping",
+        factor("flight.pitch_damping", 1.2),
+        *("pitch_rate", "pitch_left", "law", 4.0),
+    ),
+    one(
+        "airframe",
+        "pitch_stiffness",
+        factor("flight.pitch_stiffness", 1.1),
+        *("alpha", "pitch_rate", "loop", 4.0),
+    ),
+    one(
+        "airframe",
+        "lift_slope",
+        factor("flight.lift_slope", 0.97, 0.2, 5.0),
+        *("alpha", "load_answer", "loop", 4.0),
+    ),
+    one(
+        "airframe",
+        "mass",
+        factor("flight.mass", 1.03, 0.3, 3.0),
+        *("alpha", "load_answer", "loop", 4.0),
+    ),
+    replace(
+        one(
+            "airframe",
+            "vertical_gust",
+            value("rms_m_per_s", "flight.gust_rms_m_per_s", 0, 30, 0.5),
+            *("", "air", "time", 6.0),
+        ),
+        needs=AIR,
+        sample_error=spread_of_air,
+    ),
+    one(
+        "surface",
+        "rigging_offset",
+        added("offset_norm", "rigging.offset_norm", -0.5, 0.5, 0.01),
+        *("wanted", "answer_left"),
+    ),
+)
+BY_NAME = {effect.name: effect for effect in EFFECTS}
+
+
+def _ends(effect: Effect) -> tuple[float, float, float]:
+    """Return between which values an effect's number is a setting, and its neutral one."""
+    neutral = 1.0 if effect.free[0].mode == "factor" else 0.0
+    return neutral - effect.tolerance, neutral + effect.tolerance, neutral
+
+
+# {the effect that frees the same number: the setting}, where the rig file gives no tolerance
+SETTINGS: dict[str, Effect] = {
+    effect.name: setting_of(effect, *_ends(effect)) for effect in EFFECTS if effect.tolerance > 0.0
+}

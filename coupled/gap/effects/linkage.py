@@ -1,0 +1,114 @@
+"""The linkage's effects in the library."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.entries import (
+    SETTING,
+    added,
+    bend_beside,
+    factor,
+    limit,
+    one,
+    real_bend,
+    switch,
+    value,
+)
+
+LINKAGE: tuple[Effect, ...] = (
+    one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
+    Effect(
+        "stiffening_bend",
+        "linkage",
+        (real_bend(1e-4), limit("limit_{d}", "loader.bend_limit_{d}", 1e-4, 1, 5e-3, 2e-2)),
+        Signature("force", "bent"),
+    ),
+    one(
+        "linkage",
+        "backlash",
+        added("play_{d}", "loader.play_{d}", 0, 0.1, 1e-3),
+        *("computed", "deflection_left", "loop"),
+    ),
+    Effect(
+        "soft_backlash",
+        "linkage",
+        (
+            added("play_{d}", "loader.play_{d}", 0, 0.1, 1e-3),
+            replace(
+                limit(
+                    *("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}"),
+                    *(1e3, 1e8, 1e5, 2e4),
+                ),
+                scanned=False,
+                shape=True,
+            ),
+        ),
+        Signature("force", "deflection_left", "loop"),
+    ),
+    Effect(
+        "bend_hysteresis",
+        "linkage",
+        (
+            bend_beside(1e-6),
+            replace(
+                value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3),
+                scanned=False,
+            ),
+            value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0),
+        ),
+        Signature("force", "bent", "loop", 6.0),
+    ),
+    Effect(
+        "structural_mode",
+        "linkage",
+        (
+            bend_beside(1e-6),
+            limit("frequency_Hz", "loader.bend_frequency_Hz", 0.5, 200, 8.0),
+            replace(
+                value("damping_ratio", "loader.bend_damping_ratio", 0, 2, 0.05),
+                scanned=False,
+                may_end=True,
+            ),
+        ),
+        Signature("force", "bent", "loop", 1.5),
+    ),
+    replace(
+        one(
+            "linkage",
+            "servo_lag",
+            factor("loader.servo_frequency_Hz", 0.8),
+            *("speed", "deflection_left", "law", 0.8),
+        ),
+        tolerance=SETTING,
+    ),
+    one(
+        "linkage",
+        "servo_rate_limit",
+        limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-3, 10, 0.1, 0.18),
+        *("speed", "servo_speed", "law", 1.5),
+    ),
+    # A servo that was fitted without its dead time is too slow: its frequency is found again.
+    Effect(
+        "servo_delay",
+        "linkage",
+        (
+            added("delay_s", "loader.servo_delay_s", 0, 0.45, 0.02, 0.05, 0.1),
+            replace(
+                factor("loader.servo_frequency_Hz", 1.0),
+                starts=(1.0, 3.0, 8.0),
+                scanned=False,
+                may_end=True,
+            ),
+        ),
+        Signature("speed", "deflection_left", "law", 0.8),
+        reserve=True,
+    ),
+    one(
+        "linkage",
+        "arc_geometry",
+        switch("loader.arc_geometry", True),
+        *("deflection", "deflection_left"),
+    ),
+)

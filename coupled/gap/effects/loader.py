@@ -1,0 +1,128 @@
+"""The loader's effects in the library."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
+from coupled.gap.effects.frictions import FRICTIONS
+from coupled.gap.effects.ripples import ripples
+from coupled.gap.thresholds import CLOCK_s
+
+LOADER: tuple[Effect, ...] = (
+    *FRICTIONS,
+    replace(
+        one(
+            "loader",
+            "inertia",
+            factor("loader.mass_kg", 1.2),
+            *("acceleration", "missing", "law", 1.5),
+        ),
+        tolerance=SETTING,
+    ),
+    replace(
+        one(
+            "loader",
+            "viscous_damping",
+            factor("loader.damping_N_s_per_{d}", 1.2),
+            *("speed", "missing"),
+        ),
+        tolerance=SETTING,
+    ),
+    one(
+        "loader",
+        "gradient_error",
+        replace(factor("loader.basic_gradient_N_per_{d}", 1.05), host="the host's G_B"),
+        *("computed", "missing"),
+    ),
+    one(
+        "loader",
+        "cubic_stiffness",
+        added("cubic_N_per_{d}3", "loader.cubic_N_per_{d}3", 0, 1e9, 2e4, 2e6),
+        *("computed", "missing"),
+    ),
+    one(
+        "loader",
+        "breakout",
+        replace(added("breakout_N", "loader.breakout_N", 0, 60, 2.0), host="the host's F_BO"),
+        *("computed", "missing"),
+    ),
+    one(
+        "loader",
+        "bob_weight",
+        added("force_N_per_g", "loader.bob_weight_N_per_g", -200, 200, 5.0),
+        *("load", "missing"),
+    ),
+    one(
+        "loader",
+        "force_offset",
+        added("offset_N", "loader.offset_N", -100, 100, 1.0),
+        *("computed", "missing"),
+    ),
+    replace(
+        one(
+            "loader",
+            "digital_multiplier",
+            switch("loader.multiplier", "digital"),
+            *("noise", "product_left", "law", 0.3),
+        ),
+        outputs=("loader", "multiplier"),
+        mark="multiplier",
+    ),
+    # Where nothing bends, a force that comes late is one that is stamped late.
+    replace(
+        one(
+            "loader",
+            "transport_delay",
+            replace(added("delay_s", "loader.delay_s", 0, 0.19, 0.01), unsure=CLOCK_s),
+            *("speed", "computed_left", "law", 1.0),
+        ),
+        swallows=("force_skew",),
+    ),
+    Effect(
+        "friction_ripple",
+        "loader",
+        (
+            added("ripple_N", "loader.ripple_N", 0, 60, 1.0),
+            value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2),
+            value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0),
+        ),
+        Signature("computed", "missing"),
+        seen=ripples,
+    ),
+    Effect(
+        "relaxation",
+        "loader",
+        (
+            added("stiffness_N_per_{d}", "loader.relaxing_stiffness_N_per_{d}", 0, 1e5, 200.0),
+            replace(
+                value("time_s", "loader.relaxing_time_s", 5e-3, 100, 0.2, 1.5),
+                scanned=False,
+                shape=True,
+            ),
+        ),
+        Signature("speed", "missing", "loop", 6.0),
+    ),
+    one(
+        "loader",
+        "force_limit",
+        limit("limit_N", "loader.force_limit_N", 0.05, 2000, 10.0, 60.0),
+        *("computed", "missing"),
+    ),
+    replace(
+        one(
+            "loader",
+            "crosstalk",
+            added("factor", "loader.crosstalk", -0.9, 0.9, 0.05),
+            *("other_force", "missing"),
+        ),
+        other=True,
+    ),
+    one(
+        "loader",
+        "modifying_lag",
+        added("lag_s", "loader.modifying_lag_s", 0, 3, 0.01),
+        *("speed", "missing", "law", 1.5),
+    ),
+)

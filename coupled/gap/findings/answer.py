@@ -1,0 +1,151 @@
+"""What is said of the effects found: their numbers, how sure each is, and the verdict on all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+
+from coupled.gap.chain import stage_of
+from coupled.gap.effects.effect import Effect, Parameter, field_of
+from coupled.gap.effects.settings import settings
+from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.credibility import credibility
+from coupled.gap.findings.result import (
+    EffectResult,
+    ParameterEstimate,
+    SettingResult,
+    StageResult,
+    Verdict,
+)
+from coupled.gap.noise.lines import other_side
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import Choice, Found
+from coupled.gap.search.courses import course_in
+from coupled.gap.stages.stages import Reader
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+
+def verdict_of(
+    choice: Choice,
+    stages: Sequence[StageResult],
+    effects: Sequence[EffectResult],
+    budget: Sequence[StageBudget],
+) -> Verdict:
+    """Return the verdict; `mostly` where what is certain leaves structure, but holds more.
+
+    An effect that is not certain, though no other rivals it, explains nothing: it may imitate what
+    is missing so well that nothing seems to remain.
+    """
+    guilty = [stage.name for stage in stages if stage.guilty]
+    blamed = {step.effect.stage for step in choice.steps}
+    sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
+    left = bool(doubted(choice, effects)) or any(
+        s.guilty and (s.name not in blamed or s.unexplained) for s in stages
+    )
+    known = {one.stage: one for one in budget}
+    if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
+        return "unexplained"
+    if not choice.steps:
+        # A floor that hides much of a stage lets nobody say whether it has a gap.
+        return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
+    if any(step.rivals for step in choice.steps):
+        return "ambiguous"
+    return "mostly" if left else "effect"
+
+
+def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
+    """Return the effects that are not certain, though no other rivals them."""
+    alone = {step.effect.name for step in choice.steps if not step.rivals}
+    return frozenset(e.name for e in effects if e.name in alone and e.probability < CERTAIN)
+
+
+def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
+    """Return the share of a stage's gap that some of the effects hold, noise apart."""
+    return 0.0 if budget is None else sum(budget.of(name) for name in effects)
+
+
+def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
+    """Return what the settings of the nominal rig were found to be, over what is filed."""
+    found = []
+    for setting in settings(rig, control).values():
+        for p in setting.free:
+            value = choice.fit.values.get(setting.value_key(p))
+            filed = p.nominal(rig, control) if value is not None else 0.0
+            if value is not None and filed:
+                factor = float(p.entered(filed, value) / filed)
+                name = field_of(rig, control, p.key)
+                found.append(SettingResult(name, setting.stage, factor))
+    return tuple(found)
+
+
+def effects_of(
+    case: Case,
+    choice: Choice,
+    readers: Sequence[Reader],
+    stages: Sequence[StageResult],
+) -> tuple[EffectResult, ...]:
+    """Return the effects found, the largest first.
+
+    What drifts, or stands beside a remainder, may only imitate what is missing: the less credible
+    it is, the less sure.
+    """
+    remains = {stage.name: stage.remainder for stage in stages}
+    records = [reader.record for reader in readers]
+
+    def result(step: Found) -> EffectResult:
+        effect = step.effect
+        beside = max(remains.get(stage_of(output), 0.0) for output in effect.shows_in)
+        known = credibility(effect, case, choice.fit, records, beside)
+        sure = DOUBT + (SURE - DOUBT) * known.value
+        scatter = _sample_error(effect, readers)
+        numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
+        probability = step.probability * sure
+        course = course_in(effect, case, choice.fit, records)
+        return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
+
+    return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
+
+
+def _estimate(
+    choice: Choice, effect: Effect, p: Parameter, case: Case, scatter: float
+) -> ParameterEstimate:
+    key, fit = effect.value_key(p), choice.fit
+    value, low, high = fit.values[key], fit.low[key], fit.high[key]
+    if scatter > 0.0:  # the records meet a sample of it
+        low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
+        high = value + math.hypot(high - value, 1.96 * scatter * value)
+    twin = other_side(value, case.nominal.frame_rate) if p.folds else None
+    if twin is not None:  # the records do not say on which side of the fold it is
+        low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
+    ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
+    filed = float(p.nominal(case.nominal, case.control))
+    bounds = [None if end is None else float(p.entered(filed, end)) for end in ends]
+    host = case.nominal.controls[case.control].compensation
+    return ParameterEstimate(
+        name=p.named(case.control),
+        value=value,
+        low=ends[0],
+        high=ends[1],
+        key=p.key_on(case.control),
+        unit=p.unit(case.nominal, case.control),
+        filed=None if p.inverse and filed == 0.0 else filed,
+        found=float(p.entered(filed, value)),
+        found_low=bounds[0],
+        found_high=bounds[1],
+        host=p.host if host.deflection or host.gradient else "",
+        relative=p.mode == "factor",
+    )
+
+
+def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
+    """Return the relative standard error of an effect's number from what the records meet of it."""
+    one: Callable[[Record, float], float] | None = effect.sample_error
+    if one is None:
+        return 0.0
+    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    return float(np.sqrt(np.sum(np.square(each)))) / len(each)

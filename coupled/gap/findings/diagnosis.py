@@ -1,0 +1,135 @@
+"""A diagnosis, whole: what was found, the improved rig, and what is computed when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
+from coupled.gap.findings.healthy import Baseline
+from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
+from coupled.gap.findings.power import EffectPower, power
+from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
+from coupled.gap.findings.result import FORMAT, Findings
+from coupled.gap.findings.shrink import Shrink
+from coupled.gap.findings.summary import filtered_words, summary
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import Choice
+from coupled.gap.signals.output import Output
+from coupled.gap.signals.reading import worth_recording
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
+
+
+@dataclass(frozen=True)
+class Diagnosis(Findings):
+    """What records say of a rig, with the rig that has the effects found (`improved`).
+
+    The flight again, the next test and the power are computed when they are first asked for:
+    each flies the rig, and takes as long as the diagnosis or longer.
+    """
+
+    control: ControlName
+    shrink: Shrink
+    nominal: Rig = field(repr=False, compare=False)
+    improved: Rig = field(repr=False, compare=False)
+    records: Mapping[str, Record] = field(repr=False, compare=False)
+    outputs: tuple[Output, ...] = field(repr=False, compare=False)
+    choice: Choice = field(repr=False, compare=False)
+    baseline: Baseline | None = field(default=None, repr=False, compare=False)
+    # Channels whose logs were filtered, and where their floors come from.
+    filtered: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def first(self) -> Record:
+        """The first of the records, by which the flight again and the next test are made."""
+        return next(iter(self.records.values()))
+
+    @cached_property
+    def closed_loop(self) -> tuple[ChannelAgain, ...] | None:
+        """How far both rigs, flown with the record's force, stay from it; None without effects."""
+        if not self.choice.steps:
+            return None
+        return closed_loop(self.nominal, self.improved, self.control, self.first, self._again)
+
+    @cached_property
+    def _again(self) -> Again | None:
+        """The pilot of the first record."""
+        return Again.of(self.nominal, self.control, self.first)
+
+    @cached_property
+    def in_flight(self) -> tuple[EffectInFlight, ...] | None:
+        """What each effect does to the flight, the largest first; None without flight or effect."""
+        if not self.choice.steps or self._again is None:
+            return None
+        case = Case(self.nominal, self.control, self.outputs)
+        return in_flight(case, self.choice.fit, self.control, self._again)
+
+    @property
+    def improves(self) -> bool:
+        """Whether the improved rig flies no further from the record than the one as filed."""
+        return self.closed_loop is None or nearer(self.closed_loop)
+
+    @cached_property
+    def next_tests(self) -> tuple[ProposedTest, ...]:
+        """The tests that would separate the first rivals, the best first; empty without rivals."""
+        return next_tests(self.nominal, self.first, self.control, self.choice)
+
+    @property
+    def next_test(self) -> str:
+        """What to record next, in a sentence; empty where nothing would help."""
+        lacking = [
+            worth_recording(self.nominal, self.control, stage.name, stage.missing)
+            for stage in self.stages
+        ]
+        wanted = [stage.hidden.wanted for stage in self.stages if stage.hidden is not None]
+        return in_one_line(self.next_tests, sorted(set().union(*lacking)), wanted)
+
+    @cached_property
+    def power(self) -> tuple[EffectPower, ...]:
+        """The least size of each effect that the records would have shown."""
+        return power(self.choice.settled.rig, self.control, self.outputs)
+
+    @cached_property
+    def summary(self) -> str:
+        """What is wrong, how large, how sure, how much it explains, and what to record next."""
+        flight = "" if self.in_flight is None else in_words(self.in_flight)
+        filtered = filtered_words(self.filtered)
+        said = summary(self, self.shrink, flight, filtered, self.next_test)
+        said += f" {CIRCLED}" if self.choice.circled else ""
+        return said if self.baseline is None else f"{self.baseline.words} {said}"
+
+    def as_dict(self, with_power: bool = False) -> dict[str, Any]:
+        """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
+        found: dict[str, Any] = {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "stages": {stage.name: stage.as_dict() for stage in self.stages},
+            "effects": [effect.as_dict() for effect in self.effects],
+            "rivals": [list(group) for group in self.rivals],
+            "budget": {one.stage: one.as_dict() for one in self.budget},
+            "budget_95": {one.stage: one.intervals() for one in self.budget},
+            "shrink": self.shrink.as_dict(),
+            "settings": {setting.name: setting.factor for setting in self.settings},
+        }
+        if self.choice.circled:
+            found["circled"] = True
+        if self.filtered:
+            found["filtered"] = dict(self.filtered)
+        if self.baseline is not None:
+            found["healthy"] = self.baseline.as_dict()
+        if self.closed_loop is not None:
+            found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
+        if self.in_flight is not None:
+            found["in_flight"] = [one.as_dict() for one in self.in_flight]
+        if self.next_tests:
+            found["next_tests"] = [test.as_dict() for test in self.next_tests]
+        found["next_test"] = self.next_test
+        if with_power:
+            found["power"] = [one.as_dict() for one in self.power]
+        return found

@@ -1,0 +1,143 @@
+"""What each effect found does to the flight: the improved rig is flown with and without it.
+
+The pilot is the record's. A gap of a hundred floors in the loader may hardly move the aircraft,
+and one of two floors may. With the effects found, and without any, the two flights differ by some
+power of pitch rate, load factor and surface; each effect's share is what adding it takes off of
+that (`shapley`). With several, whoever fixes the rig fixes the largest first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.findings.flown import Again
+from coupled.gap.findings.shapley import shapley_weights
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.stages.surfaces import surface_channel
+from coupled.gap.thresholds import IN_FLIGHT_LEAST
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+LOAD = "load_factor"
+RATES = {
+    "column": ("pitch_rate_rad_per_s", LOAD),
+    "wheel": ("roll_rate_rad_per_s",),
+    "pedals": ("yaw_rate_rad_per_s",),
+}
+
+
+@dataclass(frozen=True)
+class EffectInFlight:
+    """What one effect does to the flight, by channel.
+
+    `shares` are of the power by which the effects change the flight, and sum to 1 over all of
+    them; below 0, it works against the others. `changes` are rms differences that leaving it out
+    makes, in the channel's unit, `of_motion` the same over the rms of the channel's own motion.
+    `share` is over all channels, each power over that of the channel's motion.
+    """
+
+    name: str
+    share: float
+    shares: Mapping[str, float]
+    changes: Mapping[str, float]
+    of_motion: Mapping[str, float]
+
+    @property
+    def shows(self) -> bool:
+        """Whether leaving it out changes any channel by what could matter."""
+        return any(value >= IN_FLIGHT_LEAST for value in self.of_motion.values())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {
+            "name": self.name,
+            "share": self.share,
+            "shares": dict(self.shares),
+            "changes": dict(self.changes),
+            "of_motion": dict(self.of_motion),
+        }
+
+
+def in_flight(
+    case: Case, found: Fit, control: ControlName, again: Again
+) -> tuple[EffectInFlight, ...] | None:
+    """Return what each effect does to the flight, the largest first; None where none can be flown.
+
+    A stamp that is late is in the record, not in the flight: it is taken off.
+    """
+    if case.nominal.flight is None or not found.effects:
+        return None
+    count = len(found.effects)
+    flights = []
+    for subset in range(2**count):
+        kept = [effect for i, effect in enumerate(found.effects) if subset & 1 << i]
+        flown = again.fly(_unstamped(case.with_only(found, kept), control))
+        if flown is None:
+            return None
+        flights.append(flown)
+    names = [name for name in (*RATES[control], surface_channel(control)) if name in flights[-1]]
+    rows = min(len(flown) for flown in flights)
+    whole = np.array([flights[-1][name][:rows] for name in names])
+    each = np.array([[flown[name][:rows] for name in names] for flown in flights])
+    power = np.mean((each - whole) ** 2, axis=2)  # (subsets, channels)
+    motion = np.sqrt(np.mean((whole - whole[:, :1]) ** 2, axis=1))
+    shares = shapley_weights(count) @ power
+    changed = np.flatnonzero((motion > 0.0) & (power[0] > (1e-3 * IN_FLIGHT_LEAST * motion) ** 2))
+    weight = 1.0 / motion[changed] ** 2
+    total = float(power[0, changed] @ weight)
+
+    def of(i: int) -> EffectInFlight:
+        without = np.sqrt(power[2**count - 1 - (1 << i)])
+        relative = np.divide(without, motion, out=np.zeros_like(without), where=motion > 0.0)
+        return EffectInFlight(
+            found.effects[i].name,
+            float(shares[i, changed] @ weight) / total if total > 0.0 else 0.0,
+            {names[c]: float(shares[i, c] / power[0, c]) for c in changed},
+            dict(zip(names, without.tolist(), strict=True)),
+            dict(zip(names, relative.tolist(), strict=True)),
+        )
+
+    return tuple(sorted(map(of, range(count)), key=lambda one: -one.share))
+
+
+def _unstamped(rig: Rig, control: ControlName) -> Rig:
+    """Return a rig whose recorder stamps all channels in time."""
+    stamps = {"flight.motion_stamp_s": 0.0, f"controls.{control}.sensing.force_stamp_s": 0.0}
+    late = rig.flight is not None and rig.flight.motion_stamp != 0.0
+    late = late or rig.controls[control].sensing.force_stamp != 0.0
+    return rig.changed(stamps) if late else rig
+
+
+def in_words(effects: Sequence[EffectInFlight]) -> str:
+    """Return in a sentence or two what the effects do to the flight, and which to fix first."""
+    shown = [effect for effect in effects if effect.shows]
+    if not shown:
+        return "In flight it hardly shows: no channel of the motion changes by 1 %."
+    if len(effects) == 1:
+        (only,) = effects
+        parts = [f"the {_plain(n)} by {_per_cent(v)}" for n, v in only.of_motion.items()]
+        return f"In flight it changes {_listed(parts)} of their rms."
+    parts = [f"{e.name.replace('_', ' ')} {_per_cent(e.share)}" for e in effects]
+    first = effects[0].name.replace("_", " ")
+    return f"Of what they do to the flight, {_listed(parts)}: fix {first} first."
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
+def _plain(name: str) -> str:
+    for unit in ("_rad_per_s", "_rad"):
+        name = name.removesuffix(unit)
+    return name.replace("_", " ")
+
+
+def _per_cent(share: float) -> str:
+    return f"{100 * share:.0f} %" if abs(share) >= 0.095 else f"{100 * share:.1f} %"

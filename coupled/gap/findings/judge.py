@@ -1,0 +1,164 @@
+"""Which stages have a gap: by what is left of their outputs, and by the effects found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.chain import CHAIN, stage_of
+from coupled.gap.findings.result import StageResult
+from coupled.gap.findings.where import remains, where
+from coupled.gap.search.choose import Choice
+from coupled.gap.signals.output import Hides, Output, explained_below, stage_gaps, stage_limits
+from coupled.gap.stages.airframe import needs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.thresholds import MOST
+from coupled.rig.rig import Rig
+
+BY_LAWS = "the aircraft's laws move it, too; judged with the airframe"
+
+
+def _by_stage(gaps: Mapping[str, float]) -> dict[str, float]:
+    """Return the gaps of outputs by the stages that they judge, the widest of each."""
+    joined: dict[str, float] = {}
+    for output, gap in gaps.items():
+        name = stage_of(output)
+        joined[name] = max(joined.get(name, 0.0), gap)
+    return joined
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges the stages by their outputs. `last` are the outputs' gaps with the effects found.
+
+    An effect of `doubted` blames no stage that has no output of its own: it may stand for what is
+    wrong in the one where it shows.
+    """
+
+    readers: Sequence[Reader]
+    outputs: Sequence[Output]
+    choice: Choice
+    last: Mapping[str, float]
+    doubted: frozenset[str] = frozenset()
+
+    @property
+    def rig(self) -> Rig:
+        """The nominal rig."""
+        return self.readers[0].rig
+
+    @property
+    def blamed(self) -> set[str]:
+        """The stages of the effects found.
+
+        One that shows in its neighbours alone is blamed where half of a gap there is closed. Where
+        it is doubted, the neighbour with the widest gap is.
+        """
+        settled = stage_gaps(self.outputs, self.choice.settled.rig)
+        found: set[str] = set()
+        for effect in (step.effect for step in self.choice.steps):
+            seen = [out for out in effect.shows_in if out in settled]
+            if effect.stage in effect.shows_in:
+                found.add(effect.stage)
+            elif any(self.last[o] - 1.0 < (1.0 - MOST) * (settled[o] - 1.0) for o in seen):
+                widest = stage_of(max(seen, key=lambda out: settled[out]))
+                found.add(widest if effect.name in self.doubted else effect.stage)
+        return found
+
+    def stages(self) -> tuple[StageResult, ...]:
+        """Return the stages that the records have, in the order of the chain."""
+        before = _by_stage(stage_gaps(self.outputs, self.rig))
+        settled = _by_stage(stage_gaps(self.outputs, self.choice.settled.rig))
+        left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
+        lacking = self._lacking()
+        found = []
+        for stage in CHAIN:
+            name = stage.name
+            result: StageResult | None
+            if name in before and name not in lacking:
+                wide = left[name] > explained_below(settled[name], limits[name])
+                guilty = name in self.blamed or wide
+                hidden = None if guilty else self._hidden(name)
+                if hidden is not None:
+                    found += [StageResult(name, why=hidden.words, hidden=hidden)]
+                    continue
+                numbers = (before[name], settled[name], limits[name], left[name])
+                result = self._with_where(StageResult(name, *numbers, guilty=guilty))
+            elif name == "sensing":
+                result = self._with_where(self._sensing(before))
+            elif name in lacking:
+                result = StageResult(name, missing=lacking[name])
+            else:
+                result = self._without_output(name)
+            found += [result] if result is not None else []
+        return tuple(found)
+
+    def _hidden(self, stage: str) -> Hides | None:
+        """Return what hides the least of a stage, where even that hides much; else None."""
+        outputs = [output for output in self.outputs if output.stage == stage]
+        known = [output.hides for output in outputs if output.hides is not None]
+        least = min(known, key=lambda one: one.share, default=None)
+        return least if least is not None and least.much else None
+
+    def _lacking(self) -> dict[str, tuple[str, ...]]:
+        """Return the channels that each stage lacks in every record."""
+        each = [reader.missing() for reader in self.readers]
+        shared = {s: tuple(n) for s, n in each[0].items() if all(s in m for m in each)}
+        shared.pop("multiplier", None)
+        if self.readers[0].set_points:
+            shared.pop("loader", None)
+        if self.rig.flight is None:
+            shared.pop("surface", None)
+        return shared
+
+    def _sensing(self, before: Mapping[str, float]) -> StageResult:
+        """Return sensing: guilty where its effect was found, else not judged by itself.
+
+        A wrong scale has no residual of its own: it shows in those of its neighbours at once,
+        and the widest of them is its gap.
+        """
+        shown = dict.fromkeys(stage_of(o) for o in STAGE_OF["sensing"].effects_show_in)
+        neighbours = tuple(name for name in shown if name in before)
+        if "sensing" in self.blamed:
+            widest = max(before[name] for name in neighbours)
+            return StageResult("sensing", widest, guilty=True, shown_in=neighbours)
+        why = f"see {', '.join(neighbours or shown)}"
+        return StageResult("sensing", why=why, shown_in=tuple(shown))
+
+    def _without_output(self, name: str) -> StageResult | None:
+        """Return a stage that no output judges, None where the rig has none of it."""
+        flown = self.rig.flight is not None
+        if name == "linkage" and self.readers[0].moved and name in self.blamed:
+            gap = max(o.gap(self.rig) for o in self.outputs if o.stage == "loader")
+            return StageResult(name, gap, guilty=True, shown_in=("loader",))
+        reader = self.readers[0]
+        known = {"schedule": "constant gradient"}
+        known |= {"linkage": "see loader"} if reader.moved else {}
+        known |= {"loader": "δc is a set point"} if reader.set_points else {}
+        known |= {"surface": BY_LAWS} if flown else {}
+        if name in known:
+            return StageResult(name, why=known[name])
+        if name == "airframe" and flown:
+            lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
+            return StageResult(name, missing=tuple(lacking))
+        return None
+
+    def _with_where(self, found: StageResult) -> StageResult:
+        """Return a stage with where in it the gap lies, by the output where it is widest."""
+        stage = STAGE_OF[found.name]
+        shown = stage.outputs or stage.effects_show_in
+        ours = [output for output in self.outputs if output.stage in shown]
+        if not found.guilty or not ours:
+            return found
+        # Without what its settings explain, unless at the end of their tolerance they hide it.
+        hidden = found.settled is not None and found.settled <= (found.limit or 0.0)
+        rig = self.rig if hidden else self.choice.settled.rig
+        widest = max(ours, key=lambda o: o.gap(rig))
+        reader = self.readers[widest.record]
+        found = replace(found, where=where(widest, rig, reader.record, reader.control))
+        if not found.unexplained:
+            return found
+        improved = self.choice.fit.rig
+        most = max(ours, key=lambda o: o.gap(improved))
+        record = self.readers[most.record].record
+        return replace(found, remains=remains(most, improved, record, reader.control))

@@ -1,0 +1,183 @@
+"""The next test: the record that would separate rivals, found by computation (T-optimal design).
+
+Each candidate test is flown by the rig with one rival, noise and all, and the record so made is
+fitted by both: the rival refitted, since without the refit any test would seem to separate them.
+What counts is by how much the true one then beats the other on held-out stretches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.effects.library import EFFECTS
+from coupled.gap.findings.flown import fly_force
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import Choice
+from coupled.gap.search.gain import ranked_by_gain
+from coupled.gap.signals.output import Output, white
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import SEPARATED_GAIN, TEST_EDGE_s, TEST_s
+from coupled.record.channels import ControlName, channel, noisy_channels
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProposedTest:
+    """A test that would separate two rivals, and by what log-likelihood."""
+
+    text: str
+    rivals: tuple[str, str]
+    gain: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"words": self.text, "rivals": list(self.rivals), "gain": self.gain}
+
+
+@dataclass(frozen=True)
+class Push:
+    """A test that could be flown: what it is called, its force at each frame, and its q̄."""
+
+    text: str
+    force_N: Floats
+    pressure_Pa: Floats
+    rig: Rig
+
+
+def next_tests(
+    nominal: Rig, record: Record, control: ControlName, choice: Choice
+) -> tuple[ProposedTest, ...]:
+    """Return the tests that would separate the first rivals found, the best first."""
+    step = next((step for step in choice.steps if step.rivals), None)
+    if step is None or channel(control, "force") not in record:
+        return ()
+    rival = step.rivals[0]
+    others = tuple(effect for effect in choice.fit.effects if effect is not step.effect)
+    noise = {name: white(record[name]) for name in _noisy(nominal, record, control)}
+    found = []
+    for test in pushes(nominal, record, control):
+        real = _as_flown(rival.fit.rig, test.rig, control).changed({"noise": noise})
+        pair = ((*others, rival.effect), (*others, step.effect))
+        gain = _gain(test, real, control, pair, {**rival.fit.values, **choice.fit.values})
+        if gain is not None:
+            rivals = (step.effect.name, rival.effect.name)
+            found.append(ProposedTest(test.text, rivals, gain))
+    return tuple(sorted(found, key=lambda item: -item.gain))
+
+
+def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
+    """Return the rig with a test's aircraft and speed, what effects change in the flight kept."""
+    if test.flight is None:
+        return rig
+    freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
+    kept = {key: value_of(rig, control, key) for key in freed}
+    return rig.changed({"flight": test.flight}).changed(kept)
+
+
+def _noisy(rig: Rig, record: Record, control: ControlName) -> list[str]:
+    channels = noisy_channels([control], flown=rig.flight is not None)
+    return [name for name in channels if name in record]
+
+
+def _gain(
+    test: Push,
+    real: Rig,
+    control: ControlName,
+    pair: tuple[tuple[Effect, ...], tuple[Effect, ...]],
+    start: dict[str, float],
+) -> float | None:
+    """Return by how much the first set would beat the second on a record of the first."""
+    try:
+        record = fly_force(real, {control: test.force_N}, test.pressure_Pa, seed=5)
+    except InputError:
+        return None
+    if record.manifest["ended_early"]:
+        return None
+    reader = Reader(test.rig, record, control, surface_points)
+    outputs: list[Output] = reader.outputs()
+    if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
+        outputs += airframe_outputs(test.rig, record)
+    case = Case(test.rig, control, outputs)
+    fits = [case.fit(effects, "fitted", start) for effects in pair]
+    settled = case.fit((), "fitted")
+    fitted = [(effects[-1], found) for effects, found in zip(pair, fits, strict=True)]
+    ranked = ranked_by_gain(outputs, settled, fitted)
+    gains = {candidate.effect.name: candidate.gain for candidate in ranked}
+    return gains[pair[0][-1].name] - gains[pair[1][-1].name]
+
+
+def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:
+    """Yield tests that the rig can make: pushes of the record's own size, at its q̄ and others."""
+    most = float(np.max(np.abs(record[channel(control, "force")])))
+    rate = nominal.frame_rate
+    time = np.arange(round(TEST_s * rate)) / rate
+    settings = _pressures(nominal, record, control, len(time))
+    for text, shape in _shapes(time):
+        for where, pressure, rig in settings:
+            text_of = f"{text} of ±{most:.0f} N for {TEST_s:g} s {where}"
+            yield Push(text_of, most * shape, pressure, rig)
+
+
+def _shapes(time: Floats) -> list[tuple[str, Floats]]:
+    """Return what a hand can do, ±1, at rest at both ends."""
+    quiet = np.clip(np.minimum(time, time[-1] - time) / TEST_EDGE_s, 0.0, 1.0)
+    slow = np.abs(((time / 5.0 + 0.75) % 1.0) * 4.0 - 2.0) - 1.0
+    chirp = np.sin(2.0 * np.pi * (0.1 + 0.07 * time) * time)
+    holds = np.repeat([1.0, -0.6, 0.3, -1.0, 0.5, 0.0], -(-len(time) // 6))[: len(time)]
+    width = max(3, round(TEST_EDGE_s / (time[1] - time[0])))
+    edge = np.hanning(width + 2)
+    steps = np.convolve(holds, edge / edge.sum(), mode="same")
+    return [
+        ("slow triangles", slow * quiet),
+        ("a sweep from 0.1 to 3 Hz", chirp * quiet),
+        ("steps that are held", steps * quiet),
+    ]
+
+
+def _pressures(
+    nominal: Rig, record: Record, control: ControlName, frames: int
+) -> list[tuple[str, Floats, Rig]]:
+    """Return the q̄ that a test could have: as recorded, and on a bench through the whole table."""
+    name = "dynamic_pressure_Pa"
+    usual = float(np.median(record[name])) if name in record else 0.0
+    level = np.full(frames, usual)
+    here = [(f"at {usual / 1000.0:.2g} kPa", level, nominal)]
+    table = nominal.controls[control].schedule.dynamic_pressure
+    if nominal.flight is None:
+        whole = np.linspace(table[0], table[-1], frames)
+        text = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"
+        return [*here, (text, whole, nominal)]
+    faster = {"flight.calibrated_airspeed_m_per_s": 1.2 * nominal.flight.calibrated_airspeed}
+    return [*here, ("at 1.2 times the airspeed", level, nominal.changed(faster))]
+
+
+def in_one_line(
+    tests_found: Sequence[ProposedTest], lacking: Sequence[str], wanted: Sequence[str] = ()
+) -> str:
+    """Return what to record next, in a sentence, or nothing where nothing would help.
+
+    `lacking` are channels, `wanted` what would lift a stage out of its floor.
+    """
+    if tests_found:
+        best = tests_found[0]
+        one, other = (name.replace("_", " ") for name in best.rivals)
+        if best.gain < SEPARATED_GAIN:
+            return f"No test tried would tell {one} from {other}: they act alike on this rig."
+        return f"To tell {one} from {other}, record {best.text}."
+    if wanted:
+        return f"Record {wanted[0]}."
+    if lacking:
+        return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
+    return ""

@@ -1,0 +1,190 @@
+"""What a diagnosis found, as data; each result makes its own part of the JSON by `as_dict`.
+
+Keys are those of the contract. SI units; a gap is a residual's rms over its noise floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.credibility import Credibility, remainder
+from coupled.gap.findings.where import Remains, Where
+from coupled.gap.search.course import Course
+from coupled.gap.signals.output import Hides, explained_below
+from coupled.gap.thresholds import GUILTY_FROM
+
+# Of the JSON that is written. Where it is read back, one without a format is read, as one written
+# before formats had numbers, and a newer one is refused by name (`files.check_format`).
+FORMAT = 2
+Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
+
+
+@dataclass(frozen=True)
+class StageResult:
+    """One stage. `gap` None: it was not judged, for the channels `missing` or the reason `why`.
+
+    `settled` is the gap with the settings within their tolerance, `left` that with the effects
+    found; `limit` the gap up to which noise may be all there is. `shown_in` names the stages in
+    whose gaps a fault of this one would show, where it has no residual of its own. `hidden`: it
+    stays within a floor that would hide a gap, and is not judged for that.
+    """
+
+    name: str
+    gap: float | None = None
+    settled: float | None = None
+    limit: float | None = None
+    left: float | None = None
+    guilty: bool = False
+    where: Where | None = None
+    remains: Remains | None = None
+    missing: tuple[str, ...] = ()
+    why: str = ""
+    shown_in: tuple[str, ...] = ()
+    hidden: Hides | None = None
+
+    @property
+    def judged(self) -> bool:
+        """Whether the record let the stage be judged."""
+        return self.gap is not None
+
+    @property
+    def explained_below(self) -> float:
+        """The gap up to which the effects found explain the stage."""
+        if self.settled is None or self.limit is None:
+            return GUILTY_FROM if self.limit is None else self.limit
+        return explained_below(self.settled, self.limit)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it still holds structure that the effects found do not explain."""
+        return self.left is not None and self.left > self.explained_below
+
+    @property
+    def remainder(self) -> float:
+        """How much what is left says against the effects found, 0 to 1 (`credibility`)."""
+        if self.left is None or self.settled is None:
+            return 0.0
+        return remainder(self.settled, self.left, self.explained_below)
+
+    @property
+    def within_settings(self) -> bool:
+        """Whether only settings within their tolerance widen it beyond its limit."""
+        if self.gap is None or self.settled is None or self.limit is None or self.guilty:
+            return False
+        return self.settled <= self.limit < self.gap
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        if self.gap is None:
+            found: dict[str, Any] = {"judged": False, "missing": list(self.missing)}
+            found |= {"why": self.why} if self.why else {}
+            return found | ({} if self.hidden is None else {"floor_share": self.hidden.share})
+        found = {"gap": self.gap}
+        numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}
+        found |= {name: number for name, number in numbers.items() if number is not None}
+        found["guilty"] = self.guilty
+        if self.where is not None:
+            found["where"] = self.where.as_dict()
+        if self.remains is not None:
+            found["remains"] = self.remains.as_dict()
+        return found
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A parameter with its 95 % interval; an end is None where nothing determines it.
+
+    `key` is the rig file's, in `unit`; it is `filed` there, and `found` is what it should be. The
+    parameter's own value is that number, a factor on it, or what is added to it. `filed` is None
+    where the rig has none of it; `found_low` and `found_high` are the interval's ends; `host` is
+    what the host calls the number that it assumes for it, where it has one. The change of a
+    `relative` one is given as a share of what is filed.
+    """
+
+    name: str
+    value: float
+    low: float | None
+    high: float | None
+    key: str = ""
+    unit: str = ""
+    filed: float | None = None
+    found: float = 0.0
+    found_low: float | None = None
+    found_high: float | None = None
+    host: str = ""
+    relative: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        own = {"value": self.value, "low": self.low, "high": self.high}
+        return own | {"key": self.key, "filed": self.filed, "found": self.found}
+
+
+@dataclass(frozen=True)
+class EffectResult:
+    """An effect found, with the probability that it is the one."""
+
+    name: str
+    stage: str
+    probability: float
+    parameters: tuple[ParameterEstimate, ...]
+    credibility: Credibility | None = None
+    course: Course | None = None
+
+    @property
+    def value(self) -> float | None:
+        """The value of its first parameter; None of an effect without a number."""
+        return self.parameters[0].value if self.parameters else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        found: dict[str, Any] = {
+            "name": self.name,
+            "stage": self.stage,
+            "probability": self.probability,
+            "parameters": {p.name: p.as_dict() for p in self.parameters},
+        }
+        if self.course is not None:
+            found["course"] = self.course.as_dict()
+        known = self.credibility
+        return found | ({} if known is None else {"credibility": known.as_dict()})
+
+
+@dataclass(frozen=True)
+class SettingResult:
+    """What a setting of the nominal rig was found to be, over its nominal value."""
+
+    name: str
+    stage: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What records say of a rig: where it departs from them, by which effects, and how far.
+
+    `stages` are in the order of the chain, `effects` the largest first; `rivals` are groups of
+    effects that the records do not distinguish.
+    """
+
+    control: str
+    verdict: Verdict
+    stages: tuple[StageResult, ...]
+    effects: tuple[EffectResult, ...]
+    rivals: tuple[tuple[str, ...], ...]
+    settings: tuple[SettingResult, ...]
+    budget: tuple[StageBudget, ...]
+
+    def stage(self, name: str) -> StageResult:
+        """Return a stage by its name; KeyError where the records have none of it."""
+        for stage in self.stages:
+            if stage.name == name:
+                return stage
+        raise KeyError(name)
+
+    @property
+    def guilty(self) -> tuple[str, ...]:
+        """The names of the guilty stages."""
+        return tuple(stage.name for stage in self.stages if stage.guilty)

@@ -1,0 +1,284 @@
+"""A diagnosis in the few sentences that an engineer can repeat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from coupled.display import unit_in
+from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
+from coupled.gap.findings.shrink import Shrink
+from coupled.gap.findings.where import Remains, Where
+from coupled.gap.noise.lines import SeenLine
+from coupled.gap.thresholds import FREE_LEAST
+
+OF_SIGNAL = {
+    "computed": "the deflection",
+    "estimate": "the estimated deflection",
+    "force": "the force",
+    "gradient": "the gradient",
+    "dynamic_pressure": "q̄",
+    "load_factor": "the load factor",
+    "time": "time",
+    "elevator": "the elevator",
+    "pitch_rate": "the pitch rate",
+    "alpha": "the angle of attack",
+}
+
+
+def in_figures(name: str, value: float) -> str:
+    """Return a parameter's value in figures; of a factor as many as distinguish it from 1."""
+    off = abs(value - 1.0)
+    if name != "factor" or off >= 0.1 or off < 1e-12:
+        return f"{value:.4g}"
+    return f"{value:.{1 - math.floor(math.log10(off))}f}"
+
+
+def plain(name: str) -> str:
+    """Return an effect's or a stage's name without its underscores."""
+    return name.replace("_", " ")
+
+
+def filtered_words(filtered: Mapping[str, str]) -> str:
+    """Return which logs were filtered, and where their floors come from."""
+    said = []
+    for source in dict.fromkeys(filtered.values()):
+        names = " and ".join(name for name, one in filtered.items() if one == source)
+        said.append(
+            f"No noise is seen in {names}, as in a log that was filtered or resampled:"
+            f" the floor is {source}."
+        )
+    return " ".join(said)
+
+
+def summary(found: Findings, shrink: Shrink, in_flight: str, filtered: str, next_test: str) -> str:
+    """Return what is wrong, how large, how sure, how much it explains, and what to record next.
+
+    `in_flight` says what it does to the flight, `filtered` which logs were filtered.
+    """
+    said = [_what(found), _set(found), _settings(found)]
+    if found.verdict == "no_gap":
+        said.append(_not_judged(found))
+    else:
+        said += [
+            *map(in_time, found.effects),
+            _since(found),
+            _sure(found),
+            _closes(shrink),
+            in_flight,
+        ]
+    said += [filtered, next_test]
+    return " ".join(sentence for sentence in said if sentence)
+
+
+def _not_judged(found: Findings) -> str:
+    """Return the stages that were not judged, nor by the residuals of their neighbours."""
+    judged = {stage.name for stage in found.stages if stage.judged}
+    names = [s.name for s in found.stages if not s.judged and not judged & set(s.shown_in)]
+    return f"Not judged: {', '.join(names)}." if names else ""
+
+
+def _what(found: Findings) -> str:
+    if found.verdict == "no_gap":
+        within = "every stage that could be judged stays within its noise"
+        return f"No gap in the {found.control}: {within}."
+    hidden = [stage for stage in found.stages if stage.hidden is not None]
+    if hidden and not found.guilty:
+        why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
+        return f"Whether the {found.control} has a gap cannot be said: {why}."
+    budgets = {one.stage: one for one in found.budget}
+    if found.verdict == "unexplained":
+        named = "; ".join(_effect(effect) for effect in found.effects)
+        also = f" Found nevertheless: {named}." if named else ""
+        return (
+            f"A gap in the {', '.join(found.guilty)} that no effect of the library explains.{also}"
+        )
+    return " ".join(
+        _explained(found, found.stage(name), budgets.get(name)) for name in found.guilty
+    )
+
+
+def _explained(found: Findings, stage: StageResult, budget: StageBudget | None) -> str:
+    """Return which effects explain how much of a stage's gap, and what remains of it."""
+    ours = [e for e in found.effects if e.stage == stage.name]
+    beside = [e for e in found.effects if e.stage != stage.name]
+    if budget is None:
+        return f"The gap lies in the {stage.name}."
+    shares = [
+        f"{_effect(effect)}, explains {_per_cent(budget.of(effect.name))}"
+        for effect in (*ours, *(e for e in beside if budget.of(e.name) >= FREE_LEAST / 100))
+    ]
+    said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
+    if not stage.unexplained or stage.remains is None:
+        return f"{said}; what remains is noise."
+    near = stage.remains.reversals
+    where = "" if near is None else f", within {1000 * near.within_s:.0f} ms of each reversal,"
+    rest = f"{_per_cent(budget.remains)} remains{where}"
+    return f"{said}; {rest} and no effect of the library explains it."
+
+
+def _per_cent(share: float) -> str:
+    """Return a share in per cent; with a decimal where it is nearly nothing or nearly all."""
+    nearly = share < 0.01 or 0.99 < share < 0.9995
+    return f"{100 * share:.1f} %" if nearly else f"{100 * share:.0f} %"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _set(found: Findings) -> str:
+    """Return what to set, so that host and rig file have what was found."""
+    if found.verdict not in ("effect", "mostly"):
+        return ""
+    numbers = [p for effect in found.effects for p in effect.parameters]
+    said = [f"Set {p.host or f'{p.key} of the rig file'} to {_found(p)}." for p in numbers]
+    return " ".join(said)
+
+
+def _settings(found: Findings) -> str:
+    """Return what widens a stage that nothing else does: a number off within its setting."""
+    said = []
+    for stage in found.stages:
+        if not stage.within_settings:
+            continue
+        off = [
+            f"{plain(setting.name)} {100 * (setting.factor - 1):+.1f} %"
+            for setting in found.settings
+            if setting.stage == stage.name
+        ]
+        if off:
+            said.append(
+                f"The {stage.name} stands at {stage.gap:.3g} floors by its settings,"
+                f" {' and '.join(off)}: within what they are set to."
+            )
+    return " ".join(said)
+
+
+def _since(found: Findings) -> str:
+    """Return since when, and for what is not explained, what it follows."""
+    said = []
+    for stage in found.stages:
+        if stage.where is None:
+            continue
+        if not any(e.course is not None and e.course.onset_s for e in found.effects):
+            said += _between(stage.name, stage.where)
+        if stage.where.line is not None:
+            said.append(_line(stage.where.channel, stage.where.line))
+        if stage.remains is not None:
+            said.append(_remains(stage.name, stage.remains))
+    return " ".join(said)
+
+
+def _between(stage: str, where: Where) -> list[str]:
+    """Return from when to when a stage's gap is there, where it is not there all the time."""
+    begins, ends = (f"{span.at_s:.1f} s" if span else "" for span in (where.begins, where.ends))
+    if begins and ends:
+        return [f"The gap in the {stage} is there from {begins} to {ends}."]
+    if begins:
+        return [f"The gap in the {stage} is there from {begins} on."]
+    return [f"The gap in the {stage} is there until {ends}."] if ends else []
+
+
+def in_time(effect: EffectResult) -> str:
+    """Return since when an effect is there and how fast it grows; nothing where it always is."""
+    course = effect.course
+    if course is None or course.kind == "constant":
+        return ""
+    onset, rate, said = course.onset_s, course.rate_per_s, []
+    if onset is not None:
+        said.append(f"from {onset.value:.1f} s on ({onset.low:.1f} to {onset.high:.1f})")
+    if course.kind == "from":
+        p = effect.parameters[0]
+        filed = p.filed or 0.0
+        said.append(f"then {figure(filed + course.then * (p.found - filed))} {p.unit}".rstrip())
+    if rate is not None:
+        share = rate.times(60.0)
+        first = effect.parameters[0]
+        unit = " of them" if course.kind == "events" else f" {first.unit}".rstrip()
+        if course.kind != "events" and (first.relative or first.name == "per_s"):
+            share, unit = share.times(100.0), " %"
+        ends = f"{share.low:.3g} to {share.high:.3g}"
+        said.append(f"at {share.value:.3g}{unit} a minute ({ends})")
+    return f"{_capital(plain(effect.name))}: {', '.join(said)}."
+
+
+def _line(channel: str, line: SeenLine) -> str:
+    """Return the line of a tone in a channel: where it stands, how high, and what it is."""
+    unit = unit_in(channel)
+    said = f"A line of {figure(line.amplitude)} {unit} stands at {line.seen_Hz:.4g} Hz in {channel}"
+    if line.folded:
+        return f"{said}: aliased, from a tone of {line.tone_Hz:.4g} Hz."
+    return f"{said}."
+
+
+def _remains(stage: str, left: Remains) -> str:
+    """Return what an unexplained stage's residual looks like, effects found taken off."""
+    follows = ""
+    if left.follows:
+        most = left.follows[0]
+        follows = f"{100 * most.share:.0f} % follows {_signal(most.signal)}, and "
+    share = round(100 * left.free_share)
+    of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
+    takes = f"{share} % could be some function of {of}"
+    if share < FREE_LEAST:
+        takes = "no function of the stage's signals takes any on stretches held out"
+    return f"What remains in the {stage} is {left.gap:.3g} floors: {follows}{takes}."
+
+
+def _signal(name: str) -> str:
+    if name == "constant":
+        return "nothing: it is constant"
+    base = next((known for known in OF_SIGNAL if name.startswith(known)), name)
+    rest = name[len(base) :]
+    kind = "the sign of " if rest.endswith("sign") else ""
+    kind += "the rate of " if "_rate" in rest else ("the cube of " if "cubed" in rest else "")
+    return kind + OF_SIGNAL.get(base, base)
+
+
+def _sure(found: Findings) -> str:
+    if found.rivals:
+        groups = [[plain(name) for name in group] for group in found.rivals]
+        pairs = "; ".join(f"{first} from {' and '.join(rest)}" for first, *rest in groups)
+        return f"The record does not distinguish {pairs}."
+    if found.verdict == "unexplained" or not found.effects:
+        return ""
+    return f"Probability {min(effect.probability for effect in found.effects):.2f}."
+
+
+def _closes(shrink: Shrink) -> str:
+    most = shrink.widest
+    if most.closed is None or most.low is None or most.high is None:
+        return ""
+    few = "" if most.reliable else ", of too few stretches to rely on"
+    ends = f"{100 * most.low:.0f} to {100 * most.high:.0f} %{few}"
+    return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
+
+
+def _effect(effect: EffectResult) -> str:
+    numbers = ", ".join(change(parameter) for parameter in effect.parameters)
+    return f"{plain(effect.name)}, {numbers}" if numbers else plain(effect.name)
+
+
+def _found(p: ParameterEstimate) -> str:
+    return f"{figure(p.found)} {p.unit}".rstrip()
+
+
+def figure(value: float) -> str:
+    """Return a number of the rig in four figures; small ones as 1.95e-4."""
+    if value == 0.0 or abs(value) >= 1e-3:
+        return f"{value:.4g}"
+    digits, _, power = f"{value:.2e}".partition("e")
+    return f"{digits}e{int(power)}"
+
+
+def change(p: ParameterEstimate) -> str:
+    """Return a parameter as filed → found (change), with its unit."""
+    unit = f" {p.unit}" if p.unit else ""
+    if p.filed is None:
+        return f"none → {figure(p.found)}{unit}"
+    more = p.found - p.filed
+    sign = "+" if more >= 0.0 else ""
+    by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
+    return f"{figure(p.filed)} → {figure(p.found)}{unit} ({by})"

@@ -1,0 +1,291 @@
+"""Where inside a stage the gap lies: what it follows, at which frequency, since when.
+
+The residual of the nominal rig is held against the stage's own signals, each alone: the share of
+its variance that a straight line on that signal takes, and its slope. Its beginning and its end are
+sought by windows at the same excitation (`onset`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import bilinear, welch
+
+from coupled.gap.findings.flexible import free_share
+from coupled.gap.findings.onset import Span, in_time
+from coupled.gap.noise.lines import SeenLine, widest_line
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.output import Output
+from coupled.gap.thresholds import (
+    NEAR_DENSER,
+    NEAR_SHARE,
+    NO_SIGN,
+    WHERE_MOST,
+    WHERE_SHARE,
+    NEAR_s,
+    SPECTRUM_s,
+)
+from coupled.record.channels import ControlName, channel, unit_of
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Follows:
+    """A signal that a residual follows: its share of the power, 0 to 1, and the slope.
+
+    `per_unit` is in the channel's unit per the signal's.
+    """
+
+    signal: str
+    share: float
+    per_unit: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"signal": self.signal, "share": self.share, "per_unit": self.per_unit}
+
+
+@dataclass(frozen=True)
+class PressureBand:
+    """The gap where q̄ lies between two pressures, Pa."""
+
+    from_Pa: float
+    to_Pa: float
+    gap: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"from_Pa": self.from_Pa, "to_Pa": self.to_Pa, "gap": self.gap}
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where in a stage its gap lies, by the channel where it is widest.
+
+    `loud` is the share of time that shows it; `begins` and `ends` None where it may be there all
+    the time, as the excitation lets it; `by_pressure` is empty where q̄ stays; `line` None where no
+    tone stands out of the spectrum.
+    """
+
+    channel: str
+    follows: tuple[Follows, ...]
+    peak_Hz: float
+    loud: float
+    begins: Span | None = None
+    ends: Span | None = None
+    by_pressure: tuple[PressureBand, ...] = ()
+    line: SeenLine | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON; what is not known is left out."""
+        found: dict[str, Any] = {"channel": self.channel}
+        found["follows"] = [item.as_dict() for item in self.follows]
+        found |= {"peak_Hz": self.peak_Hz, "loud": self.loud}
+        for name, span in (("onset", self.begins), ("end", self.ends)):
+            if span is not None:
+                found |= {f"{name}_s": span.at_s, f"{name}_95_s": [span.low_s, span.high_s]}
+        if self.by_pressure:
+            found["by_pressure"] = [band.as_dict() for band in self.by_pressure]
+        if self.line is not None:
+            found["line"] = self.line.as_dict()
+        return found
+
+
+@dataclass(frozen=True)
+class Reversals:
+    """A residual that sits about the reversals of motion: its share within so long of one, s."""
+
+    within_s: float
+    share: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        return {"within_s": self.within_s, "share": self.share}
+
+
+@dataclass(frozen=True)
+class Remains:
+    """What the effects found leave of a stage that they do not explain.
+
+    `free_share` is what a model free in form takes of it on held-out stretches, 0 to 1, as a
+    function of the signal `free_in`, or of `all`.
+    """
+
+    gap: float
+    follows: tuple[Follows, ...]
+    peak_Hz: float
+    free_share: float
+    free_in: str
+    reversals: Reversals | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        near = {} if self.reversals is None else {"reversals": self.reversals.as_dict()}
+        return near | {
+            "gap": self.gap,
+            "follows": [item.as_dict() for item in self.follows],
+            "peak_Hz": self.peak_Hz,
+            "free_share": self.free_share,
+            "free_in": self.free_in,
+        }
+
+
+def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Where:
+    """Return where the gap of an output lies, by the residual that this rig leaves."""
+    left, rate_Hz = output.residual(rig), output.frame_rate_Hz
+    known = signals(output.stage, record, control, rate_Hz)
+    drives = {name: x for name, x in known.items() if not name.endswith(("sign", "3", "time_s"))}
+    times = in_time(left, drives, rate_Hz)
+    pressure = "dynamic_pressure_Pa"
+    varies = pressure in record and np.ptp(record[pressure]) > 0.0
+    return Where(
+        channel=output.channel,
+        follows=_follows(output, left, record, control),
+        peak_Hz=_peak(left, rate_Hz),
+        loud=times.loud,
+        begins=times.begins,
+        ends=times.ends,
+        by_pressure=_by(left, smoothed(record[pressure])) if varies else (),
+        line=widest_line(left, output.floor, rate_Hz),
+    )
+
+
+def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> Remains:
+    """Return what the effects found leave of an output."""
+    left, answers = output.residual(improved), response(output, improved, record, control)
+    known = signals(output.stage, record, control, output.frame_rate_Hz)
+    share, signal = free_share(output, left, known, answers)
+    return Remains(
+        gap=output.gap(improved),
+        follows=_follows(output, left, record, control),
+        peak_Hz=_peak(left, output.frame_rate_Hz),
+        free_share=share,
+        free_in=signal,
+        reversals=_reversals(left, known, output.frame_rate_Hz),
+    )
+
+
+def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Reversals | None:
+    """Return within how long of the reversals most of a residual lies, None where it does not."""
+    side = next((s for name, s in known.items() if name.endswith("rate_sign")), None)
+    if side is None:
+        return None
+    moving = np.flatnonzero(side)
+    turned = np.flatnonzero(np.diff(side[moving]) != 0.0)
+    turns = 0.5 * (moving[turned] + moving[turned + 1])
+    if not turns.size:
+        return None
+    frames = np.arange(len(left))
+    after = np.searchsorted(turns, frames)
+    last, following = turns[np.maximum(after - 1, 0)], turns[np.minimum(after, len(turns) - 1)]
+    away_s = np.minimum(np.abs(frames - last), np.abs(following - frames)) / rate_Hz
+    power = float(left @ left)
+    for within_s in NEAR_s:
+        near = away_s <= within_s
+        share = float(left[near] @ left[near]) / power
+        if share >= NEAR_SHARE and share >= NEAR_DENSER * float(np.mean(near)):
+            return Reversals(within_s, share)
+    return None
+
+
+def response(
+    output: Output, rig: Rig, record: Record, control: ControlName
+) -> tuple[Floats, Floats] | None:
+    """Return the digital filter by which a loader answers to a force, at its mean gradient."""
+    name = channel(control, "gradient")
+    if output.stage != "loader" or name not in record:
+        return None
+    loader = rig.controls[control].loader
+    second = [loader.mass, loader.damping, max(float(np.mean(record[name])), 1.0)]
+    above, below = bilinear([1.0], second, output.frame_rate_Hz)
+    return np.asarray(above), np.asarray(below)
+
+
+def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:
+    """Return the signals that a stage's gap may follow, by name with unit, as far as recorded."""
+    d = unit_of(control)
+    names = {
+        "loader": (("force", "N"), ("computed", d)),
+        "multiplier": (("computed", d), ("gradient", f"N_per_{d}")),
+        "linkage": (("force", "N"), ("computed", d)),
+        "compensation": (("force", "N"), ("computed", d)),
+        "surface": (("estimate", d),),
+    }
+    found: dict[str, Floats] = {}
+    for quantity, unit in names.get(stage, ()):
+        name = channel(control, quantity)
+        if name not in record and quantity == "computed":
+            name = channel(control, "deflection")  # the motion that was imposed
+        if name not in record:
+            continue
+        smooth = smoothed(record[name])
+        found[f"{quantity}_{unit}"] = smooth
+        if quantity in ("computed", "estimate"):
+            rate = rate_of(smooth, rate_Hz)
+            found[f"{quantity}_rate_{unit}_per_s"] = rate
+            found[f"{quantity}_rate_sign"] = _sign(rate)
+            found[f"{quantity}_cubed_{unit}3"] = smooth**3
+            found[f"{quantity}_sign"] = _sign(smooth)
+    common: dict[str, tuple[str, ...]] = {
+        "loader": ("load_factor",),
+        "schedule": ("dynamic_pressure_Pa",),
+        "surface": ("dynamic_pressure_Pa",),
+        "airframe": ("elevator_rad", "pitch_rate_rad_per_s", "alpha_rad"),
+    }
+    for name in common.get(stage, ()):
+        if name in record:
+            found[name] = smoothed(record[name])
+    if stage == "schedule" and "dynamic_pressure_Pa" in found:
+        found["dynamic_pressure_rate_Pa_per_s"] = rate_of(found["dynamic_pressure_Pa"], rate_Hz)
+    found["time_s"] = record.time_s
+    return found
+
+
+def _sign(signal: Floats) -> Floats:
+    """Return the sign of a signal, nothing where it is too small to have one."""
+    return np.where(np.abs(signal) > NO_SIGN * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
+
+
+def _follows(
+    output: Output, left: Floats, record: Record, control: ControlName
+) -> tuple[Follows, ...]:
+    """Return what the residual follows, the largest share first; `constant` is its mean."""
+    power = float(np.mean(left**2))
+    if power == 0.0:
+        return ()
+    mean = float(np.mean(left))
+    found = [Follows("constant", mean**2 / power, mean * output.floor)]
+    spread = left - mean
+    for name, signal in signals(output.stage, record, control, output.frame_rate_Hz).items():
+        moved = signal - signal.mean()
+        size = float(moved @ moved)
+        if size <= 0.0:
+            continue
+        slope = float(spread @ moved) / size
+        share = slope**2 * size / (len(left) * power)
+        found.append(Follows(name, share, slope * output.floor))
+    found.sort(key=lambda item: -item.share)
+    return tuple(item for item in found if item.share >= WHERE_SHARE)[:WHERE_MOST]
+
+
+def _peak(left: Floats, rate_Hz: float) -> float:
+    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(SPECTRUM_s * rate_Hz)))
+    return float(frequency[1:][np.argmax(density[1:])])
+
+
+def _by(left: Floats, pressure: Floats) -> tuple[PressureBand, ...]:
+    """Return the gap in the lower, middle and upper third of the record's q̄."""
+    edges = np.linspace(pressure.min(), pressure.max(), 4)
+    found = []
+    for low, high in pairwise(edges.tolist()):
+        rows = (pressure >= low) & (pressure <= high)
+        if rows.any():
+            found.append(PressureBand(low, high, float(np.sqrt(np.mean(left[rows] ** 2)))))
+    return tuple(found)

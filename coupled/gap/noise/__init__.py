@@ -1,0 +1,1 @@
+"""What of a channel is noise: its level, its colour, its lines."""

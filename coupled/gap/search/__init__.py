@@ -1,0 +1,1 @@
+"""The search: which effects, fitted as physics, the stages' residuals call for."""

@@ -1,0 +1,240 @@
+"""The candidates for what an output shows: screened, fitted beside what is known, and ranked."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import count
+
+import numpy as np
+
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.search.case import Case
+from coupled.gap.search.descent import Descent, leaves_noise
+from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.gain import Candidate, ranked_by_gain
+from coupled.gap.search.information import informative
+from coupled.gap.search.screen import screen
+from coupled.gap.thresholds import (
+    BEHIND_GAIN,
+    BEHIND_SHARE,
+    HARDLY,
+    RACE_BEHIND,
+    RACE_EVALUATIONS,
+    RACE_FLIGHTS,
+)
+from coupled.parallel import in_threads
+
+Starts = list[dict[str, float]]
+Fits = list[tuple[Effect, Fit]]
+
+
+def fitted_candidates(
+    case: Case, current: Fit, library: Sequence[Effect], outputs: set[str]
+) -> list[Candidate]:
+    """Return the effects that show in some outputs, fitted beside the current ones, best first."""
+    # A law of friction with its contact's numbers as its own is one beside which they are settings.
+    same = {effect.yielding for effect in library} if case.contact else set()
+    candidates = [
+        effect
+        for effect in library
+        if effect not in current.effects
+        and effect.name not in same
+        and outputs & set(effect.shows_in)
+    ]
+    screened = screen(case, current, candidates)
+    laws = [one for one in screened if one[0].dry and not one[0].yielding]
+    found = _fitted(case, current, [one for one in screened if one not in laws])
+    found += _fitted(case, current, [(law, _law_starts(case, law, s, found)) for law, s in laws])
+    return informative(case, current, found)
+
+
+def _law_starts(
+    case: Case, law: Effect, starts: Starts, found: Sequence[tuple[Effect, Fit]]
+) -> Starts:
+    """Return where the fit of a law of friction starts, beside those that were fitted.
+
+    With the contact that plain friction was found with; the richer of two laws where the plainer
+    one ended, too, and only there where that one left noise alone.
+    """
+    beside = _contact_of(case, found)
+    from_plainer = _from_plainer(case, law, found)
+    if from_plainer and any(one.yielding and _leaves_noise(case, one, f) for one, f in found):
+        return from_plainer
+    return [*({**beside, **start} for start in starts), *from_plainer]
+
+
+def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, float]:
+    """Return how plain friction yields by its fit, if it was fitted."""
+    return {
+        one.value_key(p): fitted.values[one.value_key(p)]
+        for plain, fitted in found
+        if plain.yielding
+        for one in case.contact
+        for p in one.free
+        if one.value_key(p) in fitted.values
+    }
+
+
+BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
+FLOWN = Descent("wide", RACE_FLIGHTS)
+
+
+def _fitted(
+    case: Case, current: Fit, screened: Sequence[tuple[Effect, Starts]]
+) -> list[tuple[Effect, Fit]]:
+    """Return the effects that fit beside the current ones, each with the best of its fits.
+
+    By the loader's wide steps, and by its own where that may decide.
+    """
+    tries = [(effect, start) for effect, starts in screened for start in starts]
+    begun, many = count(), Counter(effect.name for effect, _ in tries)
+
+    def first(effect: Effect) -> Descent:
+        if STAGE_OF[effect.stage].flown:
+            return FLOWN
+        return BEGUN if many[effect.name] > 1 else WIDE
+
+    def begin(tried: tuple[Effect, dict[str, float]]) -> tuple[Effect, Fit]:
+        effect, start = tried
+        if case.tell is not None:
+            case.tell(f"fitting {effect.name}", next(begun), len(tries))
+        values = {**current.values, **start}
+        return effect, _beside(case, current, effect, values, first(effect))
+
+    def go_on(begun: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
+        effect, fitted = begun
+        if first(effect) is WIDE:
+            return begun
+        return effect, _beside(case, current, effect, fitted.values, WIDE, fitted)
+
+    def finish(near: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
+        effect, fitted = near
+        return effect, _beside(case, current, effect, fitted.values, Descent("own"), fitted)
+
+    racing, given_up = _still_racing(case, in_threads(begin, tries))
+    fits = [*in_threads(go_on, racing), *given_up]
+    found = _possible(case, list(_least(fits).values()))
+    near = _near_the_best(case, current, found)
+    far = [each for each in found if each not in near]
+    return far + _possible(case, in_threads(finish, near))
+
+
+def _beside(
+    case: Case,
+    current: Fit,
+    effect: Effect,
+    values: Mapping[str, float],
+    descent: Descent,
+    near: Fit | None = None,
+) -> Fit:
+    """Return an effect fitted on every other stretch beside the current ones, from these values."""
+    return case.fit((*current.effects, effect), "fitted", values, effect, descent, near)
+
+
+def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
+    """Return the best of each effect's fits, by its name."""
+    best: dict[str, tuple[Effect, Fit]] = {}
+    for each in fits:
+        name = each[0].name
+        if name not in best or each[1].cost < best[name][1].cost:
+            best[name] = each
+    return best
+
+
+def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits, Fits]:
+    """Return the fits of each effect that are not far behind its best one, and the effects left.
+
+    Where that leaves noise alone, its others are given up. Of effects that have to be flown, one
+    is left as it is where another leaves noise alone of the same outputs, and it is far behind.
+    """
+    best = _least(begun)
+    noise = {name for name, one in best.items() if _leaves_noise(case, *one)}
+    least = {
+        best[name][0].shows_in: best[name][1].cost
+        for name in sorted(noise, key=lambda name: -best[name][1].cost)
+    }
+    left = {
+        name
+        for name, (effect, fitted) in best.items()
+        if STAGE_OF[effect.stage].flown
+        and fitted.cost > RACE_BEHIND * least.get(effect.shows_in, np.inf)
+    }
+    racing = [
+        (effect, fitted)
+        for effect, fitted in begun
+        if effect.name not in left
+        and fitted.cost
+        <= (1.0 if effect.name in noise else RACE_BEHIND) * best[effect.name][1].cost
+    ]
+    return racing, [best[name] for name in best if name in left]
+
+
+def _leaves_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect, as fitted, leaves noise alone of the outputs that it shows in."""
+    ours = touched(case.outputs, [effect])
+    squares = [0.5 * float(np.sum(o.residual(fitted.rig, "fitted", wide=True) ** 2)) for o in ours]
+    return leaves_noise(sum(squares), sum(int(o.rows("fitted").sum()) for o in ours))
+
+
+def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
+    """Return the effects fitted that are away from their bounds, and beyond their settings."""
+    return [
+        (effect, fitted)
+        for effect, fitted in found
+        if not any(effect.value_key(p) in fitted.at_bound for p in effect.free)
+        and not _within_tolerance(case, effect, fitted)
+    ]
+
+
+def _near_the_best(
+    case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]
+) -> list[tuple[Effect, Fit]]:
+    """Return those whose gain may still be the best's, or its rival's."""
+    ranked = ranked_by_gain(case.outputs, current, found)
+    most = max((one.gain for one in ranked), default=0.0)
+    least = most - max(BEHIND_GAIN, BEHIND_SHARE * most)
+    near = {one.effect.name for one in ranked if one.gain >= least}
+    return [each for each in found if each[0].name in near]
+
+
+def _from_plainer(
+    case: Case, effect: Effect, found: Sequence[tuple[Effect, Fit]]
+) -> list[dict[str, float]]:
+    """Return where a richer law's fit starts by what its plainer one was fitted to, if it was."""
+    if effect.alike is None:
+        return []
+    starts = []
+    for plain, fitted in found:
+        if plain.name == effect.alike.plainer:
+            alike = {**fitted.values, **imitating(case, effect, plain, fitted)}
+            starts += [alike, {**alike, **_hardly_richer(case, effect, fitted)}]
+    return starts
+
+
+def _hardly_richer(case: Case, effect: Effect, fitted: Fit) -> dict[str, float]:
+    """Return the numbers of a richer law that stand above another, hardly above it."""
+    return {
+        effect.value_key(p): HARDLY * float(value_of(fitted.rig, case.control, p.above))
+        for p in effect.free
+        if p.above
+    }
+
+
+def imitating(case: Case, richer: Effect, plain: Effect, fitted: Fit) -> dict[str, float]:
+    """Return the values by which a richer law is nearly the plainer one that was fitted."""
+    assert richer.alike is not None
+    known = {p.name: fitted.values[plain.value_key(p)] for p in plain.free}
+    base = float(value_of(case.nominal, case.control, richer.alike.base))
+    values = richer.alike.values(known, base)
+    return {richer.value_key(p): values[p.name] for p in richer.free}
+
+
+def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether a nominal number moved by no more than its setting can be trusted to."""
+    ends = case.ends(effect)
+    if ends is None:
+        return False
+    (number,) = effect.free
+    return ends[0] < fitted.values[effect.value_key(number)] < ends[1]

@@ -1,0 +1,203 @@
+"""What the search for effects works on: a rig, its outputs, and fits with the settings free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.settings import contact, is_dry, settings
+from coupled.gap.search.contact import contact_start
+from coupled.gap.search.course import Bounds
+from coupled.gap.search.descent import WHOLE, Descent
+from coupled.gap.search.fit import Fit, fit, touched
+from coupled.gap.search.timed import Timing, timed
+from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
+from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+
+Tell = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the search works on: a nominal rig, and the outputs of its records.
+
+    `refloored` gives the outputs with the floors of another rig; `timings` are of the effects that
+    begin within the record, and of all that free the same numbers, with the onsets as seen.
+    """
+
+    nominal: Rig
+    control: ControlName
+    outputs: Sequence[Output]
+    tell: Tell | None = None
+    refloored: Callable[[Rig], Sequence[Output]] | None = None
+    # A model with an error of its own strains its settings: only a stage over its limit is guilty.
+    only_wide: bool = False
+    timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
+    # Its fits: a case of other outputs, made by `replace`, begins with none.
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @cached_property
+    def known(self) -> dict[str, Effect]:
+        """The nominal rig's settings, by the effects that free the same numbers."""
+        return settings(self.nominal, self.control)
+
+    @cached_property
+    def settings(self) -> dict[str, Effect]:
+        """The settings that the outputs depend on, by name: nuisances of every fit."""
+        return {name: one for name, one in self.known.items() if self._unsettled & {*one.shows_in}}
+
+    @cached_property
+    def contact(self) -> tuple[Effect, ...]:
+        """How far dry friction yields: nuisances beside any."""
+        return contact(self.nominal, self.control)
+
+    @cached_property
+    def _unsettled(self) -> set[str]:
+        """The outputs whose residual is large enough to settle anything by."""
+        return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
+
+    @cached_property
+    def neutral(self) -> dict[str, float]:
+        """The settings as the rig file has them."""
+        every = (*self.known.values(), *self.contact)
+        return {one.value_key(p): p.starts[0] for one in every for p in one.free}
+
+    def ends(self, effect: Effect) -> tuple[float, float] | None:
+        """Return between which values an effect's number is a setting; None where it is none."""
+        setting = self.known.get(effect.name)
+        return None if setting is None else (setting.free[0].low, setting.free[0].high)
+
+    def gaps(self, rig: Rig) -> dict[str, float]:
+        """Return each stage's gap, by the floors of this rig where they are higher.
+
+        As where a contact that yields lets noise pass that the filed friction would hold.
+        """
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
+        if self.refloored is None or rig == self.nominal or narrow:
+            return gaps
+        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        found: dict[str, float] = {}
+        for one in self.outputs:
+            new = made.get((one.record, one.channel), one)
+            floor = max(
+                one.floor, hypot(min(one.own, new.own), new.carried) if new.carried else new.floor
+            )
+            gap = one.gap(rig) * one.floor / floor
+            found[one.stage] = max(found.get(one.stage, 0.0), gap)
+        return found
+
+    def heard_anew(self, rig: Rig) -> Case | None:
+        """Return the case with the noise that a rig's residuals have; None where none is lower.
+
+        Noise is the same whatever the rig, and a gap adds to it what passes for coloured noise:
+        the least that any rig leaves is the nearest.
+        """
+        if self.refloored is None:
+            return None
+        made = {(one.record, one.channel): one for one in self.refloored(rig)}
+        anew = [made.get((one.record, one.channel), one) for one in self.outputs]
+        pairs = list(zip(self.outputs, anew, strict=True))
+        if not any(new.own < HEARD_ANEW * old.own for old, new in pairs):
+            return None
+        outputs = [
+            replace(old, floor=new.floor, spread=new.spread, smoothed=new.smoothed, _known=[])
+            if new.own < HEARD_ANEW * old.own
+            else old
+            for old, new in pairs
+        ]
+        return replace(self, outputs=outputs)
+
+    def timed(self, effect: Effect, timing: Timing, seen: Bounds) -> Case:
+        """Return the case with outputs in which an effect's size goes with time."""
+
+        def ours(outputs: Sequence[Output]) -> list[Output]:
+            given = (self.nominal, self.control, effect, timing)
+            return [timed(o, *given) if o.stage in effect.shows_in else o for o in outputs]
+
+        before = self.refloored
+        return replace(
+            self,
+            outputs=ours(self.outputs),
+            refloored=None if before is None else lambda rig: ours(before(rig)),
+            timings=(*self.timings, (effect, timing, seen)),
+        )
+
+    def timing(self, effect: Effect) -> tuple[Timing, Bounds] | None:
+        """Return the timing of an effect that begins within the record; None of any other."""
+        keys = {p.key for p in effect.parameters}
+        each = (
+            (timing, seen, {p.key for p in one.parameters}) for one, timing, seen in self.timings
+        )
+        return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
+
+    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the settings whose number none of these effects frees, nor is the same law as.
+
+        Where friction is filed, or among the effects, how far its contact yields is one.
+        """
+        freed = {p.key for effect in effects for p in effect.parameters}
+        same = {name for effect in effects for name in effect.swallows}
+        free = [one for name, one in self.settings.items() if name not in same]
+        if any(effect.dry for effect in effects) or is_dry(self.nominal, self.control):
+            free += [one for one in self.contact if self._unsettled & {*one.shows_in}]
+        return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
+
+    def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
+        """Return the rig with some of the effects that a fit found, and its settings."""
+        every = (*effects, *self.nuisances(found.effects))
+        rig = possible(self.nominal, self.control, every, {**self.neutral, **found.values})
+        return self.nominal if rig is None else rig
+
+    def fit(
+        self,
+        effects: Sequence[Effect],
+        part: Part = "all",
+        start: Mapping[str, float] | None = None,
+        only: Effect | None = None,
+        descent: Descent = WHOLE,
+        near: Fit | None = None,
+    ) -> Fit:
+        """Return the effects fitted, with the settings free within their tolerance.
+
+        With `only`, just that one and what shares an output with it; the others stay. `near` is a
+        fit of this case that ended at the start.
+        """
+        free = self.nuisances(effects)
+        start = self._with_contact(effects, free, start or {})
+        given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
+        known = {} if near is None else near.slopes
+        return fit(*given, replace(descent, known=self._known, slopes=known))
+
+    def _with_contact(
+        self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Return where a fit starts, with the contact that leaves least where none is known."""
+        known = dict(start)
+        if not self.contact or self.contact[0] not in free:
+            return known
+        numbers = [one.free[0] for one in self.contact]
+        keys = [one.value_key(one.free[0]) for one in self.contact]
+        if keys[0] in known:
+            return known
+        begun = {effect.value_key(p): p.starts[0] for effect in effects for p in effect.free}
+        ours = touched(self.outputs, self.contact)
+
+        def left(*contact: float) -> float:
+            values = {**self.neutral, **begun, **start, **dict(zip(keys, contact, strict=True))}
+            rig = possible(self.nominal, self.control, [*effects, *free], values)
+            if rig is None:
+                return np.inf
+            each = [output.residual(rig, wide=True) for output in ours]
+            return sum(float(np.mean(one**2)) for one in each)
+
+        found = contact_start(left, *(number.high for number in numbers))
+        return known | dict(zip(keys, found, strict=True))

@@ -1,0 +1,296 @@
+"""Choosing effects: each has to earn its place on stretches of the record not used to fit it.
+
+Guilty stages are those whose residual stands clear of its floor. Their candidates are
+screened by the projection of the residual on each effect's own signature, the best fitted
+as physics on every other stretch, and judged on the stretches between. The gain is a
+log-likelihood ratio by effective samples, the frames divided by the residual's memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, apply, possible
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.candidates import fitted_candidates, imitating
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate, ranked_by_gain
+from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.search.twolaws import even_reading, plain_reading, yielding_reading
+from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
+from coupled.gap.thresholds import (
+    FAINT_GAP,
+    LAW_GAIN,
+    LEAST_GAIN,
+    MOST_EFFECTS,
+    NEEDLESS_GAIN,
+    RIVAL_GAIN,
+    SIMPLER_GAIN,
+    SIMPLER_SHARE,
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """One effect found: its gain, and the others that the record does not distinguish from it."""
+
+    effect: Effect
+    gain: float
+    probability: float
+    rivals: tuple[Candidate, ...]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the search found: its steps, and the final fit on all of the record.
+
+    `settled` has the nominal rig's settings moved within their tolerance, and no effect. A search
+    that `circled` was ended where it came back to effects that it had stood at before.
+    """
+
+    steps: tuple[Found, ...]
+    fit: Fit
+    settled: Fit
+    tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
+    rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
+    circled: bool = False
+
+
+def searched(case: Case, library: Sequence[Effect]) -> Choice:
+    """Return the effects of a library that explain a case's gap, each earning its place in turn."""
+    settled = current = case.fit(())
+    steps: list[Found] = []
+    rounds: list[dict[str, float]] = []
+    idle: set[str] = set()  # guilty outputs for which nothing was found
+    stood: list[set[str]] = [set()]  # the sets of effects that the search has stood at
+    circled = False
+    while len(steps) < MOST_EFFECTS:
+        ranked = _round(case, settled, current, library, idle)
+        rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
+        if not ranked or ranked[0].gain < LEAST_GAIN:
+            break
+        best = _simplest(case, settled, ranked)
+        steps.append(_step(case, settled, best, ranked))
+        found = best.fit
+        current = case.fit((*current.effects, best.effect), start=found.values, near=found)
+        idle -= set(best.effect.shows_in)
+        even = even_reading(current.effects, current.values)
+        if even is not None:
+            current = case.fit(even[0], start=even[1])
+            pair = current.effects[-2:]
+            steps[-1:] = [replace(steps[-1], effect=effect, rivals=()) for effect in pair]
+            continue
+        needless = _needless(case, current)
+        if needless is not None:
+            steps = [step for step in steps if step.effect is not needless]
+            rest = tuple(effect for effect in current.effects if effect is not needless)
+            current = case.fit(rest, start=current.values)
+            if needless is best.effect:
+                break
+            # Effects that displace one another would be found and dropped without end.
+            now = {step.effect.name for step in steps}
+            circled = now in stood
+            if circled:
+                break
+        stood.append({step.effect.name for step in steps})
+    yields = yielding_reading(case, current)
+    if yields is not None:
+        plain, law, start = yields
+        steps = [replace(one, effect=law) if one.effect is plain else one for one in steps]
+        current = case.fit([one.effect for one in steps], start=start)
+    empty = [step for step in steps if says_nothing(case, step.effect, current)]
+    if empty:
+        steps = [step for step in steps if step not in empty]
+        current = case.fit([step.effect for step in steps], start=current.values)
+    if len(steps) > 1:
+        steps = [_again(case, settled, current, step) for step in steps]
+    tried = next((gains for gains in rounds if gains), {})
+    return Choice(tuple(steps), current, settled, tried, tuple(rounds), circled)
+
+
+def _again(case: Case, settled: Fit, current: Fit, step: Found) -> Found:
+    """Return a step whose rivals are tried again, now that the other effects are known."""
+    if not step.rivals:
+        return step
+    rest = tuple(effect for effect in current.effects if effect is not step.effect)
+    without = case.fit(rest, "fitted", current.values)
+    tries = [step.effect, *(rival.effect for rival in step.rivals)]
+    found = [
+        (effect, case.fit((*rest, effect), "fitted", current.values))
+        for effect in tries
+        if effect not in rest
+    ]
+    ranked = ranked_by_gain(case.outputs, without, found)
+    own = next(candidate for candidate in ranked if candidate.effect is step.effect)
+    return _step(case, settled, own, ranked)
+
+
+def _needless(case: Case, current: Fit) -> Effect | None:
+    """Return the effect found earlier that those found since have made needless, if any."""
+    if len(current.effects) < 2:
+        return None
+    whole = case.fit(current.effects, "fitted", current.values, near=current)
+    least: tuple[float, Effect] | None = None
+    for effect in current.effects[:-1]:
+        rest = tuple(other for other in current.effects if other is not effect)
+        without = case.fit(rest, "fitted", current.values)
+        missed = ranked_by_gain(case.outputs, without, [(effect, whole)])[0].gain
+        if missed < NEEDLESS_GAIN and (least is None or missed < least[0]):
+            least = (missed, effect)
+    return None if least is None else least[1]
+
+
+def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]) -> Found:
+    """Return a found effect with its rivals; what holds it as a special case is none.
+
+    Unless the gap is faint: there one law of dry friction passes for another.
+    """
+    others = [
+        other
+        for other in ranked
+        if other is not best and len(other.effect.free) <= len(best.effect.free)
+    ]
+    rivals = [other for other in others if other.gain > best.gain - RIVAL_GAIN]
+    gaps = stage_gaps(case.outputs, settled.rig)
+    family = _family(best.effect)
+    if family and all(gaps.get(at, 0.0) < FAINT_GAP for at in best.effect.shows_in):
+        rivals = [other for other in rivals if other.effect not in family]
+        rivals += _other_laws(case, best, ranked)
+    weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
+    return Found(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
+
+
+def _family(effect: Effect) -> tuple[Effect, ...]:
+    """Return an effect with those that pass for it, or for which it passes, in a faint gap."""
+    found: list[Effect] = []
+    for richer in EFFECTS:
+        if richer.alike is not None and effect.name in (richer.name, richer.alike.plainer):
+            found += [BY_NAME[richer.alike.plainer], richer]
+    return tuple(dict.fromkeys(found))
+
+
+def _other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
+    """Return the effects that a faint gap does not distinguish from the best.
+
+    The richer of two laws excludes the plainer by its gain; the plainer never excludes the
+    richer, which may pass for it.
+    """
+    if best.effect.alike is not None:
+        plainer = best.effect.alike.plainer
+        return [
+            one for one in ranked if one.effect.name == plainer and one.gain > best.gain - LAW_GAIN
+        ]
+    found = []
+    for richer in _family(best.effect):
+        if richer.alike is None:
+            continue
+        values = {**best.fit.values, **imitating(case, richer, best.effect, best.fit)}
+        effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
+        rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
+        fitted = replace(best.fit, effects=effects, values=values, rig=rig)
+        found.append(Candidate(best.gain, richer, fitted))
+    return found
+
+
+def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
+    """Return the best candidate, or one with fewer numbers that is as good.
+
+    Where the one with fewer closes a gap of the loader, the other must beat it by more than the
+    physics of a right effect may leave: no law of dry friction is exact. And the richer of two laws
+    must say by its own interval that it is not the plainer one: its other numbers, and the contact
+    beside it, also take up what noise has moved of a contact that yields.
+    """
+    best = ranked[0]
+    first, limits = stage_gaps(case.outputs, settled.rig), stage_limits(case.outputs)
+    for other in ranked[1:]:
+        if len(other.effect.free) >= len(best.effect.free):
+            continue
+        left = stage_gaps(case.outputs, other.fit.rig)
+        closes = all(
+            left[stage] <= explained_below(first[stage], limits[stage])
+            for stage in other.effect.shows_in
+            if stage in left
+        )
+        doubtful = closes and best.effect.stage == "loader"
+        if doubtful and may_be_plainer(case, best.effect, best.fit, other.effect):
+            best = other
+            continue
+        share = SIMPLER_SHARE * ranked[0].gain
+        margin = max(SIMPLER_GAIN, share) if doubtful else RIVAL_GAIN
+        if other.gain > ranked[0].gain - margin:
+            best = other
+    return plain_reading(best, ranked)
+
+
+def _round(
+    case: Case, settled: Fit, current: Fit, library: Sequence[Effect], idle: set[str]
+) -> list[Candidate]:
+    """Return the candidates of one guilty output by their held-out gain, best first.
+
+    Outputs are taken by their gap, each for itself: what explains one has no say in what is tried
+    for another. One where nothing gains is `idle`, and not tried again until it changes.
+    """
+    first = case.gaps(settled.rig)
+    now = case.gaps(current.rig)
+    limits = stage_limits(case.outputs)
+    wide = {at for at, gap in now.items() if gap > explained_below(first[at], limits[at])}
+    tried: list[Candidate] = []
+    for output in sorted(wide - idle, key=lambda at: -now[at]):
+        ranked = fitted_candidates(case, current, library, {output})
+        tried = tried or ranked
+        if ranked and ranked[0].gain >= LEAST_GAIN:
+            return ranked
+        idle.add(output)
+    marked = _marked(case, current, library)
+    if wide or marked:
+        return marked or tried
+    ranked = fitted_candidates(case, current, library, _strained(case, current))
+    return ranked if _surely_beyond(case, ranked) else []
+
+
+def _marked(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
+    """Return the candidate that an output shows by its mark, though it is within its limit.
+
+    Its gain is what that output says alone: there the mark is known, and has no number to fit.
+    """
+    for effect in library:
+        ours = [output for output in case.outputs if output.stage == effect.mark]
+        if not ours or effect in current.effects:
+            continue
+        effects = (*current.effects, effect)
+        beside = (*effects, *case.nuisances(effects))
+        rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
+        shown = [] if rig is None else [(effect, replace(current, rig=rig))]
+        if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
+            fitted = [(effect, case.fit(effects, "fitted", current.values, effect))]
+            return ranked_by_gain(ours, current, fitted)
+    return []
+
+
+def _strained(case: Case, current: Fit) -> set[str]:
+    """Return the stages of which a setting stands at the end of its tolerance.
+
+    It may then keep a stage within its limit that is off by more.
+    """
+    known = {} if case.only_wide else case.known
+    ends = [one for one in known.values() for p in one.free if one.value_key(p) in current.at_bound]
+    return {stage for one in ends for stage in one.shows_in}
+
+
+def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:
+    """Tell whether the best candidate is a number off by more than its setting, and nothing else.
+
+    In a stage within its limit no other effect is claimed.
+    """
+    ends = case.ends(ranked[0].effect) if ranked else None
+    if ends is None:
+        return False
+    best = ranked[0]
+    (number,) = best.effect.free
+    key = best.effect.value_key(number)
+    beyond = best.fit.low[key] > ends[1] or best.fit.high[key] < ends[0]
+    return beyond and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])

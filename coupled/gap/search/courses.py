@@ -1,0 +1,86 @@
+"""The course of each effect found, by what its records hold of its action."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.search.case import Case
+from coupled.gap.search.course import Bounds, Course, course_of, course_of_events
+from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.timed import timing_of
+from coupled.gap.signals.output import Floats
+from coupled.gap.thresholds import BEGUN, COURSE_WINDOW_s
+from coupled.record.record import Record
+
+Parts = list[tuple[Floats, Floats]]  # of each output, what the effect does, and what is left
+
+
+def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> Course | None:
+    """Return the course of an effect in the record that holds most of its action.
+
+    None of an effect without a number, of one of several records whose course is the same all the
+    time, and of a limit, whose action does not go with its size.
+    """
+    if not effect.free:
+        return None
+    parts = _parts(effect, case, found)
+    if not parts:
+        return None
+    most = max(parts, key=lambda k: sum(float(action @ action) for action, _ in parts[k]))
+    record, rate_Hz = records[most], case.nominal.frame_rate
+    if effect.events is not None:
+        at_s = effect.events(record)
+        return course_of_events(at_s, len(record) / rate_Hz) if at_s.size else None
+    if effect.free[0].inverse:
+        return None
+    value = _size(effect, case, found)
+    begun = case.timing(effect)
+    if begun is not None:
+        return begun[0].course(begun[1], len(record) / rate_Hz, value)
+    return course_of(parts[most], rate_Hz, value, effect.gradual)
+
+
+def in_time(effect: Effect, case: Case) -> Case | None:
+    """Return the case with an effect that begins within the one record, at once or straight.
+
+    None where it was there from the first, or has no size. The effect is fitted alone: others may
+    only have taken up what its course leaves.
+    """
+    number = effect.free[0] if effect.free else None
+    sized = number is not None and not number.inverse and not effect.gradual
+    if not sized or effect.events is not None or case.timing(effect) is not None:
+        return None
+    alone = case.fit((effect,))
+    parts = _parts(effect, case, alone)
+    if len(parts) != 1:
+        return None
+    ((_, ours),) = parts.items()
+    rate_Hz = case.nominal.frame_rate
+    seen = course_of(ours, rate_Hz, _size(effect, case, alone), effect.gradual)
+    # What changes from the first may be anything that drifts: it is said, and no cause.
+    if seen.onset_s is None or seen.onset_s.low < BEGUN * COURSE_WINDOW_s:
+        return None
+    anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
+    # By what it does at its true size: friction and play do not go straight with theirs.
+    ((_, ours),) = _parts(effect, case, anew.fit((effect,))).items()
+    return case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
+
+
+def _parts(effect: Effect, case: Case, found: Fit) -> dict[int, Parts]:
+    """Return {record: what an effect does there in each output, and what is left}, in floors."""
+    without = case.with_only(found, [other for other in found.effects if other is not effect])
+    parts: dict[int, Parts] = {}
+    for output in touched(case.outputs, [effect]):
+        left = output.residual(found.rig)
+        action = output.residual(without) - left
+        parts.setdefault(output.record, []).append((action, left))
+    return parts
+
+
+def _size(effect: Effect, case: Case, found: Fit) -> Bounds:
+    """Return an effect's first number, less what does nothing."""
+    first = effect.free[0]
+    key, nothing = effect.value_key(first), first.neutral(case.nominal, case.control)
+    each = (bound.get(key, np.nan) for bound in (found.values, found.low, found.high))
+    return Bounds(*(float(bound - nothing) for bound in each))

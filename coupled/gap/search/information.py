@@ -1,0 +1,79 @@
+"""Whether a record says anything of an effect: none is named by an interval that holds nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.effects.library import EFFECTS
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate, ranked_by_gain
+from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
+
+ORDER = [effect.name for effect in EFFECTS]
+
+
+def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -> list[Candidate]:
+    """Return the candidates whose intervals say something, by their gain.
+
+    Half of a record has few stretches for its intervals to go by: one that says nothing there, but
+    foretells the other half far better than any that does, is asked on all of it. Where none gains,
+    one of a single number may, whose interval is as wide as what the others leave: the whole record
+    judges it in the end.
+    """
+    open_ones = [one for one in found if says_nothing(case, *one)]
+    clear = [one for one in found if one not in open_ones]
+    ranked = ranked_by_gain(case.outputs, current, clear)
+    asked = _clear_on_all(case, current, ranked, open_ones)
+    if asked:
+        ranked = ranked_by_gain(case.outputs, current, [*clear, *asked])
+    if ranked and ranked[0].gain >= LEAST_GAIN:
+        return ranked
+    single = [one for one in open_ones if len(one[0].free) == 1]
+    others = ranked_by_gain(case.outputs, current, single) if single else ranked
+    # Two that are one law differ by rounding alone: the library's order settles it.
+    return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
+
+
+def _clear_on_all(
+    case: Case, current: Fit, clear: Sequence[Candidate], open_ones: Sequence[tuple[Effect, Fit]]
+) -> list[tuple[Effect, Fit]]:
+    """Return those of the open ones that gain far more, and say something on all of the record."""
+    least = max([LEAST_GAIN, *(one.gain for one in clear)]) + RIVAL_GAIN
+    better = [one for one in ranked_by_gain(case.outputs, current, open_ones) if one.gain > least]
+    return [
+        (one.effect, one.fit)
+        for one in better
+        if not says_nothing(case, one.effect, case.fit(one.fit.effects, start=one.fit.values))
+    ]
+
+
+def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect's interval holds the size at which it does nothing.
+
+    By its first number, the level; the others shape it. Of a limit, none is no size. A number that
+    counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed.
+    """
+    level = next((p for p in effect.free if not p.above), None)
+    if level is None or level.inverse:
+        return False
+    key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
+    if key not in fitted.low:
+        return False
+    return fitted.low[key] <= nothing <= fitted.high[key]
+
+
+def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
+    """Tell whether the interval of the richer of two laws holds the plainer one.
+
+    There its number stands above another of the rig by nothing: a breakaway no larger than the
+    running friction.
+    """
+    if richer.alike is None or richer.alike.plainer != plainer.name:
+        return False
+    return any(
+        fitted.low[richer.value_key(p)] <= value_of(fitted.rig, case.control, p.above)
+        for p in richer.free
+        if p.above
+    )

@@ -1,0 +1,94 @@
+"""What is taken for a channel's noise: by its spectrum, or where that does not say, the file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.quiet import noise_of_input, quiet_noise
+from coupled.gap.noise.smooth import Smoother
+from coupled.gap.signals.output import heard, rounding
+from coupled.gap.thresholds import LEAST_NOISE, LOUDER
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
+    """Return the noise of a channel; of one that was filtered, no less than `given_noise`."""
+    found = heard(signal)
+    if not found.filtered:
+        return found
+    return replace(found, rms=max(found.rms, given_noise(rig, channel, signal).rms))
+
+
+def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
+    """Return what the rig file says of a channel's noise; else the least that a sensor has."""
+    known = rig.noise.get(channel, 0.0)
+    least = LEAST_NOISE * float(np.sqrt(np.mean(signal**2)))
+    return Noise(known or max(least, rounding(signal, np.inf)))
+
+
+def input_noise(heard_: Noise, signal: Floats) -> Noise:
+    """Return the noise of a channel that drives its stage; no less than its rounding."""
+    found = None if heard_.filtered else noise_of_input(signal)
+    return heard_ if found is None else _no_less(found, signal)
+
+
+def left_noise(
+    heard_: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
+) -> Noise:
+    """Return a channel's noise by what its stage leaves of it; no less than its rounding.
+
+    `heard_` is what the signal alone says: it stays for a filtered log, and for a short one, and
+    where the rest is far louder: a signal that jumps elsewhere than predicted is a gap.
+    Frames that are not `judged` have nothing left, and would be heard as silence: the noise is that
+    of the others, and its rms that over all frames. Where none is judged, `heard_` stays.
+    """
+    rows = np.ones(len(left), dtype=bool) if judged is None else judged
+    found = None if heard_.filtered else quiet_noise(left[rows])
+    if found is not None and found.rms <= LOUDER * heard_.rms:
+        heard_ = _no_less(found, signal)
+    share = float(np.mean(rows)) or 1.0
+    return replace(heard_, rms=heard_.rms * math.sqrt(share))
+
+
+def without_echo(left: Floats, echo: Floats | None) -> Floats:
+    """Return what a stage leaves without what repeats another channel's noise, same shape.
+
+    A product that a host makes of δc as read repeats the noise of that reading: that says how it is
+    made, and to take it for the channel's own noise would hide it.
+    """
+    power = 0.0 if echo is None else float(echo @ echo)
+    return left if echo is None or power == 0.0 else left - float(left @ echo) / power * echo
+
+
+def _no_less(found: Noise, signal: Floats) -> Noise:
+    """Return a noise that is no less than a signal's rounding."""
+    rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    return replace(found, rms=max(found.rms, rounding(signal, rough)))
+
+
+def with_error(signal: Floats, k: int, level: Noise) -> Floats:
+    """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
+    rng = np.random.default_rng([41, k])
+    raw = signal + level.sample(len(signal), rng)
+    return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
+
+
+def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
+    """Return a signal that is taken as recorded, with as much noise again."""
+    return signal + level.sample(len(signal), np.random.default_rng([41, k]))
+
+
+def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
+    """Return where the floor of a channel comes from whose log was filtered."""
+    if heard(signal).rms > given_noise(rig, channel, signal).rms:
+        return "what is left at its highest frequencies"
+    if rig.noise.get(channel, 0.0) > 0.0:
+        return "the rig file"
+    return f"1/{1.0 / LEAST_NOISE:g} of the signal, since the rig file says nothing of it"

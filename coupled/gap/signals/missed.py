@@ -1,0 +1,131 @@
+"""Frames that the host missed, as a record shows them: all that it puts out repeats.
+
+A host that misses a frame holds δ̂ and G_T. They repeat by chance as well, as coarsely as they are
+written; so a repeat counts where G_T never repeats otherwise, or where δ̂ is not what the host's own
+arithmetic, δc + ΣK̂·F fitted to the frames that do not repeat, would have made of the frame.
+
+Which frames a host misses is chance. In a replay each frame has its number in 0 to 1, and is
+missed where that is under the rig's share, as in a flight (`rig/compensation`): numbers that give
+the record's own missed frames at the record's own share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.signals.output import Floats, Output
+from coupled.gap.thresholds import CHANCE_STEP, HELD_OFF, REPEATS_ELSE
+from coupled.record.channels import CONTROL_NAMES, ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Which frames of a record its host missed, shape (frames,), and what would be missed."""
+
+    seen: Mask
+
+    @property
+    def share(self) -> float:
+        """The share of the frames that was missed."""
+        return float(np.mean(self.seen))
+
+    def under(self, rig: Rig, control: ControlName) -> Mask | None:
+        """Return the frames that a rig's host misses; None where it misses none."""
+        share = rig.controls[control].compensation.missed_share
+        return None if share == 0.0 else self._chances() < share
+
+    def _chances(self) -> Floats:
+        """Return each frame's number: the record's missed ones have the lowest, evenly spread."""
+        rng, frames = np.random.default_rng(17), len(self.seen)
+        missed = rng.permutation(np.flatnonzero(self.seen))
+        others = rng.permutation(np.flatnonzero(~self.seen[1:]) + 1)
+        chances = np.ones(frames)  # the first frame is never missed
+        chances[np.concatenate((missed, others))] = (np.arange(frames - 1) + 0.5) / frames
+        return chances
+
+
+def missed_in(record: Record) -> Missed:
+    """Return the frames that a record's host missed, by all of its controls."""
+    estimates = _channels(record, "estimate")
+    gradients = _channels(record, "gradient")
+    frames = len(record)
+    both = np.ones(frames, dtype=bool)
+    for name in (*estimates, *gradients):
+        both &= _repeats(record[name])
+    if not (estimates or gradients) or not both.any():
+        return Missed(np.zeros(frames, dtype=bool))
+    lively = [name for name in gradients if _lively(record[name], both)]
+    if estimates and not lively:
+        both &= _off_arithmetic(record, both)
+    elif not lively:
+        both[:] = False
+    return Missed(both)
+
+
+def shares_missed(
+    outputs: Sequence[Output], rig: Rig, control: ControlName
+) -> list[dict[str, float]]:
+    """Return the share of frames missed in the records of these outputs, where any was."""
+    by_record = {output.record: output.missed for output in outputs if output.missed is not None}
+    seen = np.concatenate([*by_record.values(), np.zeros(0, dtype=bool)])
+    return [{"share": float(np.mean(seen))}] if seen.any() else []
+
+
+def times_missed(record: Record) -> Floats:
+    """Return when the frames were missed, in s from the record's start."""
+    return np.asarray((record.time_s - record.time_s[0])[missed_in(record).seen])
+
+
+def spread_of_missed(record: Record, frame_s: float) -> float:
+    """Return the relative standard error of the share, from how few frames were missed.
+
+    Of n frames missed at chance, √((1 − share)/n).
+    """
+    missed = missed_in(record)
+    count = int(np.sum(missed.seen))
+    return math.sqrt((1.0 - missed.share) / count) if count else 0.0
+
+
+def _channels(record: Record, quantity: str) -> list[str]:
+    names = [channel(control, quantity) for control in CONTROL_NAMES]
+    return [name for name in names if name in record]
+
+
+def _repeats(signal: Floats) -> Mask:
+    """Return which frames repeat the one before."""
+    return np.concatenate(([False], np.diff(signal) == 0.0))
+
+
+def _lively(gradient: Floats, both: Mask) -> bool:
+    """Tell whether a gradient repeats in missed frames alone, moving by far more than its step."""
+    moves = np.abs(np.diff(gradient))
+    moves = moves[moves > 0.0]
+    if not moves.size or moves.min() > CHANCE_STEP * np.median(moves):
+        return False
+    return int(np.sum(_repeats(gradient))) <= REPEATS_ELSE * int(np.sum(both)) + 1
+
+
+def _off_arithmetic(record: Record, both: Mask) -> Mask:
+    """Return where a control's δ̂ is not what the host's arithmetic makes of the frame."""
+    off = np.zeros(len(record), dtype=bool)
+    forces = [record[name] for name in _channels(record, "force")]
+    for control in CONTROL_NAMES:
+        computed, estimate = (channel(control, q) for q in ("computed", "estimate"))
+        if computed not in record or estimate not in record:
+            continue
+        bent = record[estimate] - record[computed]
+        columns = np.column_stack((np.ones(len(record)), *forces))
+        fresh = ~both
+        left = bent - columns @ np.linalg.lstsq(columns[fresh], bent[fresh], rcond=None)[0]
+        usual = float(np.median(np.abs(left[fresh])))
+        off |= np.abs(left) > HELD_OFF * max(usual, 1e-12)
+    return off

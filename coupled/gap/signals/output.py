@@ -1,0 +1,285 @@
+"""One measured output of a stage, against what a rig makes of the stage's measured input."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.signals.steps import widely_stepped
+from coupled.gap.thresholds import (
+    ECHO_FRAMES,
+    FELT_FRAMES,
+    FLOOR_SHARE,
+    GUILTY_FROM,
+    MISMATCH,
+    NOISE_ALONE,
+    NOISE_SIGMAS,
+    ROUNDED,
+    SMOOTHING_LOST,
+    STRETCH_POWER,
+    UNCORRELATED,
+    WIDE_NEAR,
+    SHORTEST_STRETCH_s,
+    STRETCH_s,
+)
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+Predict = Callable[[Rig], Floats]
+Part = Literal["all", "fitted", "held"]
+_KEPT = 8  # predictions remembered: threads fit different effects at once
+
+
+@dataclass(frozen=True)
+class Hides:
+    """What a floor hides of an output: its share of what the channel does, rms over rms.
+
+    `noisiest` is the channel whose noise makes most of the floor, `channel` the output's.
+    """
+
+    share: float
+    noisiest: str
+    channel: str
+
+    @property
+    def much(self) -> bool:
+        """Whether a gap that is a large share of the signal would not show."""
+        return self.share > FLOOR_SHARE
+
+    @property
+    def still(self) -> bool:
+        """Whether the channel shows little but its own noise: breakout and friction held it."""
+        return self.noisiest == self.channel and self.share > NOISE_ALONE
+
+    @property
+    def words(self) -> str:
+        """What hides how much."""
+        if self.still:
+            return f"{self.channel} shows little but noise"
+        return f"noise of {self.noisiest} is {100 * self.share:.0f} % of what {self.channel} does"
+
+    @property
+    def wanted(self) -> str:
+        """What to record instead."""
+        if self.still:
+            return f"a push that moves {self.channel}, or {self.noisiest} with less noise"
+        times = math.ceil(self.share / FLOOR_SHARE)
+        return f"a motion {times} times as large, or {self.noisiest} with less noise"
+
+
+@dataclass(frozen=True)
+class Output:
+    """One measured output of a stage, and how a rig predicts it from the measured input.
+
+    `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
+    standard deviation from record to record, `smoothed` the share of it that a smoothed input has,
+    `hides` what it hides, where that is known.
+    `record` numbers the record that it is of; `held` are the frames held out from fits, without
+    which they are those of every other stretch; `missed` are those that the host missed (`missed`).
+    One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
+    that wider ones hardly change.
+    """
+
+    stage: str
+    channel: str
+    measured: Floats
+    predict: Predict
+    floor: float
+    frame_rate_Hz: float
+    record: int = 0
+    spread: float = 0.0
+    smoothed: float = 0.0
+    hides: Hides | None = None
+    held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    stepped: bool = False
+    _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
+
+    def widely(self, rig: Rig) -> bool:
+        """Tell whether wide steps of the loader change the prediction by little, against the floor.
+
+        They do under a force up to half of the frame rate, and where the floor is near zero.
+        """
+        stepped = replace(self, stepped=True)
+        change = stepped.residual(rig, wide=True) - stepped.residual(rig)
+        return float(np.sqrt(np.mean(change**2))) < WIDE_NEAR
+
+    def residual(self, rig: Rig, part: Part = "all", wide: bool = False) -> Floats:
+        """Return measured less predicted, in floors, shape (frames,), of a part's stretches.
+
+        A `wide` one is by wide steps of the loader (`steps`).
+        """
+        rig = widely_stepped(rig) if wide and self.stepped else rig
+        key = (rig.controls, rig.flight, rig.substeps)
+        left = next((left for known, left in self._known if known == key), None)
+        if left is None:
+            left = (self.measured - self.predict(rig)) / self.floor
+            self._known[:] = [*self._known[1 - _KEPT :], (key, left)]
+        return left if part == "all" else left[self.rows(part)]
+
+    @property
+    def carried(self) -> float:
+        """The part of the floor that is its input's noise, carried through."""
+        return self.floor * self.smoothed
+
+    @property
+    def own(self) -> float:
+        """The part of the floor that is the channel's own noise, not its input's."""
+        return self.floor * math.sqrt(1.0 - self.smoothed**2)
+
+    @property
+    def stretches(self) -> NDArray[np.intp]:
+        """The number of the stretch that each frame lies in."""
+        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
+        return np.arange(len(self.measured)) // frames
+
+    def rows(self, part: Part) -> NDArray[np.bool_]:
+        """Return which frames are of a part: every other stretch is fitted, those between held."""
+        if part == "all":
+            return np.ones(len(self.measured), dtype=bool)
+        held = self.stretches % 2 == 1 if self.held is None else self.held
+        return np.asarray(held if part == "held" else ~held)
+
+    def halved(self, rig: Rig) -> Output:
+        """Return the output with halves that both hold of what this rig leaves.
+
+        What happens seldom, as a limit that is met once, would else be in one of them alone: a
+        stretch that holds much of the residual's power is cut where it has had its share.
+        """
+        frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
+        least = max(1, round(SHORTEST_STRETCH_s * self.frame_rate_Hz))
+        power = np.concatenate(([0.0], np.cumsum(self.residual(rig) ** 2)))
+        most = max(STRETCH_POWER, 2.0 * frames / len(self.measured)) * float(power[-1])
+        held = np.zeros(len(self.measured), dtype=bool)
+        start, odd = 0, False
+        while start < len(held):
+            full = int(np.searchsorted(power, power[start] + most))
+            end = min(max(full, start + least), start + frames)
+            held[start:end] = odd
+            start, odd = end, not odd
+        return replace(self, held=held, _known=[])
+
+    @property
+    def limit(self) -> float:
+        """The gap up to which noise may be all there is."""
+        return max(GUILTY_FROM, 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed)
+
+    def gap(self, rig: Rig) -> float:
+        """Return the rms residual over the floor."""
+        return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
+
+
+def white(signal: Floats) -> float:
+    """Return the rms of the noise in a smooth signal."""
+    return heard(signal).rms
+
+
+def heard(signal: Floats) -> Noise:
+    """Return the noise in a smooth signal (`noise`).
+
+    No less than its rounding, which is not white where the signal is slow.
+    """
+    noise = noise_of(signal)
+    rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
+    return replace(noise, rms=max(noise.rms, rounding(signal, rough)))
+
+
+def rounding(signal: Floats, noise: float) -> float:
+    """Return the rms error of a signal's rounding, by the least step between its values.
+
+    None where it would be thrice `noise`: an even ramp has even steps, a test's few levels have
+    wide ones, and neither was rounded.
+    """
+    steps = np.diff(np.unique(signal))
+    error = float(steps.min()) / math.sqrt(12.0) if steps.size else 0.0
+    return error if error < ROUNDED * noise else 0.0
+
+
+def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
+    """Return how much of a signal's white noise is that of what it was made from, and the rest.
+
+    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal as it should
+    be, with the noise of its source: where that comes late or filtered, it echoes over frames.
+    """
+    noise, source = np.diff(signal, 4)[ECHO_FRAMES:], np.diff(made, 4)
+    echo = np.column_stack([source[ECHO_FRAMES - k : len(source) - k] for k in range(ECHO_FRAMES)])
+    left = noise - echo @ np.linalg.lstsq(echo, noise, rcond=None)[0]
+    power = float(noise @ noise)
+    share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+    rest = float(np.sqrt(np.mean(left**2) / 70.0))
+    return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
+
+
+def felt(force: Floats, answer: Floats) -> float:
+    """Return how much of a force's roughness its answer shows, 0 to 1, as a share of the power.
+
+    What is rough in a force, and no noise, is in what answers to it: fourth differences of the
+    force are regressed on those of the answer about the same frame, without a model of what lies
+    between.
+    """
+    rough, shown = np.diff(force, 4)[FELT_FRAMES:-FELT_FRAMES], np.diff(answer, 4)
+    last = len(shown) - 2 * FELT_FRAMES
+    near = np.column_stack([shown[k : k + last] for k in range(2 * FELT_FRAMES + 1)])
+    left = rough - near @ np.linalg.lstsq(near, rough, rcond=None)[0]
+    power = float(rough @ rough)
+    return 1.0 - float(left @ left) / power if power > 0.0 else 0.0
+
+
+def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:
+    """Return the relative standard deviation of noise's rms: `carried` of some tries, and its own.
+
+    The own noise is white, or correlates by `memory` from frame to frame.
+
+    The mean square of N values of Gaussian noise varies by √(2·Σρ²/N) of itself (Bartlett), its
+    root by half of that. The less noise a stage and its smoother let pass, the fewer values count.
+    """
+    power = np.mean([np.abs(np.fft.rfft(x)) ** 2 for x in carried], axis=0) / len(carried[0])
+    crowded = 1.0 + 1.0 / len(carried)  # of the square of a periodogram, by how few are averaged
+    at = np.linspace(0.0, np.pi, len(power))
+    alone = own**2 * (1.0 - memory**2) / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
+    total = float(np.mean(power + alone))
+    square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
+    return float(np.sqrt(0.5 * square / total**2 / len(carried[0])))
+
+
+def memory(residual: Floats) -> float:
+    """Return the residual's integrated autocorrelation time in frames, at least 1."""
+    x = residual - residual.mean()
+    power = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+    correlation = np.fft.irfft(power)[: len(x) // 4]
+    if correlation[0] <= 0.0:
+        return 1.0
+    correlation /= correlation[0]
+    negative = np.flatnonzero(correlation < UNCORRELATED)
+    end = int(negative[0]) if negative.size else len(correlation)
+    return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
+
+
+def explained_below(before: float, limit: float) -> float:
+    """Return the gap up to which a stage is explained, by its gap without any effect.
+
+    `limit` is the gap up to which noise may be all there is.
+    """
+    return max(limit, 1.0 + MISMATCH * (before - 1.0))
+
+
+def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
+    """Return the gap of each stage up to which noise may be all there is."""
+    found: dict[str, float] = {}
+    for output in outputs:
+        found[output.stage] = max(found.get(output.stage, GUILTY_FROM), output.limit)
+    return found
+
+
+def stage_gaps(outputs: Sequence[Output], rig: Rig) -> dict[str, float]:
+    """Return each stage's gap: the largest of its outputs', over all records."""
+    found: dict[str, float] = {}
+    for output in outputs:
+        found[output.stage] = max(found.get(output.stage, 0.0), output.gap(rig))
+    return found

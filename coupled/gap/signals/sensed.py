@@ -1,0 +1,98 @@
+"""What a rig's sensing and recording made of a signal, undone: the signal as it was.
+
+The stages are driven by what was, and a record holds what was read: by a scale that is off or
+drifts, with the mains' hum, with a zero, stamped late. The phase of a hum is a record's own, where
+there are several: a rig has that of the first.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupled.gap.noise.lines import projected
+from coupled.gap.signals.output import Floats
+from coupled.record.channels import ControlName
+from coupled.rig.nodes import on_nodes
+from coupled.rig.parameters import Sensing
+from coupled.rig.recorder import stamped
+from coupled.rig.rig import Rig
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What a rig's channels of one control have to do with what they measure."""
+
+    rig: Rig
+    control: ControlName
+    number: int = 0  # of the record, where there are several
+
+    @property
+    def _of(self) -> Sensing:
+        return self.rig.controls[self.control].sensing
+
+    @property
+    def zero(self) -> float:
+        """What the transducer at the grip reads at neutral, d."""
+        return self._of.deflection_zero
+
+    def hum(self, read: Floats) -> Floats | float:
+        """Return the mains' hum at each frame in δc as read, d."""
+        of = self._of
+        if of.hum == 0.0:
+            return 0.0
+        turn = 2.0 * math.pi * of.hum_frequency / self.rig.frame_rate
+        at = turn * np.arange(len(read))
+        if self.number == 0:
+            return np.asarray(of.hum * np.sin(at + of.hum_phase))
+        phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # four differences lead by 2
+        return np.asarray(of.hum * np.sin(at + phase))
+
+    def hum_on_nodes(self, read: Floats) -> Floats | float:
+        """Return the same on the loader's nodes, along the spline that a record is taken along."""
+        return on_nodes(self.rig, hum) if isinstance(hum := self.hum(read), np.ndarray) else hum
+
+    def scale(self, frames: int) -> Floats | float:
+        """Return δc as read over what it is, at each frame."""
+        return self._scale(frames, self.rig.frame_rate)
+
+    def scale_on_nodes(self, nodes: int) -> Floats | float:
+        """Return the same at each of the loader's nodes."""
+        return self._scale(nodes, self.rig.frame_rate * self.rig.substeps)
+
+    def _scale(self, samples: int, rate_Hz: float) -> Floats | float:
+        of = self._of
+        if of.scale_drift == 0.0:
+            return of.read_scale
+        times_s = np.arange(samples, dtype=np.float64) / rate_Hz
+        return np.asarray(of.read_scale * (1.0 + of.scale_drift * times_s))
+
+    def force(self, recorded: Floats) -> Floats:
+        """Return F in N at each frame from what the record holds of it."""
+        return self._unread(self.as_the_host_had_it(recorded))
+
+    def force_on_nodes(self, nodes: Floats, recorded: Floats) -> Floats:
+        """Return F in N at each of the loader's nodes; `nodes` are those of the record's F."""
+        if self._of.force_stamp != 0.0:
+            nodes = on_nodes(self.rig, self.as_the_host_had_it(recorded))
+        return self._unread(nodes)
+
+    def both(self, computed: Floats, recorded: Floats, read: Floats) -> tuple[Floats, Floats]:
+        """Return δc on the nodes and F at the frames from what was read of them there.
+
+        `read` is δc as recorded, by which a hum goes.
+        """
+        still = computed - self.hum_on_nodes(read)
+        return still / self.scale_on_nodes(len(computed)), self.force(recorded)
+
+    def as_the_host_had_it(self, recorded: Floats) -> Floats:
+        """Return F as the host read it, N: without the recorder's late stamps."""
+        return stamped(recorded, -self._of.force_stamp * self.rig.frame_rate)
+
+    def _unread(self, read: Floats) -> Floats:
+        of = self._of
+        if of.force_scale == 1.0 and of.force_zero == 0.0:
+            return read
+        return (read - of.force_zero) / of.force_scale

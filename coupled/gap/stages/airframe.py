@@ -1,0 +1,203 @@
+"""The airframe's residuals: the JSBSim model, driven from trim by the measured surfaces.
+
+How far the surfaces moved from their trim is added to the model's own trim, and the model flown
+so, open loop (`openloop`). The rates, angle of attack, sideslip and load factor are compared: they
+hold up, since what they owe to the surfaces fades within seconds; attitude, speed and height
+integrate every small error and are left to the kinematics. Where the elevator stands in trim is
+compared besides (`trim`). How the air moved is found by `air`.
+
+A surface that the aircraft's own laws move is no input: the host's command is flown through the
+laws, as JSBSim has them, and the surface is compared with the motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.flight.aircraft import make_aircraft
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.air import Air, vertical_air
+from coupled.gap.signals.floors import left_noise
+from coupled.gap.signals.output import Output, heard, spread, white
+from coupled.gap.stages.openloop import Flown, Moved, fly_open_loop
+from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
+from coupled.gap.stages.trim import Trim, trim_of
+from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
+from coupled.record.channels import SPEED, motion_channels
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+from coupled.rig.recorder import stamped
+from coupled.rig.rig import Rig
+from coupled.schema import changed
+
+Floats = NDArray[np.float64]
+RATE = "pitch_rate_rad_per_s"
+COMPARED = (
+    RATE,
+    "alpha_rad",
+    "load_factor",
+    "roll_rate_rad_per_s",
+    "yaw_rate_rad_per_s",
+    "sideslip_rad",
+)
+TRIM = "elevator_trim_rad"  # where the elevator stands in trim
+_KEPT = 12  # flights remembered
+
+
+class Flights:
+    """The last flights of a record, by the aircraft, what its surfaces did, and how the air moved.
+
+    A rig that flies as another did need not be flown again.
+    """
+
+    def __init__(self) -> None:
+        self._known: list[tuple[tuple[Any, ...], Flown | None]] = []
+
+    def of(self, asked: tuple[Any, ...], fly: Callable[[], Flown]) -> Flown | None:
+        """Return what was asked for, as it is known or flown; None where the aircraft has none."""
+        for known, flown in self._known:
+            if known == asked:
+                return flown
+        made: Flown | None
+        try:
+            made = fly()
+        except InputError:  # no trim with such a mass, lift or moment
+            made = None
+        self._known[:] = [*self._known[1 - _KEPT :], (asked, made)]
+        return made
+
+
+@dataclass
+class Model:
+    """The aircraft of one record, flown by its surfaces; remembers its last flights."""
+
+    rig: Rig
+    moved: Sequence[Moved]
+    compared: tuple[str, ...]
+    air: Air | None
+    flights: Flights = field(default_factory=Flights)
+
+    def flown(self, rig: Rig) -> Flown | None:
+        """Return the compared channels and the trim as `rig` has them; None where it has none."""
+        assert rig.flight is not None
+        flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        asked = (flight, self.compared, _digest(self.moved))
+        return self.flights.of(asked, lambda: self.fly(flight, self.moved))
+
+    def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
+        """Return by how much errors of the surfaces' motion and of the air change the flight."""
+        assert self.rig.flight is not None
+        flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
+        asked = (flight, self.compared, _digest(wrong), "with error")
+        flown = self.flights.of(asked, lambda: self.fly(flight, wrong, with_error=True))
+        assert flown is not None  # as without
+        return flown.motion - plain.motion
+
+    def fly(self, flight: Flight, moved: Sequence[Moved], with_error: bool = False) -> Flown:
+        """Return the flight that the surfaces make.
+
+        `with_error` adds to the air a sample of its error.
+        """
+        air = None
+        if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
+            moves = self.air.speed * (flight.gust_rms / self.air.rms)
+            moves = moves + self.air.error if with_error else moves
+            air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
+        controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
+        return fly_open_loop(flight, rate_Hz, controls, moved, self.compared, air)
+
+
+def _digest(moved: Sequence[Moved]) -> bytes:
+    """Return what tells one motion of the surfaces from another."""
+    found = sha256()
+    for one in moved:
+        found.update(repr((one.channel, one.trim, one.filed)).encode())
+        for values in (one.values, *(one.points or ())):
+            found.update(values.tobytes())
+    return found.digest()
+
+
+def needs(rig: Rig) -> tuple[str, ...]:
+    """Return the channels without which the airframe cannot be judged."""
+    return (RATE, surface_channel("column")) if "column" in rig.controls else (RATE,)
+
+
+def airframe_outputs(
+    rig: Rig, record: Record, number: int = 0, flights: Flights | None = None
+) -> list[Output]:
+    """Return the airframe's outputs; none for a bench or where its channels lack.
+
+    `flights` are those of the same record that are known.
+    """
+    if rig.flight is None or any(name not in record for name in needs(rig)):
+        return []
+    known = motion_channels(list(rig.controls), flown=True)
+    by_laws = [surface_channel(c) for c in rig.controls if surface_points(rig, c) is None]
+    wanted = [name for name in (*COMPARED, *by_laws) if name in known and name in record]
+    compared = tuple(name for name in wanted if np.ptp(record[name]) > 0.0)
+    each = {control: trim_of(rig, record, control) for control in rig.controls}
+    trims = {control: trim for control, trim in each.items() if trim is not None}
+    places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
+    right, wrong = moved(rig, record, places, np.random.default_rng(43))
+    air = vertical_air(record, 1.0 / rig.frame_rate)
+    model = Model(rig, right, compared, air, Flights() if flights is None else flights)
+    flown = model.flown(rig)
+    assert flown is not None  # as the rig is filed, it trims
+    carried = model.carried(wrong, flown)
+    outputs = []
+    for i, name in enumerate(compared):
+        noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
+        own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
+        floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
+        loose = spread([carried[:, i]], own, noise.memory)
+
+        def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
+            assert other.flight is not None
+            made = model.flown(other)
+            if made is None:
+                return record[name] + UNTRIMMED * floor
+            late = other.flight.motion_stamp * other.frame_rate
+            return stamped(np.asarray(made.motion[:, i]), late)
+
+        outputs.append(
+            Output("airframe", name, record[name], predict, floor, rig.frame_rate, number, loose)
+        )
+    if "column" in trims:
+        outputs.append(_trim_output(model, record, trims["column"], number))
+    return outputs
+
+
+def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
+    """Return the elevator's place in trim as an output, with the noise of its channel.
+
+    It is known by less than all of the rows: the floor is higher than the noise by as much.
+    """
+    position, at = record[surface_channel("column")], list(model.rig.controls).index("column")
+    noise = position - smoothed(position)
+    noise *= white(position) / max(float(np.std(noise)), 1e-12)
+    floor = max(trim.error * math.sqrt(len(position)), 1e-9)
+
+    def predict(rig: Rig) -> Floats:
+        made = model.flown(rig)
+        place = trim.measured + UNTRIMMED * floor if made is None else made.trim[at]
+        return np.full(len(position), place)
+
+    rate_Hz = model.rig.frame_rate
+    return Output("airframe", TRIM, trim.measured + noise, predict, floor, rate_Hz, number)
+
+
+def trim_speed(rig: Rig) -> float:
+    """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
+    assert rig.flight is not None
+    frame_s = 1.0 / rig.frame_rate
+    airframe = make_aircraft(rig.flight, frame_s, ["column"], [aircraft_folder()])
+    return airframe.motion()[SPEED]

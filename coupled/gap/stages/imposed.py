@@ -1,0 +1,102 @@
+"""A control whose motion is imposed, as on a test bench for dampers: the force is its answer.
+
+The grip's motion is imposed where the record has it, else δc; the force is held against what the
+loader's laws make of the motion. Play lies between the two (`rig.imposed`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.floors import with_error
+from coupled.gap.signals.output import Floats, Output, Predict
+from coupled.gap.signals.reading import Reading
+from coupled.gap.thresholds import JUMP_COUNTED, PLAY_LEAST, PLAYS
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.imposed import answer_to
+from coupled.rig.nodes import Nodes
+from coupled.rig.recorder import stamped
+from coupled.rig.rig import Rig
+
+PLAY = "loader.play_{d}"
+
+
+class Imposed:
+    """The force of a control under an imposed motion: as measured, and as a rig predicts it."""
+
+    def __init__(self, reading: Reading) -> None:
+        self._reading = reading
+        self._motion = smoothed(reading.signal(reading.imposed))
+        self._level: Noise = reading.heard(reading.imposed)
+        self._gradient = reading.gradient()
+        record = reading.record
+        self._load = smoothed(record["load_factor"]) if "load_factor" in record else None
+
+    def predict(self, motion: Floats | None = None) -> Predict:
+        """Return the prediction for a motion in d at each frame, as read; the record's own."""
+        reading = self._reading
+        imposed = Nodes(self._motion if motion is None else motion)
+
+        def predicted(rig: Rig) -> Floats:
+            data, nodes = rig.controls[reading.control], imposed.of(rig)
+            read_as = reading.sensed(rig)
+            true = nodes / read_as.scale_on_nodes(len(nodes))
+            if reading.imposed == "deflection":
+                true = nodes - read_as.zero
+            force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load)
+            late_s = data.sensing.force_stamp - data.loader.delay
+            read = data.sensing.force_scale * force + data.sensing.force_zero
+            read = stamped(read, late_s * rig.frame_rate)
+            return self._within_jumps(read, jumps) if jumps.any() else read
+
+        return predicted
+
+    def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
+        """Return a prediction that leaves nearly open when, within a frame, a play was taken up.
+
+        A sample there may hold any force between those before and after; what it holds is counted
+        as a small share, by which a fit finds its way.
+        """
+        around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
+        held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))
+        return np.where(jumps, held + JUMP_COUNTED * (predicted - held), predicted)
+
+    def noisy(self, rig: Rig, k: int) -> Floats:
+        """Return the prediction with a sample of what is wrong with the smoothed motion."""
+        return self.predict(with_error(self._motion, k, self._level))(rig)
+
+
+def under_motion(library: Sequence[Effect]) -> list[Effect]:
+    """Return a library for imposed motions: play shows in the force, the linkage's rest nowhere."""
+    found = []
+    for effect in library:
+        if effect.stage != "linkage":
+            found.append(effect)
+        elif [p.key for p in effect.parameters] == [PLAY]:
+            found.append(replace(effect, outputs=("loader",), seen=_plays))
+    return found
+
+
+def _plays(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+    """Return the play that leaves least of the force, where a fit starts: by two scans.
+
+    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
+    """
+    ours = [output for output in outputs if output.stage == "loader"]
+    key = f"controls.{control}.{PLAY.format(d=unit_of(control))}"
+    filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
+
+    def left(play: float) -> float:
+        other = rig.changed({key: filed + play})
+        return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
+
+    best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
+    best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
+    return [{"play_{d}": best}]

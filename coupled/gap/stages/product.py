@@ -1,0 +1,123 @@
+"""The multiplier's product F_mod, against what it should be: of δc itself, or of δc as read.
+
+A digital product repeats the noise of the δc that it was made from, an analog one does not know of
+it; a wrong scale is in the one and not in the other. What repeats that noise is therefore no noise
+of F_mod's own channel (`echo`): taken for such, it would hide how the product is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.floors import with_error
+from coupled.gap.signals.output import Floats
+from coupled.gap.signals.reading import Reading
+from coupled.gap.signals.served import neutral
+from coupled.gap.thresholds import PRELOAD_UNSURE
+from coupled.rig.replay import replay_product
+from coupled.rig.rig import Rig
+
+
+@dataclass(frozen=True)
+class Product:
+    """F_mod of a record in N, by δc and G_T; each signal of shape (frames,)."""
+
+    reading: Reading
+
+    @property
+    def name(self) -> str:
+        """The name of its channel."""
+        return self.reading.name_of("modifying_force")
+
+    @property
+    def recorded(self) -> Floats:
+        """F_mod as recorded, N."""
+        return self.reading.signal("modifying_force")
+
+    @cached_property
+    def own(self) -> Noise:
+        """The noise of its channel, by its spectrum."""
+        return self.reading.heard("modifying_force")
+
+    @cached_property
+    def unsure(self) -> NDArray[np.bool_]:
+        """Where noise in δc says on which side of neutral it is, and a breakout makes F_mod jump.
+
+        There the prediction is the measurement. A jump that F_mod's own noise covers counts too,
+        where it is more than the gradient's rise: δc as read is on its right side more often than
+        δc smoothed, of an analog product as of a digital one.
+        """
+        away, level = self._smooth - self._neutral, self._level.rms
+        below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
+        jump, rise = np.abs(above - below), np.abs(beyond - above)
+        near = np.abs(away) < PRELOAD_UNSURE * level
+        return np.asarray(near & ((jump > PRELOAD_UNSURE * self.own.rms) | (jump > 2.0 * rise)))
+
+    @cached_property
+    def echo(self) -> Floats:
+        """What a product of δc as read has of that reading's noise, N."""
+        more = self._made(self._computed) - self._made(self._smooth)
+        return np.where(self.unsure, 0.0, more)
+
+    def predict(self, rig: Rig, seen: Floats | None = None) -> Floats:
+        """Return what a rig makes of δc, smoothed or as `seen` in d, N."""
+        of = self.reading
+        if rig.controls[of.control].loader.multiplier == "digital":
+            read = self._computed
+        else:
+            sensed, smooth = of.sensed(rig), self._likely if seen is None else seen
+            read = (smooth - sensed.hum(self._computed)) / sensed.scale(len(smooth))
+        return np.where(self.unsure, self.recorded, self._made(read, rig))
+
+    def noisy(self, rig: Rig, k: int) -> Floats:
+        """Return the same of δc with the k-th sample of its noise."""
+        return self.predict(rig, with_error(self._likely, k, self._level))
+
+    @cached_property
+    def _computed(self) -> Floats:
+        return self.reading.signal("computed")
+
+    @cached_property
+    def _smooth(self) -> Floats:
+        return smoothed(self._computed)
+
+    @cached_property
+    def _likely(self) -> Floats:
+        """δc as it likely was, d: with the share of what the smoother takes off that was motion.
+
+        Of a fast motion beside little noise it is a large one, and an analog product, which has
+        all of the motion, would seem to repeat the noise.
+        """
+        rest = self._computed - self._smooth
+        noise = self._level.sample(len(rest), np.random.default_rng(53))
+        alone = noise - Smoother.of(self._computed).smooth(noise)
+        power = float(rest @ rest)
+        motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
+        return self._smooth + motion * rest
+
+    @cached_property
+    def _level(self) -> Noise:
+        return self.reading.heard("computed")
+
+    @cached_property
+    def _gradients(self) -> tuple[Floats, Floats | None]:
+        """G_T within the break and beyond it, N/d."""
+        return self.reading.gradient(), self.reading.second()
+
+    @cached_property
+    def _neutral(self) -> Floats:
+        """δc at which the services hold the control neutral, d."""
+        return 0.0 * self._smooth + neutral(self.reading)
+
+    def _made(self, read: Floats, rig: Rig | None = None) -> Floats:
+        """Return the product of δc as read, N, by a rig, without one the nominal."""
+        of = self.reading
+        rig = of.rig if rig is None else rig
+        missed = of.missed.under(rig, of.control)
+        return replay_product(rig, of.control, read - self._neutral, *self._gradients, missed)

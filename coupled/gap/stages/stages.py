@@ -1,0 +1,300 @@
+"""Each stage's residual: what is measured less what the stage makes of its measured input.
+
+The chain is cut at every measured signal, so that a fault upstream is inherited by nobody.
+Inputs are smoothed (`smooth`). A residual is over its floor: its own noise and its inputs'.
+
+    schedule      q̄ → G_T                       surface   δ̂, q̄ → its position
+    loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
+    multiplier    δc, G_T → F_mod (part of the loader)
+    linkage       δc, F → δ
+    compensation  δc, F → δ̂ (the host's own arithmetic)
+
+A wrong scale S₁ cannot be driven alone: it shows in all three of loader, multiplier and linkage.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.noise import Noise, between_jumps
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.floors import (
+    given_noise,
+    left_noise,
+    noise_in,
+    unsmoothed,
+    with_error,
+    without_echo,
+)
+from coupled.gap.signals.output import Hides, Output, Predict, echoed, felt, heard, spread
+from coupled.gap.signals.reading import Reading
+from coupled.gap.signals.served import asked, left, services
+from coupled.gap.stages.imposed import Imposed
+from coupled.gap.stages.openloop import about
+from coupled.gap.stages.product import Product
+from coupled.gap.stages.ratchet import (
+    Driven,
+    is_walked,
+    passed,
+    passed_noise,
+    unratcheted,
+    unwalked,
+)
+from coupled.gap.stages.surfaces import filed_trim
+from coupled.gap.stages.trim import trim_of
+from coupled.gap.thresholds import (
+    BROAD,
+    ECHO_SHARE,
+    FELT,
+    HALF_FELT,
+    NOISE_TRIES,
+    REPLAY_KNOWN,
+    ROUNDING_SPAN,
+    SURFACE_KNOWN,
+    RESTART_s,
+    SLOW_LOADER_s,
+)
+from coupled.rig.hosted import Hosted
+from coupled.rig.nodes import Nodes
+from coupled.rig.replay import (
+    drive_linkage,
+    drive_loader,
+    replay_compensation,
+    replay_schedule,
+    replay_surface,
+)
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
+
+
+@dataclass(frozen=True)
+class Reader(Reading):
+    """Builds the outputs that a record lets judge, and says which channels lack."""
+
+    def outputs(self) -> list[Output]:
+        """Return every output that the record lets judge, in the order of the chain."""
+        lacking = self.missing()
+        makers = {
+            "schedule": self._schedule,
+            "loader": self._loader,
+            "multiplier": self._multiplier,
+            "linkage": self._linkage,
+            "compensation": self._compensation,
+            "surface": self._surface,
+        }
+        if self.moved:
+            makers = {"schedule": self._schedule, "loader": self._answering}
+        if self.set_points:
+            del makers["loader"], makers["multiplier"]
+        found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
+        return [out for out in found if np.isfinite(out.floor) and out.floor > 0.0]
+
+    def _made(
+        self,
+        stage: str,
+        name: str,
+        measured: Floats,
+        predict: Predict,
+        noisy: Callable[[Rig, int], Floats],
+        own: Noise,
+        driven_by: str = "",
+        judged: NDArray[np.bool_] | None = None,
+        echo: Floats | None = None,
+    ) -> Output:
+        """Return an output whose floor is its own noise and its input's, carried through.
+
+        Where it is not `judged`, the prediction is the measurement. Of one that is `driven_by` a
+        quantity of the control, it is known what the floor hides. What repeats an `echo` is none
+        of its own noise.
+        """
+        base = predict(self.rig)
+        own = left_noise(own, measured, without_echo(measured - base, echo), judged)
+        tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
+        carried = float(np.sqrt(np.mean(np.square(tries))))
+        floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
+        made = self._output(stage, name, measured, predict, floor)
+        if floor <= 0.0:
+            return made
+        known = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
+        if not driven_by:
+            return known
+        noisiest = self.name_of(driven_by) if carried > own.rms else name
+        return replace(known, hides=Hides(floor / float(np.std(measured)), noisiest, name))
+
+    def _output(
+        self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
+    ) -> Output:
+        rate, missed = self.rig.frame_rate, self.missed.seen
+        made = Output(stage, name, measured, predict, floor, rate, self.number, missed=missed)
+        return replace(made, stepped=stage in STEPPED and made.widely(self.rig))
+
+    def _schedule(self) -> list[Output]:
+        pressure, gradient = self.record["dynamic_pressure_Pa"], self.signal("gradient")
+        level, ran = noise_in(self.rig, "dynamic_pressure_Pa", pressure), ~self.missed.seen
+        own = noise_in(self.rig, self.name_of("gradient"), gradient[ran])
+        smooth = smoothed(pressure)
+
+        def predict(rig: Rig, q: Floats = smooth) -> Floats:
+            missed = self.missed.under(rig, self.control)
+            return replay_schedule(rig, self.control, q, missed=missed) * left(self)
+
+        share, rest = echoed(gradient[ran], predict(self.rig, pressure)[ran])
+        if share > ECHO_SHARE:
+            # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
+            def as_read(rig: Rig) -> Floats:
+                return predict(rig, pressure)
+
+            floor = max(rest, ROUNDING_SPAN * float(np.ptp(gradient)))
+            return [self._output("schedule", self.name_of("gradient"), gradient, as_read, floor)]
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            return predict(rig, with_error(smooth, k, level))
+
+        return [self._made("schedule", self.name_of("gradient"), gradient, predict, noisy, own)]
+
+    def _loader(self) -> list[Output]:
+        noisy_force, gradient = self.signal("force"), self.gradient()
+        force, level = smoothed(noisy_force), self.heard("force")
+        computed, second = self.signal("computed"), self.second()
+        load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
+        smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
+        leaks = [Nodes(smoothed(other)) for other in self.partner()]
+        every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
+
+        def driven(f: Floats, seen: Floats) -> Driven:
+            """Return the answer to a force, and so many times its noise, by where windows start."""
+            nodes = Nodes(f)
+            misread = computed - seen
+            rate = rate_of(seen, self.rig.frame_rate) if every else seen
+
+            def at(rig: Rig, times: float) -> Floats:
+                sensed = self.sensed(rig)
+                scale, hum = sensed.scale(len(seen)), sensed.hum(computed)
+                still = rate
+                if every and isinstance(hum, np.ndarray):
+                    still = rate - rate_of(hum, self.rig.frame_rate)
+                restart = (every, (seen - hum) / scale, still / scale)
+                pull = sensed.force_on_nodes(nodes.of(rig), f)
+                if times:
+                    pull = pull + times * trembling.of(rig)
+                if leaks and (share := rig.controls[self.control].loader.crosstalk):
+                    pull = pull + share * leaks[0].of(rig)
+                host = Hosted(services(self), self.missed.under(rig, self.control))
+                driven_by = (pull, gradient, misread + hum, load, second, restart, host)
+                return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
+
+            return at
+
+        def predicted(at: Driven, times: float = 1.0) -> Predict:
+            return lambda rig: unwalked(rig, self.control, at, times) if walks else at(rig, 0.0)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            seen = with_error(smooth, k + NOISE_TRIES, own)
+            return predicted(driven(wandering(force, k, level), seen), 2.0**0.5)(rig)
+
+        if level.rms > BROAD * float(np.std(noisy_force)):
+            share = felt(noisy_force, computed)
+            level = replace(level, rms=level.rms * float(np.sqrt(max(1.0 - share, 0.0))))
+            if share > FELT:
+                level = given_noise(self.rig, self.name_of("force"), noisy_force)
+            if share > HALF_FELT:
+                force, wandering = noisy_force, unsmoothed
+        trembling = Nodes(passed(noisy_force, level))
+        answer = driven(force, smooth)
+        walks = force is not noisy_force and is_walked(self.rig, self.control, answer, own.rms)
+        made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
+        return [self._made("loader", *made)]
+
+    def _answering(self) -> list[Output]:
+        """Return the force that answers an imposed motion."""
+        motion, force = Imposed(self), self.signal("force")
+        # At the end of a play it jumps.
+        own = min(self.heard("force"), between_jumps(force), key=lambda noise: noise.rms)
+        made = (force, motion.predict(), motion.noisy, own, self.imposed)
+        return [self._made("loader", self.name_of("force"), *made)]
+
+    def _drifts(self, gradient: Floats) -> bool:
+        """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
+        loader = self.rig.controls[self.control].loader
+        softest = float(np.min(np.maximum(gradient, 0.0)))
+        return softest * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * loader.mass
+
+    def _multiplier(self) -> list[Output]:
+        product = Product(self)
+        made = (product.name, product.recorded, product.predict, product.noisy, product.own)
+        return [self._made("multiplier", *made, judged=~product.unsure, echo=product.echo)]
+
+    def _linkage(self) -> list[Output]:
+        computed, measured = self.signal("computed"), self.signal("deflection")
+        (smooth, level), (smooth_force, force_level) = self.commanded(), self.pulled()
+        others = {name: smoothed(signal) for name, signal in self.others().items()}
+        force = self.signal("force") if self.name_of("force") in self.record else smooth_force
+        noise = passed_noise((computed, force), (level, force_level))
+
+        def driven(c: Floats, f: Floats) -> Predict:
+            nodes = Nodes(c)
+
+            def at(rig: Rig, times: float) -> Floats:
+                sensed = self.sensed(rig)
+                driven_by = sensed.both(
+                    nodes.of(rig) + times * noise[0].of(rig), f + times * noise[1], computed
+                )
+                return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
+
+            return lambda rig: unratcheted(rig, self.control, at)
+
+        def noisy(rig: Rig, k: int) -> Floats:
+            f = with_error(smooth_force, k + NOISE_TRIES, force_level)
+            return driven(with_error(smooth, k, level), f)(rig)
+
+        made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
+        return [self._made("linkage", self.name_of("deflection"), *made, "computed")]
+
+    def _compensation(self) -> list[Output]:
+        """Return δ̂ against the host's arithmetic on what the record says that it read.
+
+        Its floor is δc's noise, though both hold the same: F may be stamped a little late.
+        """
+        computed, recorded, others = self.signal("computed"), self.signal("force"), self.others()
+
+        def predict(rig: Rig) -> Floats:
+            force = self.sensed(rig).as_the_host_had_it(recorded)
+            missed = self.missed.under(rig, self.control)
+            return replay_compensation(rig, self.control, computed, force, others, missed)
+
+        floor = max(self.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+        name = self.name_of("estimate")
+        return [self._output("compensation", name, self.signal("estimate"), predict, floor)]
+
+    def _surface(self) -> list[Output]:
+        points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)
+        if points is None:
+            return []
+        commands_at, positions = points
+        estimate, measured = asked(self), self.record[self.surface]
+        trim = trim_of(self.rig, self.record, self.control)
+        filed = filed_trim(self.rig, self.control)
+        held = 0.0 if trim is None else about(trim.position, filed, points)
+        pressure = self.record["dynamic_pressure_Pa"]
+        command = replay_surface(self.rig, self.control, estimate, pressure)
+
+        def position(wanted: Floats) -> Floats:
+            return np.interp(held + wanted, commands_at, positions)
+
+        def predict(rig: Rig) -> Floats:
+            commands = replay_surface(rig, self.control, estimate, pressure)
+            # Row k is the answer to row k − 1; the first is the trim.
+            return position(np.concatenate(([0.0], commands[:-1])))
+
+        # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
+        left = measured - position(np.concatenate(([0.0], command[:-1])))
+        own = left_noise(heard(left), measured, left)
+        floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
+        return [self._output("surface", self.surface, measured, predict, floor)]

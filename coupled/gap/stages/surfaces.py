@@ -1,0 +1,153 @@
+"""What the airframe's surfaces did, by their recorded positions.
+
+Each model has a map of its own from command to position, found by flying it. A surface that the
+aircraft moves itself (a yaw damper, the laws of an F-16) stands where its motion wants it, too:
+what was commanded is then the host's own command, which is flown through the model's laws, and the
+surface cannot be judged by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
+from coupled.flight.altered import UNALTERED
+from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.output import heard
+from coupled.gap.stages.openloop import Moved, Points
+from coupled.gap.thresholds import (
+    SURFACE_SHAKE,
+    SURFACE_GUST_m_per_s,
+    SURFACE_MOVES_rad,
+    SURFACE_SHAKE_s,
+)
+from coupled.record.channels import SURFACES, ControlName, channel, motion_channels
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+from coupled.rig.replay import replay_surface
+from coupled.rig.rig import Rig
+from coupled.rig.serving import service_rows
+from coupled.schema import changed
+
+Floats = NDArray[np.float64]
+
+
+def surface_channel(control: ControlName) -> str:
+    """Return the channel of the surface that a control moves."""
+    return f"{SURFACES[control]}_rad"
+
+
+def surface_points(rig: Rig, control: ControlName) -> Points | None:
+    """Return commands about trim, and a surface's positions that the model gives them, rad.
+
+    None where the aircraft moves the surface by laws of its own.
+    """
+    assert rig.flight is not None
+    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
+    return _points(plain.model_dump_json(), tuple(rig.controls), rig.frame_rate, control)
+
+
+@lru_cache(maxsize=64)
+def _points(
+    flight: str, controls: tuple[ControlName, ...], rate_Hz: float, control: ControlName
+) -> Points | None:
+    plain = Flight.model_validate_json(flight)
+
+    def model() -> JSBSimAirframe:
+        return make_aircraft(plain, 1.0 / rate_Hz, controls, [aircraft_folder()])
+
+    if _moves_itself(model(), controls, rate_Hz, control):
+        return None
+    return model().surface_map(surface_channel(control))
+
+
+def _moves_itself(
+    airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
+) -> bool:
+    """Tell whether the aircraft moves a surface as the air rises and other controls are moved."""
+    at = motion_channels(controls, flown=True).index(surface_channel(control))
+    still, moved = airframe.motion()[at], 0.0
+    airframe.set_gust(SURFACE_GUST_m_per_s)
+    for i, other in enumerate(controls):
+        for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
+            shaken = 0.0 if other == control else SURFACE_SHAKE
+            airframe.step(
+                (
+                    shaken * (i == 0),
+                    shaken * (i == 1),
+                    shaken * (i == 2),
+                )
+            )
+            moved = max(moved, abs(airframe.motion()[at] - still))
+    return moved > SURFACE_MOVES_rad
+
+
+def filed_trim(rig: Rig, control: ControlName) -> float:
+    """Return where a control's surface stands in the trim that `surface_points` counts from."""
+    assert rig.flight is not None
+    plain = changed(rig.flight, UNALTERED, rig.name, "flight")
+    controls = tuple(rig.controls)
+    return _trim(plain.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
+
+
+def own_trim(rig: Rig, control: ControlName) -> float:
+    """Return where a control's surface stands in the trim of the rig's own aircraft."""
+    assert rig.flight is not None
+    still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
+    controls = tuple(rig.controls)
+    return _trim(still.model_dump_json(), controls, rig.frame_rate)[controls.index(control)]
+
+
+@lru_cache(maxsize=64)
+def _trim(flight: str, controls: tuple[ControlName, ...], rate_Hz: float) -> tuple[float, ...]:
+    still = Flight.model_validate_json(flight)
+    motion = make_aircraft(still, 1.0 / rate_Hz, controls, [aircraft_folder()]).motion()
+    every = motion_channels(controls, flown=True)
+    return tuple(motion[every.index(surface_channel(control))] for control in controls)
+
+
+def moved(
+    rig: Rig,
+    record: Record,
+    trims: Mapping[ControlName, tuple[float, float]],
+    rng: np.random.Generator,
+) -> tuple[list[Moved], list[Moved]]:
+    """Return what the surfaces did, and the same with a sample of the error in that.
+
+    In the order of the rig's controls. `trims` are where they stood in trim, rad, and by how much
+    they jump from there after the first row, which no smoother is to blur. A control that the
+    record knows nothing of is taken to have been left alone.
+    """
+    found = list[Moved]()
+    wrong = list[Moved]()
+    for control in rig.controls:
+        name, points = surface_channel(control), surface_points(rig, control)
+        if name not in record or points is None:
+            one = Moved(name, _asked(rig, record, control))
+            found, wrong = [*found, one], [*wrong, one]
+            continue
+        position, filed = record[name], filed_trim(rig, control)
+        trim, jump = trims.get(control, (filed, 0.0))
+        step = np.where(np.arange(len(position)) > 0, jump, 0.0)
+        level, smooth = heard(position), smoothed(position - step) + step
+        error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
+        found.append(Moved(name, smooth, points, trim, filed))
+        wrong.append(Moved(name, smooth + error, points, trim, filed))
+    return found, wrong
+
+
+def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
+    """Return the host's own command of a surface, none where the record holds no estimate."""
+    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
+    if name not in record or pressure not in record:
+        return np.zeros(len(record))
+    served = service_rows(record, control)
+    wanted = record[name] if served is None else served.asked
+    asked = replay_surface(rig, control, wanted, record[pressure])
+    return np.concatenate(([0.0], asked[:-1]))

@@ -1,0 +1,126 @@
+"""Where a record's surfaces stood in trim, which need not be where the model's do.
+
+A record starts in trim. A surface that stands off the model's trim by more than noise either
+belongs to an aircraft that trims elsewhere (its mass, lift or moment differs), and then the
+first row stands there, too, and the aircraft stays in trim; or something has moved it since
+(a rigging offset), and the aircraft answers. Both are weighed: by the first row, and by which
+the model follows better, flown open loop. Where neither tells, it is the aircraft's trim; of a
+record without motion, the surface's fault.
+
+What a record says of its trim is also a measurement of its own, which the model's trim is held
+against: with the angle of attack in trim it tells lift, moment and weight apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.output import heard, memory, white
+from coupled.gap.stages.openloop import about, fly_open_loop
+from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
+from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_SINCE, TRIM_FLIGHT_s, TRIM_LAGS_s, TRIM_s
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.replay import replay_surface
+from coupled.rig.rig import Rig
+from coupled.rig.serving import service_rows
+
+Floats = NDArray[np.float64]
+WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Where a surface stood in trim, rad: where its motion counts from, and what was measured.
+
+    `error` is the standard error of `measured`; `jump` by how much the surface stands off from the
+    second row on.
+    """
+
+    position: float
+    measured: float
+    error: float
+    jump: float = 0.0
+
+
+def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
+    """Return where a control's surface stood in trim; None where the record does not tell."""
+    name, points = surface_channel(control), surface_points(rig, control)
+    if name not in record or points is None:
+        return None
+    own, noise, first = own_trim(rig, control), white(record[name]), float(record[name][0])
+    off = _standing_off(rig, record, control)
+    if off is None:  # by the first row alone
+        at = own if abs(first - own) <= TRIM_SIGMAS * noise else first
+        return Trim(at, first, noise)
+    standing, error = off
+    if abs(standing) <= TRIM_SIGMAS * error:
+        return Trim(own, own + standing, error)
+    there = own + standing
+    evidence = ((first - own) ** 2 - (first - there) ** 2) / max(noise, 1e-12) ** 2
+    flown = _followed(rig, record, control, own, there) if control == "column" else None
+    in_trim = evidence > TRIM_SINCE if flown is None else evidence + flown > -TRIM_SINCE
+    return Trim(there, there, error) if in_trim else Trim(own, own, noise, standing)
+
+
+def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
+    """Return by how much a surface stands off its trim and command at first, and its error, rad.
+
+    None where the record does not hold the command.
+    """
+    name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
+    points = surface_points(rig, control)
+    if name not in record or pressure not in record or points is None:
+        return None
+    rows = max(2, round(TRIM_s * rig.frame_rate))
+    served = service_rows(record, control)
+    wanted = record[name] if served is None else served.asked
+    asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
+    measured = record[surface_channel(control)]
+    held = about(own_trim(rig, control), filed_trim(rig, control), points)
+    left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
+    noise = heard(measured)
+    crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # how few values coloured noise has
+    return float(np.mean(left)), noise.rms * float(np.sqrt(crowded / (rows - 1)))
+
+
+def _followed(
+    rig: Rig, record: Record, control: ControlName, own: float, there: float
+) -> float | None:
+    """Return by how much twice the log-likelihood is higher with the surface in trim `there`.
+
+    None where the record does not hold the motion.
+    """
+    rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
+    short = Record(record.channels, record.data[:rows])
+    names = [name for name in WEIGHED if name in record]
+    if not names or rig.flight is None:
+        return None
+    lefts = []
+    for trim, jump in ((own, there - own), (there, 0.0)):
+        surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
+        flown = fly_open_loop(rig.flight, rig.frame_rate, list(rig.controls), surfaces, names)
+        left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
+        linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
+        left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]
+        lefts.append(left.T)
+    gained = 0.0
+    for before, after in zip(*lefts, strict=True):
+        powers = [float(np.mean(left**2)) for left in (before, after)]
+        quieter = before if powers[0] < powers[1] else after
+        gained += rows / memory(quieter) * float(np.log(powers[0] / powers[1]))
+    return gained
+
+
+def _lagged(surface: Floats, rate_Hz: float) -> Floats:
+    """Return a constant and the surface so much before, shape (rows, 1 + lags).
+
+    What a model lacks of an aircraft's answer is linear in them; a departure from trim is not.
+    """
+    rows = np.arange(len(surface))
+    before = [np.maximum(rows - round(lag * rate_Hz), 0) for lag in TRIM_LAGS_s]
+    return np.column_stack([np.ones(len(surface)), *(surface[at] - surface[0] for at in before)])
