@@ -159,12 +159,10 @@ def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
     loader = {"multiplier": question.multiplier, "servo_frequency": question.servo_frequency_Hz}
     host = {"bend": question.host_bend, "gradient": question.host_gradient}
     sensing = {"gauge_frequency": question.gauge_frequency_Hz, "gauge_mass": question.gauge_mass}
-    sections = {
-        section: getattr(control, section).model_copy(
-            update={key: value for key, value in own.items() if value is not None}
-        )
-        for section, own in (("loader", loader), ("compensation", host), ("sensing", sensing))
-    }
+    sections = {}
+    for section, own in (("loader", loader), ("compensation", host), ("sensing", sensing)):
+        if put := {key: value for key, value in own.items() if value is not None}:
+            sections[section] = getattr(control, section).model_copy(update=put)
     whole: dict[str, Any] = {"controls": {name: control.model_copy(update=sections)}}
     if question.frame_s is not None:
         whole["frame_rate"] = 1.0 / question.frame_s
