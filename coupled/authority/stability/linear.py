@@ -31,6 +31,7 @@ product comes half a frame late: the damping ratio falls by ω·T/4.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,16 @@ def growth(rig: Rig, hand: Hand) -> float:
     if control.loader.multiplier == "hybrid":
         return float(poles_growth(matrix))
     return float(map_growth(frame_map(matrix, control, 1.0 / rig.frame_rate), 1.0 / rig.frame_rate))
+
+
+def growths(posed: Sequence[tuple[Rig, Hand]]) -> list[float]:
+    """Return the growths of linear rigs, 1/s; those of hybrid ones at once, which is quicker."""
+    found = [next(iter(rig.controls.values())).loader.multiplier for rig, _ in posed]
+    matrices = [motion_matrix(rig, hand) for rig, hand in posed if set(found) == {"hybrid"}]
+    if not matrices or len({matrix.shape for matrix in matrices}) > 1:
+        return [growth(rig, hand) for rig, hand in posed]
+    rates: list[float] = poles_growth(np.stack(matrices)).tolist()
+    return rates
 
 
 def motion_matrix(rig: Rig, hand: Hand) -> Floats:

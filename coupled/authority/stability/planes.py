@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.stability.linear import growth as linear_growth
+from coupled.authority.stability.linear import growths
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.growth import growth as simulated_growth
 from coupled.rig.packing import Hand
@@ -256,7 +257,7 @@ def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
 
 def _by_theory(rig: Rig, name: ControlName, kind: Kind, gradients: Floats, ys: Floats) -> Floats:
     along = [Along(rig, name, kind, gradient) for gradient in gradients.tolist()]
-    return np.array([[at.theory(y) for y in ys.tolist()] for at in along])
+    return np.array([growths([at.posed(y) for y in ys.tolist()]) for at in along])
 
 
 def simulated_along(

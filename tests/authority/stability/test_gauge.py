@@ -11,9 +11,13 @@ from hypothesis import strategies as st
 from coupled.authority.stability import planes
 from coupled.authority.stability.linear import (
     growth,
+    growths,
     mass_limit,
 )
 from coupled.authority.stability.planes import (
+    Along,
+    Kind,
+    axis,
     crossings,
     linear_rig,
     simulated_along,
@@ -97,3 +101,12 @@ def test_a_slow_gauge_brings_the_limit_of_a_hand_and_of_the_grips_mass_down() ->
     assert limits["hand"] == pytest.approx([1.19, 0.90, 0.72, 0.46], rel=0.01)
     # Where the rig has none of its own the mass is asked about behind one of 50 Hz.
     assert limits["mass"] == pytest.approx([3.08, 5.24, 3.08, 2.05], rel=0.01)
+
+
+@pytest.mark.parametrize("kind", ["gauge", "frame"])
+def test_growths_found_at_once_are_those_found_one_by_one(kind: Kind) -> None:
+    """A hybrid multiplier's and a digital one's."""
+    along = Along(bench(), "column", kind, 0.5 / K_REPORT)
+    posed = [along.posed(value) for value in axis(kind, 12).tolist()]
+    assert growths(posed) == [growth(rig, hand) for rig, hand in posed]
+    assert growths([*posed, (along.linear, Hand())])[:-1] == growths(posed)
