@@ -6,7 +6,8 @@ Run alone, with its figures printed, on an idle machine:
 
 flies 10,000; without the variable, 1000, which is the fewest that can be judged by.
 Each flight is 20 s of the report's column on a T-37. Bare JSBSim loads and trims the same model
-for each flight and takes the same steps, in as many processes. Rates are counted from the first
+for each flight and takes the same steps, in as many processes; a sweep trims for each flight, too,
+but loads a T-37 once a process. Rates are counted from the first
 flight done, so that starting up is not in them. The second test counts processor time, which a
 busy machine changes little.
 """
@@ -210,4 +211,4 @@ def test_what_a_second_worker_and_the_rig_cost_of_processor_time(tmp_path: Path)
     print(f"bare JSBSim {1e3 * min(beside):.1f} ms: {figures}")
     keep("sweep, processor time", figures, load)
     assert figures["two_of_one"] > 1.8
-    assert figures["of_bare"] > 0.6
+    assert figures["of_bare"] > 0.68

@@ -158,6 +158,7 @@ def short(run: str, force_N: float, changes: dict[str, Any] | None = None) -> Ma
     return replace(found, pilots={"column": pilot}, rig=rig)
 
 
+@pytest.mark.slow
 def test_flights_in_a_hangar_have_the_bytes_of_flights_without(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
