@@ -183,7 +183,7 @@ def _write_improved(
     for effect in whole.effects:
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
     for setting in whole.settings:
-        moved = f"{100 * (setting.factor - 1):+.2f} %, within what it is set to"
+        moved = f"{100 * (setting.factor - 1):+.2f} %, within its tolerance"
         remark += f"changed: {plain(setting.name)} {moved}\n"
     changes = differences(read_rig(rig_file), whole.improved)
     write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))

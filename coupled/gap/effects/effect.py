@@ -260,7 +260,7 @@ def possible(
         return None
 
 
-def dotted(key: str, control: ControlName) -> str:
+def dotted(key: str, control: str) -> str:
     """Return the key of a rig file for a key of a control, or of the flight."""
     return key if key.startswith("flight.") else f"controls.{control}.{key}"
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from coupled.display import unit_in
+from coupled.gap.effects.effect import dotted
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import Shrink
@@ -133,8 +134,8 @@ def _set(found: Findings) -> str:
     if found.verdict not in ("effect", "mostly"):
         return ""
     numbers = [p for effect in found.effects for p in effect.parameters]
-    said = [f"Set {p.host or f'{p.key} of the rig file'} to {_found(p)}." for p in numbers]
-    return " ".join(said)
+    keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
+    return " ".join(f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True))
 
 
 def _settings(found: Findings) -> str:
@@ -150,8 +151,8 @@ def _settings(found: Findings) -> str:
         ]
         if off:
             said.append(
-                f"The {stage.name} stands at {stage.gap:.3g} floors by its settings,"
-                f" {' and '.join(off)}: within what they are set to."
+                f"The {stage.name} stands at {stage.gap:.3g} floors because of {' and '.join(off)},"
+                " within the tolerance of each, and has no gap."
             )
     return " ".join(said)
 
@@ -251,7 +252,7 @@ def _closes(shrink: Shrink) -> str:
     most = shrink.widest
     if most.closed is None or most.low is None or most.high is None:
         return ""
-    few = "" if most.reliable else ", of too few stretches to rely on"
+    few = "" if most.reliable else ", from too few stretches to rely on"
     ends = f"{100 * most.low:.0f} to {100 * most.high:.0f} %{few}"
     return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
 
