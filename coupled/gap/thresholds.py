@@ -184,6 +184,7 @@ SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dr
 FAINT_GAP = 2.0  # under which the law of dry friction is open: 5 of 67 blind records, seeds 2 to 6
 LAW_GAIN = 12.0  # by which the richer law must win there; the same records
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
+BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again
 NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen
 MOST_EFFECTS = 4  # chosen: effects in one answer
 

@@ -9,7 +9,7 @@ from coupled.gap.effects.library import EFFECTS
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
-from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
+from coupled.gap.thresholds import BEGUN_AT, LEAST_GAIN, RIVAL_GAIN
 
 ORDER = [effect.name for effect in EFFECTS]
 
@@ -27,7 +27,9 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     ranked = ranked_by_gain(case.outputs, current, clear)
     asked = _clear_on_all(case, current, ranked, open_ones)
     if asked:
-        ranked = ranked_by_gain(case.outputs, current, [*clear, *asked])
+        best, fitted = asked[0]
+        anew = (best, _begun_elsewhere(case, best, fitted))
+        ranked = ranked_by_gain(case.outputs, current, [*clear, anew, *asked[1:]])
     if ranked and ranked[0].gain >= LEAST_GAIN:
         return ranked
     single = [one for one in open_ones if len(one[0].free) == 1]
@@ -39,7 +41,10 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
 def _clear_on_all(
     case: Case, current: Fit, clear: Sequence[Candidate], open_ones: Sequence[tuple[Effect, Fit]]
 ) -> list[tuple[Effect, Fit]]:
-    """Return those of the open ones that gain far more, and say something on all of the record."""
+    """Return those of the open ones that gain far more, and say something on all of the record.
+
+    The one that gains most comes first.
+    """
     least = max([LEAST_GAIN, *(one.gain for one in clear)]) + RIVAL_GAIN
     better = [one for one in ranked_by_gain(case.outputs, current, open_ones) if one.gain > least]
     return [
@@ -47,6 +52,21 @@ def _clear_on_all(
         for one in better
         if not says_nothing(case, one.effect, case.fit(one.fit.effects, start=one.fit.values))
     ]
+
+
+def _begun_elsewhere(case: Case, effect: Effect, fitted: Fit) -> Fit:
+    """Return the least of a fit and of those that begin at less and at more than its size.
+
+    An interval that says nothing beside a large gain may be that of a hollow beside the end.
+    """
+    level = next(p for p in effect.free if not p.above)
+    key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
+    starts = [
+        fitted.values | {key: nothing + times * (fitted.values[key] - nothing)}
+        for times in (1.0, *BEGUN_AT)
+    ]
+    fits = [case.fit(fitted.effects, "fitted", start, effect) for start in starts]
+    return min(fits, key=lambda one: one.cost)
 
 
 def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
