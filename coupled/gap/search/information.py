@@ -62,7 +62,7 @@ def _begun_elsewhere(case: Case, effect: Effect, fitted: Fit) -> Fit:
     level = next(p for p in effect.free if not p.above)
     key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
     starts = [
-        fitted.values | {key: nothing + times * (fitted.values[key] - nothing)}
+        {**fitted.values, key: nothing + times * (fitted.values[key] - nothing)}
         for times in (1.0, *BEGUN_AT)
     ]
     fits = [case.fit(fitted.effects, "fitted", start, effect) for start in starts]
