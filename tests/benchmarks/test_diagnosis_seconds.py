@@ -1,7 +1,9 @@
 """What one diagnosis of a 60 s record costs by what is found, in wall and processor seconds.
 
-    COUPLED_BENCHMARKS=keep pytest -m bench tests/benchmarks/test_diagnosis_seconds.py -s
+    OPENBLAS_NUM_THREADS=1 COUPLED_BENCHMARKS=keep \
+        pytest -m bench tests/benchmarks/test_diagnosis_seconds.py -s
 
+with the variable that `coupled` sets for its commands: BLAS's own threads take the other core.
 Each in this process, with its code compiled before, by one thread and by one a core: the answers
 are the same, and the wall seconds of both stand side by side.
 """
