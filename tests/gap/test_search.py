@@ -90,9 +90,11 @@ def test_what_half_a_record_leaves_open_is_asked_on_all_of_it_if_it_gains_far_mo
 ) -> None:
     """Few stretches give an interval hardly any freedom: what foretells the rest is something."""
     gains = {"relaxation": gain, "viscous_damping": 30.0}
-    half = Fit((), {}, {}, {}, (), bench(), 1.0)
+    relaxing = BY_NAME["relaxation"]
+    half = Fit((), {relaxing.value_key(relaxing.free[0]): 100.0}, {}, {}, (), bench(), 1.0)
     found = [(BY_NAME[name], half) for name in gains]
-    case = SimpleNamespace(outputs=[], fit=lambda *_, **__: replace(half, cost=2.0))
+    rig = {"nominal": bench(), "control": "column", "outputs": []}
+    case = SimpleNamespace(**rig, fit=lambda *_, **__: replace(half, cost=2.0))
 
     def ranked(_: object, __: object, some: list[tuple[Effect, Fit]]) -> list[Candidate]:
         each = [Candidate(gains[effect.name], effect, fitted) for effect, fitted in some]
@@ -105,6 +107,24 @@ def test_what_half_a_record_leaves_open_is_asked_on_all_of_it_if_it_gains_far_mo
     monkeypatch.setattr(information, "says_nothing", is_open)
     names = [one.effect.name for one in information.informative(cast(Case, case), half, found)]
     assert names == (["relaxation", "viscous_damping"] if asked else ["viscous_damping"])
+
+
+def test_a_doubtful_fit_begins_again_at_less_and_at_more_than_its_size() -> None:
+    """An oscillator's spring, half too stiff, stood in a hollow; the true one is 0.66 of it."""
+    spring = BY_NAME["cubic_stiffness"]
+    key = spring.value_key(spring.free[0])
+    hollow = Fit((spring,), {key: 6.1e6}, {}, {}, (), bench(), 0.0)
+
+    def fit(_: object, part: str, start: dict[str, float], only: Effect) -> Fit:
+        assert (part, only) == ("fitted", spring)
+        return replace(hollow, values=start, cost=abs(start[key] - 4e6))
+
+    rig = {"nominal": bench(), "control": "column"}
+    case = cast(Case, SimpleNamespace(**rig, fit=fit))
+    found = information._begun_elsewhere(case, spring, hollow)
+    assert found.values[key] == pytest.approx(0.7 * 6.1e6)
+    back = information._begun_elsewhere(case, spring, replace(hollow, values={key: 3.9e6}))
+    assert back.values[key] == pytest.approx(3.9e6)
 
 
 @pytest.mark.parametrize(("breakaway_N", "plain"), [((-7.9, 25.1), True), ((4.2, 5.0), False)])
