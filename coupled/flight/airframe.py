@@ -28,9 +28,9 @@ from coupled.errors import InputError, nearest
 from coupled.flight.everyframe import (
     LATERAL_PROPERTIES,
     LONGITUDINAL_PROPERTIES,
-    Frames,
     Lever,
     PlainAircraft,
+    PlainFrames,
     Read,
     motion_reader,
     plain_frames,
@@ -283,7 +283,7 @@ class JSBSimAirframe:
         """Let a gust rise at this speed from the next step on, beside any wind."""
         self._fdm[GUST_DOWN] = -up_m_per_s / FOOT_m
 
-    def plain_frames(self, placed: Placed) -> Frames | None:
+    def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return what flies it by a rig from frame to frame; None where more acts on it."""
         return None if self._plain is None else plain_frames(self._plain, placed)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Protocol
 
-from coupled.flight.everyframe import Frames
+from coupled.flight.everyframe import PlainFrames
 from coupled.record.channels import BENCH_MOTION, LOAD, WHOLE_MOTION
 from coupled.rig.placed import Placed
 
@@ -22,7 +22,7 @@ class Airframe(Protocol):
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
     safe_altitude_m: float  # above it there is no ground to meet
 
-    def plain_frames(self, placed: Placed) -> Frames | None:
+    def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return what flies it by a rig from frame to frame; None where more acts on it."""
 
     def trouble(self) -> str:
@@ -60,7 +60,7 @@ class Bench:
     def _next(self, commands: tuple[float, float, float], /) -> None:
         self._k += 1
 
-    def plain_frames(self, placed: Placed) -> Frames | None:
+    def plain_frames(self, placed: Placed) -> PlainFrames | None:
         """Return nothing: its frames are taken one by one."""
         return None
 

@@ -48,7 +48,7 @@ class Lever(NamedTuple):
 
 Read = Callable[[], float]
 Write = tuple[Callable[[float], object], float]  # what sets a command, and its value in trim
-Frames = Callable[[int, int], int]
+PlainFrames = Callable[[int, int], int]
 
 
 class Motion(NamedTuple):
@@ -159,7 +159,7 @@ class PlainAircraft(NamedTuple):
     trouble: Callable[[], str]
 
 
-def plain_frames(aircraft: PlainAircraft, placed: Placed) -> Frames | None:
+def plain_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames | None:
     """Return what flies rig and aircraft from a frame up to another, with nothing in between.
 
     It does what `motion_reader`, the rig's frame and `stepper` do, in one loop: to call them
@@ -171,7 +171,7 @@ def plain_frames(aircraft: PlainAircraft, placed: Placed) -> Frames | None:
     return _three_frames(aircraft, placed) if len(aircraft.writes) == 3 else None
 
 
-def _column_frames(aircraft: PlainAircraft, placed: Placed) -> Frames:
+def _column_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
     qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
     ((write, trim),) = aircraft.writes
     run, safe_m, trouble = aircraft.run, aircraft.safe_altitude_m, aircraft.trouble
@@ -201,7 +201,7 @@ def _column_frames(aircraft: PlainAircraft, placed: Placed) -> Frames:
     return fly
 
 
-def _three_frames(aircraft: PlainAircraft, placed: Placed) -> Frames:
+def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
     qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = aircraft.longitudinal
     aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = aircraft.lateral
     (write, trim), (second_write, second_trim), (third_write, third_trim) = aircraft.writes

@@ -20,7 +20,7 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.resources import shipped_runs
-from tests.support.benchmarks import keep, kept_figures
+from tests.support.benchmarks import FRAME_BOUNDS, keep, kept_figures
 from tests.support.runs import shortened
 
 pytestmark = pytest.mark.bench
@@ -46,7 +46,7 @@ def bare_s(scenario: Manoeuvre) -> float:
     return time.thread_time() - start
 
 
-@pytest.mark.parametrize(("controls", "most"), [(1, 1.4), (3, 1.7)])
+@pytest.mark.parametrize(("controls", "most"), FRAME_BOUNDS.items())
 @pytest.mark.parametrize("run", ["pull-up-c172p", "pull-up-737"])
 def test_a_coupled_frame_costs_little_more_than_a_run(run: str, controls: int, most: float) -> None:
     load = os.getloadavg()[0]
