@@ -22,6 +22,7 @@ from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.search.case import Case, Tell
+from coupled.gap.search.contact import allowing_for_contact
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.search import search
 from coupled.gap.signals.counts import as_counted
@@ -82,7 +83,8 @@ def _diagnose(
     ]
     raised = list if baseline is None else baseline.raised
     judged = _outputs(readers, flights := [Flights() for _ in readers])
-    outputs = [output.halved(rig) for output in raised(judged)]
+    halved = (output.halved(rig) for output in raised(judged))
+    outputs = [allowing_for_contact(output, rig, control) for output in halved]
     if not outputs:
         lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
         file = next(iter(records))
@@ -109,7 +111,7 @@ def _diagnose(
     effects = effects_of(case, choice, readers, stages)
     if unsure := doubted(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
-    last = choice.fit
+    last = choice.halves or choice.fit
     fitted = case.fit(last.effects, "fitted", last.values, descent=Descent("own"), near=last)
     floors = floors_of(case, choice)
     budgets = [

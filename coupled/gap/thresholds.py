@@ -149,6 +149,12 @@ MOVED_LEAST = 1e-3  # chosen: floors of such a move, under which they stay
 MISSED_LITTLE = 0.05  # chosen: share of it, up to which they say as much as new ones
 MOVED_LITTLE = 0.02  # floors by which what jumps has moved, under which its slopes stay; by 0.1 one
 # of 24 blind records (seed 101) was led into a hollow
+DAMPING_FIRST = 0.01  # chosen: of a fit's first step,
+DAMPING_NEXT = 0.03  # and of one after a step that gained nothing; chosen
+DAMPED_MORE = 10.0  # chosen: times as much after each more of them,
+REFUSED = 3  # of which so many end a fit, chosen, where they foretold less than this
+JUMPS_HIDE = 0.01  # chosen: of its cost; and
+HOPELESS = 6  # chosen: so many, whatever they foretold
 ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
 SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
 

@@ -52,6 +52,7 @@ CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
 LEAST_N = 1e-9  # friction of bristles that carry none at this load
 FADED = 6.0  # times the speed over which it fades, from which contacts do not damp
+SLIPS_ALL = 1e-9  # of friction, that bristles may lack where all of them slip
 SOLVED = 1e-7  # of the speeds at hand: what a step may still change
 
 
@@ -155,6 +156,17 @@ def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load
     return yielded(p, _slipping(p, load, rate), bent, way)[0]
 
 
+@stage
+def _curvature(p: FrictionParameters, level: float, rate: float, span: float) -> float:
+    """Return half of the most that a yielding contact's force may curve with speed, N·s²/d²."""
+    most = level / p.stiffness
+    curved = p.stiffness * span * span / (6.0 * (1.0 - p.elastic_share) * most)
+    if abs(rate) < FADED * p.stribeck_rate:
+        curved += 2.0 * p.contact_damping / p.stribeck_rate
+        curved += (p.breakaway - p.running) / (p.stribeck_rate * p.stribeck_rate)
+    return curved
+
+
 @seldom
 def yielding_speed(
     p: FrictionParameters,
@@ -173,10 +185,19 @@ def yielding_speed(
     rises with the way, ever less: from the speed that its slope at the start would let, Newton's
     steps run up to u from one side, each a smaller part of the last.
     """
-    spring = p.stiffness * (0.5 * span)
+    level = _slipping(p, load, v)
     free = inertia * v + push - p.stiffness * bent
-    bends = _bending(p, _slipping(p, load, v), bent, free)
+    side = 1.0 if free > 0.0 else -1.0
+    if level - side * p.stiffness * bent <= SLIPS_ALL * level and (
+        p.breakaway <= p.running or abs(v) > FADED * p.stribeck_rate
+    ):
+        u = v + (push - side * level) / inertia
+        if u * side > (0.0 if p.breakaway <= p.running else FADED * p.stribeck_rate):
+            return u, side * level / p.stiffness
+    spring = p.stiffness * (0.5 * span)
+    bends = _bending(p, level, bent, free)
     u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
+    curved = _curvature(p, level, u, span)
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = 0.0
@@ -193,7 +214,8 @@ def yielding_speed(
         u += change
         after += bends * (change * span)
         near, step = SOLVED * (abs(u) + abs(v)), abs(change)
-        if step <= near or step * step <= near * last:  # this one, or the next by their ratio
+        # This one, or the next by their ratio or by how much the force may curve.
+        if step <= near or step * step <= near * last or step * step * curved <= near * slope:
             break
         last = step
     return u, after

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from coupled.gap.search.contact import contact_start
+from coupled.gap.search.contact import allowing_for_contact, contact_start
+from coupled.gap.signals.output import Output
+from coupled.gap.thresholds import GUILTY_FROM, MISMATCH
+from tests.support.rigs import bench
 
 
 @pytest.mark.parametrize("length", [2.3e-5, 1.4e-4, 5e-4])
@@ -28,3 +32,23 @@ def test_a_contact_is_found_between_hollows(length: float, share: float) -> None
 def test_a_contact_stays_within_its_bounds() -> None:
     assert contact_start(lambda length, share: -length - share, 5e-4, 0.95) == (5e-4, 0.95)
     assert contact_start(lambda length, share: length + share, 5e-4, 0.95) == (5e-7, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("stage", "friction_N", "stiffness_N_per_m", "allowed"),
+    [
+        ("loader", 12.0, 0.0, True),
+        ("loader", 12.0, 1e5, False),
+        ("loader", 0.0, 0.0, False),
+        ("linkage", 12.0, 0.0, False),
+    ],
+)
+def test_how_filed_friction_yields_is_known_as_well_as_an_effects_physics(
+    stage: str, friction_N: float, stiffness_N_per_m: float, allowed: bool
+) -> None:
+    """Where the file says how far its friction yields, no more than noise may remain."""
+    key = "controls.column.loader.friction"
+    rig = bench({f"{key}_N": friction_N, f"{key}_stiffness_N_per_m": stiffness_N_per_m})
+    gap = Output(stage, "x", np.full(2400, 21.0), lambda rig: np.zeros(2400), 1.0, 120.0)
+    found = allowing_for_contact(gap, rig, "column")
+    assert found.limit == pytest.approx(1.0 + 20.0 * MISMATCH if allowed else GUILTY_FROM)

@@ -27,9 +27,9 @@ def straight(scaled: Floats, wide: bool = False) -> Floats:
 def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_wide_ones() -> None:
     least = np.linalg.lstsq(LAW, SAID, rcond=None)[0]
     begin = [np.array([1.0, 1.0])]
-    assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=2e-3)
+    assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=5e-3)
     found = Descent("wide").end(straight, begin, ENDS, stepped=True).x
-    assert np.allclose(found, least - [0.3, 0.0], atol=2e-3)
+    assert np.allclose(found, least - [0.3, 0.0], atol=5e-3)
 
 
 def test_of_two_starts_the_one_that_leads_lower_is_kept_whatever_their_order() -> None:

@@ -18,6 +18,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search import choose, information
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import searched
+from coupled.gap.search.descent import End
 from coupled.gap.search.fit import Fit, _half_width, fit
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.information import may_be_plainer, says_nothing
@@ -61,12 +62,12 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     rng = np.random.default_rng(2)
     left = rng.normal(size=FRAMES)
     same = np.ones((FRAMES, 2))
-    found = SimpleNamespace(jac=same, fun=left - left.mean())
+    found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
     groups = np.arange(FRAMES) // 300
     half = _half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]))
     wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
     assert half[0] == pytest.approx(wanted, rel=0.15)
-    alone = _half_width(SimpleNamespace(jac=same[:, :1], fun=left), 1, groups, np.zeros(1))
+    alone = _half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1))
     assert alone[0] < half[0]
 
 
@@ -145,6 +146,34 @@ def test_a_breakaway_no_larger_than_running_friction_is_plain_friction(
     assert may_be_plainer(case, richer, found, BY_NAME[richer.alike.plainer]) is plain
     assert not may_be_plainer(case, richer, found, BY_NAME["inertia"])
     assert not may_be_plainer(case, BY_NAME["inertia"], found, BY_NAME[richer.alike.plainer])
+
+
+@pytest.mark.parametrize(("breakaway_N", "silent"), [((1.37, 3.12), False), ((1.1, 3.12), True)])
+def test_a_breakaway_that_surely_stands_above_running_friction_says_something(
+    breakaway_N: tuple[float, float], silent: bool
+) -> None:
+    """The running friction may be as it is filed: a blind record's was dropped for it."""
+    stribeck = BY_NAME["stribeck_friction"]
+    running, breakaway, fading = (stribeck.value_key(p) for p in stribeck.free)
+    low = {running: -0.05, breakaway: breakaway_N[0], fading: -8e-3}
+    high = {running: 0.62, breakaway: breakaway_N[1], fading: 1.4e-2}
+    rig = bench({"controls.column.loader.friction_N": 1.28})
+    found = Fit((stribeck,), low, low, high, (), rig, 1.0)
+    assert says_nothing(Case(rig, "column", []), stribeck, found) is silent
+
+
+@pytest.mark.parametrize(("changed", "left"), [("flight", 1.0), ("controls", 1.4)])
+def test_what_a_surface_stands_off_may_be_where_another_aircraft_trims(
+    changed: str, left: float
+) -> None:
+    """A blind aircraft (seed 501) of 1.17 of the stiffness in pitch had a rigging offset beside."""
+    rig = nominal_rig(True)
+    keys = {"flight": "flight.pitch_stiffness", "controls": "controls.column.loader.mass_kg"}
+    other = rig.changed({keys[changed]: 1.17})
+    standing, held = output("surface", 1.4), output("surface", 1.0)
+    case = Case(rig, "column", [standing], refloored=lambda one: [held])
+    assert case.gaps(other)["surface"] == pytest.approx(left, rel=0.05)
+    assert case.gaps(rig)["surface"] == pytest.approx(1.4, rel=0.05)
 
 
 @pytest.mark.parametrize(("quiet", "floor"), [(0.3, 0.5), (0.45, 1.0)])

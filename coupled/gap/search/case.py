@@ -78,7 +78,8 @@ class Case:
     def gaps(self, rig: Rig) -> dict[str, float]:
         """Return each stage's gap, by the floors of this rig where they are higher.
 
-        As where a contact that yields lets noise pass that the filed friction would hold.
+        As where a contact that yields lets noise pass that the filed friction would hold. What a
+        surface stands off from the filed aircraft's trim may be where another aircraft trims.
         """
         gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         narrow = all(gap <= limits[stage] for stage, gap in gaps.items())
@@ -92,6 +93,8 @@ class Case:
                 one.floor, hypot(min(one.own, new.own), new.carried) if new.carried else new.floor
             )
             gap = one.gap(rig) * one.floor / floor
+            if one.stage == "surface" and rig.flight != self.nominal.flight:
+                gap = min(gap, new.gap(rig))
             found[one.stage] = max(found.get(one.stage, 0.0), gap)
         return found
 

@@ -20,7 +20,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing
-from coupled.gap.search.twolaws import even_reading, plain_reading, yielding_reading
+from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     FAINT_GAP,
@@ -48,7 +48,8 @@ class Found:
 class Choice:
     """What the search found: its steps, and the final fit on all of the record.
 
-    `settled` has the nominal rig's settings moved within their tolerance, and no effect. A search
+    `settled` has the nominal rig's settings moved within their tolerance, and no effect. `halves`
+    is the fit of the same effects on every other stretch, where the search ended with one. A search
     that `circled` was ended where it came back to effects that it had stood at before.
     """
 
@@ -58,6 +59,7 @@ class Choice:
     tried: dict[str, float] = field(default_factory=dict)  # first round's gains by effect
     rounds: tuple[dict[str, float], ...] = ()  # every round's, the last one's won by none
     circled: bool = False
+    halves: Fit | None = None
 
 
 def searched(case: Case, library: Sequence[Effect]) -> Choice:
@@ -67,7 +69,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     rounds: list[dict[str, float]] = []
     idle: set[str] = set()  # guilty outputs for which nothing was found
     stood: list[set[str]] = [set()]  # the sets of effects that the search has stood at
-    circled = False
+    circled, halves = False, None
     while len(steps) < MOST_EFFECTS:
         ranked = _round(case, settled, current, library, idle)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
@@ -75,14 +77,14 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
             break
         best = _simplest(case, settled, ranked)
         steps.append(_step(case, settled, best, ranked))
-        found = best.fit
+        halves = found = best.fit
         current = case.fit((*current.effects, best.effect), start=found.values, near=found)
         idle -= set(best.effect.shows_in)
-        even = even_reading(current.effects, current.values)
+        even = read_even(case, current)
         if even is not None:
+            read = even[0][len(current.effects) - 1 :]
             current = case.fit(even[0], start=even[1])
-            pair = current.effects[-2:]
-            steps[-1:] = [replace(steps[-1], effect=effect, rivals=()) for effect in pair]
+            steps[-1:] = [replace(steps[-1], effect=effect, rivals=()) for effect in read]
             continue
         needless = _needless(case, current)
         if needless is not None:
@@ -109,7 +111,9 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     if len(steps) > 1:
         steps = [_again(case, settled, current, step) for step in steps]
     tried = next((gains for gains in rounds if gains), {})
-    return Choice(tuple(steps), current, settled, tried, tuple(rounds), circled)
+    if halves is not None and halves.effects != current.effects:
+        halves = None
+    return Choice(tuple(steps), current, settled, tried, tuple(rounds), circled, halves)
 
 
 def _again(case: Case, settled: Fit, current: Fit, step: Found) -> Found:

@@ -3,14 +3,22 @@
 Where a control sticks depends on both, and with each little change it sticks elsewhere: least
 squares stay near where they begin. So a few lengths and shares are tried, and from the best of
 them a pattern search goes on (Hooke and Jeeves, J. ACM 8, 1961), which asks for no slopes.
+
+Of friction that is filed the contact is a setting. How it yields is known no better than the
+physics of a right effect: that part of the gap which a rigid contact leaves may remain.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 
-from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, SEARCHED_TO
+from coupled.gap.effects.settings import contact, is_dry
+from coupled.gap.signals.output import Output
+from coupled.gap.thresholds import ELASTIC_SHARES, LENGTHS, MISMATCH, SEARCHED_TO
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
 
 Left = Callable[[float, float], float]  # what a length, d, and a share leave
 
@@ -39,3 +47,10 @@ def contact_start(left: Left, most: float, most_elastic: float) -> tuple[float, 
         else:
             times, more = times**0.5, 0.5 * more
     return best
+
+
+def allowing_for_contact(output: Output, rig: Rig, control: ControlName) -> Output:
+    """Return an output of the loader with what the law of a contact that yields may leave of it."""
+    if output.stage != "loader" or not is_dry(rig, control) or not contact(rig, control):
+        return output
+    return replace(output, mismatch=MISMATCH * max(output.gap(rig) - 1.0, 0.0))

@@ -13,8 +13,8 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from coupled.gap.search.damped import descend
 from coupled.gap.search.slopes import Ends, Floats, Slope, Slopes
 from coupled.gap.thresholds import (
     ENOUGH,
@@ -131,22 +131,25 @@ class _Search:
     def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
         """Return where they lead from a start, by so many evaluations at most.
 
-        Slopes that were corrected by much are taken anew at the end, and may lead on.
+        Slopes that were corrected by much, or led nowhere, are taken anew at the end, and may lead
+        on: over shorter differences, where more than noise is left.
         """
         slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
         x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
-        until = {"xtol": 1e-4, "ftol": max(1e-5, ENOUGH / max(frames, 1000))}
+        enough = max(1e-5, ENOUGH / max(frames, 1000))
 
         def left(x: Floats) -> Floats:
             return np.asarray(self.residual(x)[self.rows])
 
         while True:
-            found = least_squares(left, x0, slopes, bounds=self.ends, max_nfev=most, **until)
-            most -= found.nfev
-            if slopes.sure or most < 1:
+            found = descend(left, slopes, x0, self.ends, most, enough)
+            most -= found.asked
+            long = slopes.share > 0.0 and not leaves_noise(found.cost, len(found.fun))
+            astray = found.refused and (long or slopes.corrections > 0)
+            if (slopes.sure and not astray) or most < 1:
                 break
-            slopes.renew()
+            slopes.renew(share=0.0 if found.refused else slopes.share)
             x0 = found.x
-        known = None if slopes.last is None else slopes.last.kept()
-        return End(found.x, float(found.cost), found.fun, found.jac, known)
+        known = None if slopes.last is None or astray else slopes.last.kept()
+        return End(found.x, found.cost, found.fun, found.jac, known)

@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from coupled.gap.effects.effect import Effect, Parameter, possible
-from coupled.gap.search.descent import WHOLE, Descent
+from coupled.gap.search.descent import WHOLE, Descent, End
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.thresholds import LEAST_GAIN
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -211,6 +211,8 @@ def _fit(
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
     stuck &= ~np.array([p.may_end for p in frees]) & ~gone
+    # A setting may well stand at its end where little would be gained beyond.
+    stuck &= (known == 0.0) | (_beyond(best, len(ours)) >= LEAST_GAIN)
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),
@@ -227,7 +229,7 @@ def _scale(p: Parameter) -> float:
     return max(abs(start) for start in p.starts) or 0.5 * (p.high - p.low)
 
 
-def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:
+def _half_width(found: End, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
 
     The larger of two: white residuals widened by their memory, and the scatter of the score from
@@ -235,9 +237,7 @@ def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Float
     known beforehand, 1/variance: of a setting, that it is anywhere within its tolerance.
     """
     jacobian, left = found.jac, found.fun
-    rows = len(left) // outputs
-    widen = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
-    variance = max(float(np.mean(left**2)), 1e-12)
+    variance, widen = _counted(left, outputs)
     before = np.diag(known)
     plain = np.linalg.pinv(jacobian.T @ jacobian / (variance * widen) + before)
     bread = np.linalg.pinv(jacobian.T @ jacobian / variance + before)
@@ -251,6 +251,24 @@ def _half_width(found: Any, outputs: int, groups: NDArray[np.intp], known: Float
     half = student.ppf(0.975, freedom) * np.sqrt(square)
     half[(np.linalg.norm(jacobian, axis=0) < 1e-9) & (known == 0.0)] = np.inf
     return np.asarray(half)
+
+
+def _beyond(found: End, outputs: int) -> Floats:
+    """Return the log-likelihood that each scaled number would gain beyond, by its slopes.
+
+    All the others go along, and the residual counts by its memory.
+    """
+    square, memories = _counted(found.fun, outputs)
+    downhill = found.jac.T @ found.fun
+    loose = np.diag(np.linalg.pinv(found.jac.T @ found.jac))
+    return np.asarray(0.5 * downhill**2 * loose / (square * memories))
+
+
+def _counted(left: Floats, outputs: int) -> tuple[float, float]:
+    """Return a residual's mean square, and the most frames that count as one."""
+    rows = len(left) // outputs
+    memories = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
+    return max(float(np.mean(left**2)), 1e-12), memories
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:

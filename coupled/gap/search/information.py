@@ -73,7 +73,8 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     """Tell whether an effect's interval holds the size at which it does nothing.
 
     By its first number, the level; the others shape it. Of a limit, none is no size. A number that
-    counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed.
+    counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed;
+    where a breakaway surely stands above the running friction, that may be as it is filed, too.
     """
     level = next((p for p in effect.free if not p.above), None)
     if level is None or level.inverse:
@@ -81,7 +82,18 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
     if key not in fitted.low:
         return False
+    if any(_stands_above(case, effect, fitted)):
+        return False
     return fitted.low[key] <= nothing <= fitted.high[key]
+
+
+def _stands_above(case: Case, effect: Effect, fitted: Fit) -> list[bool]:
+    """Tell of each number that stands above another of the rig whether it surely does."""
+    return [
+        fitted.low[effect.value_key(p)] > value_of(fitted.rig, case.control, p.above)
+        for p in effect.free
+        if p.above
+    ]
 
 
 def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
@@ -92,8 +104,4 @@ def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> 
     """
     if richer.alike is None or richer.alike.plainer != plainer.name:
         return False
-    return any(
-        fitted.low[richer.value_key(p)] <= value_of(fitted.rig, case.control, p.above)
-        for p in richer.free
-        if p.above
-    )
+    return not all(_stands_above(case, richer, fitted))

@@ -4,7 +4,7 @@ Dry friction of a with the pull and b with the push is friction of (a + b)/2 wit
 force of (b − a)/2 beside it, moving and at rest alike: no record of force and deflection
 separates them, and one reading is given. Where one direction has less than twice the friction of
 the other it is the even one with an offset, which a bearing with an amplifier's zero has; where it
-has more, friction by direction.
+has more, friction by direction. An offset is none that is less than friction is known by.
 
 Where nothing bends, a force that is felt late is one that is stamped early: the first is named,
 which a machine has more often, and the other beside it.
@@ -17,23 +17,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.effects.effect import FRICTION, Effect, value_of
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate
-from coupled.gap.thresholds import RIVAL_GAIN, YIELDED
+from coupled.gap.thresholds import MODEL_ERROR, RIVAL_GAIN, YIELDED
 
 UNEVEN = 2.0  # times the other direction's friction
 
 
+def read_even(case: Case, found: Fit) -> tuple[tuple[Effect, ...], dict[str, float]] | None:
+    """Return a fit's effects and values by `even_reading`, on a rig with its own friction."""
+    filed = float(value_of(case.nominal, case.control, FRICTION))
+    return even_reading(found.effects, found.values, filed)
+
+
 def even_reading(
-    effects: tuple[Effect, ...], values: Mapping[str, float]
+    effects: tuple[Effect, ...], values: Mapping[str, float], filed: float = 0.0
 ) -> tuple[tuple[Effect, ...], dict[str, float]] | None:
     """Return effects and values with friction by direction read as even friction and an offset.
 
     The last effect is read so. None where it is no such friction, where it is uneven indeed, or
-    where one of the two is named already. Values in N.
+    where one of the two is named already. Values in N; `filed` is the friction that the rig has.
     """
     *others, uneven = effects
     if uneven.even is None or {effect.name for effect in others} & set(uneven.even):
@@ -42,10 +48,13 @@ def even_reading(
     if max(pull, push) >= UNEVEN * min(pull, push):
         return None
     even, offset = (BY_NAME[name] for name in uneven.even)
+    level, zero = 0.5 * (pull + push), 0.5 * (push - pull)
     gone = {uneven.value_key(number) for number in uneven.free}
     read = {key: value for key, value in values.items() if key not in gone}
-    read[even.value_key(even.free[0])] = 0.5 * (pull + push)
-    read[offset.value_key(offset.free[0])] = 0.5 * (push - pull)
+    read[even.value_key(even.free[0])] = level
+    if abs(zero) < MODEL_ERROR * (filed + level):
+        return (*others, even), read
+    read[offset.value_key(offset.free[0])] = zero
     return (*others, even, offset), read
 
 

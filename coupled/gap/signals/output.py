@@ -83,7 +83,7 @@ class Output:
     `record` numbers the record that it is of; `held` are the frames held out from fits, without
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
     One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
-    that wider ones hardly change.
+    that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
     """
 
     stage: str
@@ -99,6 +99,7 @@ class Output:
     held: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     stepped: bool = False
+    mismatch: float = 0.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
@@ -168,7 +169,8 @@ class Output:
     @property
     def limit(self) -> float:
         """The gap up to which noise may be all there is."""
-        return max(GUILTY_FROM, 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed)
+        noise = 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
+        return max(GUILTY_FROM, noise, 1.0 + self.mismatch)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
