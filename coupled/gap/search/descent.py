@@ -146,10 +146,10 @@ class _Search:
             found = descend(left, slopes, x0, self.ends, most, enough)
             most -= found.asked
             long = slopes.share > 0.0 and not leaves_noise(found.cost, len(found.fun))
-            astray = found.refused and (long or slopes.corrections > 0)
-            if (slopes.sure and not astray) or most < 1:
+            misled = found.refused and (long or slopes.corrections > 0)
+            if (slopes.sure and not misled) or most < 1:
                 break
             slopes.renew(share=0.0 if found.refused else slopes.share)
             x0 = found.x
-        known = None if slopes.last is None or astray else slopes.last.kept()
+        known = None if slopes.last is None or misled else slopes.last.kept()
         return End(found.x, found.cost, found.fun, found.jac, known)
