@@ -148,18 +148,22 @@ def test_a_breakaway_no_larger_than_running_friction_is_plain_friction(
     assert not may_be_plainer(case, BY_NAME["inertia"], found, BY_NAME[richer.alike.plainer])
 
 
-@pytest.mark.parametrize(("breakaway_N", "silent"), [((1.37, 3.12), False), ((1.1, 3.12), True)])
+@pytest.mark.parametrize(
+    ("filed_N", "breakaway_N", "silent"),
+    [(1.28, (1.37, 3.12), False), (1.28, (1.1, 3.12), True), (0.0, (1.37, 3.12), True)],
+)
 def test_a_breakaway_that_surely_stands_above_running_friction_says_something(
-    breakaway_N: tuple[float, float], silent: bool
+    filed_N: float, breakaway_N: tuple[float, float], silent: bool
 ) -> None:
-    """The running friction may be as it is filed: a blind record's was dropped for it."""
+    """The running friction may be as it is filed, but where none is, it is not nothing."""
     stribeck = BY_NAME["stribeck_friction"]
     running, breakaway, fading = (stribeck.value_key(p) for p in stribeck.free)
     low = {running: -0.05, breakaway: breakaway_N[0], fading: -8e-3}
     high = {running: 0.62, breakaway: breakaway_N[1], fading: 1.4e-2}
     rig = bench({"controls.column.loader.friction_N": 1.28})
+    filed = bench({"controls.column.loader.friction_N": filed_N})
     found = Fit((stribeck,), low, low, high, (), rig, 1.0)
-    assert says_nothing(Case(rig, "column", []), stribeck, found) is silent
+    assert says_nothing(Case(filed, "column", []), stribeck, found) is silent
 
 
 @pytest.mark.parametrize(("changed", "left"), [("flight", 1.0), ("controls", 1.4)])

@@ -131,8 +131,8 @@ class _Search:
     def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
         """Return where they lead from a start, by so many evaluations at most.
 
-        Slopes that were corrected by much, or led nowhere, are taken anew at the end, and may lead
-        on: over shorter differences, where more than noise is left.
+        Slopes that were corrected by much, or corrected and led nowhere, are taken anew at the end,
+        and may lead on.
         """
         slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
         x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
@@ -145,11 +145,10 @@ class _Search:
         while True:
             found = descend(left, slopes, x0, self.ends, most, enough)
             most -= found.asked
-            long = slopes.share > 0.0 and not leaves_noise(found.cost, len(found.fun))
-            misled = found.refused and (long or slopes.corrections > 0)
+            misled = found.refused and slopes.corrections > 0
             if (slopes.sure and not misled) or most < 1:
                 break
-            slopes.renew(share=0.0 if found.refused else slopes.share)
+            slopes.renew()
             x0 = found.x
         known = None if slopes.last is None or misled else slopes.last.kept()
         return End(found.x, found.cost, found.fun, found.jac, known)

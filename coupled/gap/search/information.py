@@ -74,7 +74,7 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
 
     By its first number, the level; the others shape it. Of a limit, none is no size. A number that
     counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed;
-    where a breakaway surely stands above the running friction, that may be as it is filed, too.
+    where a breakaway surely stands above the running friction, what is filed of that may be right.
     """
     level = next((p for p in effect.free if not p.above), None)
     if level is None or level.inverse:
@@ -82,7 +82,8 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     key, nothing = effect.value_key(level), level.neutral(case.nominal, case.control)
     if key not in fitted.low:
         return False
-    if any(_stands_above(case, effect, fitted)):
+    filed = float(value_of(case.nominal, case.control, level.key)) > 0.0
+    if filed and any(_stands_above(case, effect, fitted)):
         return False
     return fitted.low[key] <= nothing <= fitted.high[key]
 

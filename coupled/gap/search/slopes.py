@@ -65,7 +65,7 @@ class Slopes:
         last: Slope | None = None,
         smooth: bool = False,
     ) -> None:
-        self._residual, self._rows, self.share = residual, rows, share
+        self._residual, self._rows, self._share = residual, rows, share
         self._smooth = smooth
         self._low, self._high = ends
         self._step = np.full(len(self._low), 0.01)
@@ -83,9 +83,9 @@ class Slopes:
             self.sure = True
         return np.asarray(jacobian[self._rows])
 
-    def renew(self, share: float) -> None:
-        """Forget what was known, so that differences over another share are taken next."""
-        self.last, self.share = None, share
+    def renew(self) -> None:
+        """Forget what was known, so that differences are taken next."""
+        self.last = None
 
     def _still_good(self, x: Floats, here: Floats) -> Floats | None:
         """Return the slopes by what was known last; None where that says too little."""
@@ -106,7 +106,7 @@ class Slopes:
         return self.last.jacobian
 
     def _differences(self, x: Floats, here: Floats) -> Floats:
-        wanted = max(DIFFERENCE, self.share * _rms(here[self._rows]))
+        wanted = max(DIFFERENCE, self._share * _rms(here[self._rows]))
 
         def column(i: int) -> Floats:
             value = x[i]
