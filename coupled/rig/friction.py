@@ -157,14 +157,20 @@ def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load
 
 
 @stage
-def _curvature(p: FrictionParameters, level: float, rate: float, span: float) -> float:
-    """Return half of the most that a yielding contact's force may curve with speed, N·s²/d²."""
+def _curvatures(
+    p: FrictionParameters, level: float, rate: float, span: float
+) -> tuple[float, float]:
+    """Return half of the most that a yielding contact may curve with speed, N·s²/d².
+
+    Of its mean force over the way, and of what it carries at the end.
+    """
     most = level / p.stiffness
-    curved = p.stiffness * span * span / (6.0 * (1.0 - p.elastic_share) * most)
+    bowed = 0.5 * p.stiffness * span * span / ((1.0 - p.elastic_share) * most)
+    curved = bowed / 3.0
     if abs(rate) < FADED * p.stribeck_rate:
         curved += 2.0 * p.contact_damping / p.stribeck_rate
         curved += (p.breakaway - p.running) / (p.stribeck_rate * p.stribeck_rate)
-    return curved
+    return curved, bowed
 
 
 @seldom
@@ -197,7 +203,7 @@ def yielding_speed(
     spring = p.stiffness * (0.5 * span)
     bends = _bending(p, level, bent, free)
     u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
-    curved = _curvature(p, level, u, span)
+    curved, bowed = _curvatures(p, level, u, span)
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = 0.0
@@ -214,8 +220,10 @@ def yielding_speed(
         u += change
         after += bends * (change * span)
         near, step = SOLVED * (abs(u) + abs(v)), abs(change)
-        # This one, or the next by their ratio or by how much the force may curve.
-        if step <= near or step * step <= near * last or step * step * curved <= near * slope:
+        # This one, or the next by their ratio, or by how much force and bend may curve.
+        if step <= near or step * step <= near * last:
+            break
+        if step * step * curved <= near * slope and step * step * bowed <= SOLVED * level:
             break
         last = step
     return u, after

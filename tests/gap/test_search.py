@@ -71,6 +71,28 @@ def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
     assert alone[0] < half[0]
 
 
+@pytest.mark.parametrize(("size", "strained"), [(0.3, False), (300.0, True)])
+def test_a_setting_strains_its_end_only_where_going_on_would_gain(
+    size: float, strained: bool
+) -> None:
+    """A mass is 1.025 times the filed one, and known to 1.02: it matters where it shows."""
+    rng = np.random.default_rng(6)
+    shape, noise = rng.normal(size=FRAMES), rng.normal(size=FRAMES)
+    rig = bench()
+
+    def moved(one: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        mass = one.controls["column"].loader.mass / rig.controls["column"].loader.mass
+        return size * (mass - 1.0) * shape
+
+    measured = size * 0.025 * shape + noise
+    case = Case(rig, "column", [Output("loader", "x", measured, moved, 1.0, 120.0)])
+    mass = case.known["inertia"]
+    found = fit(rig, "column", case.outputs, [], [mass])
+    key = mass.value_key(mass.free[0])
+    assert found.values[key] == pytest.approx(1.02, abs=1e-3 if strained else 0.05)
+    assert (key in found.at_bound) is strained
+
+
 @pytest.mark.parametrize(("share", "silent"), [((0.66, 0.81), False), ((-0.1, 0.4), True)])
 def test_a_loop_may_leave_the_bend_as_it_is_filed(share: tuple[float, float], silent: bool) -> None:
     """The interval of a hysteresis' bend holds what is filed: its share says that it is there."""

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from coupled.rig.friction import yielded
+from coupled.rig.friction import SLIPS_ALL, running_friction, yielded, yielding_speed
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
 from tests.support.rigs import bench, push
@@ -73,6 +75,33 @@ def test_a_closed_loop_loses_what_its_branches_enclose(amplitude: float) -> None
     assert loss == pytest.approx(2.0 * STIFFNESS * (straight + curved), rel=1e-4)
     if amplitude >= 200.0:  # Coulomb's loop, but for what the contact gives back
         assert loss == pytest.approx(4.0 * FRICTION_N * a, rel=0.01)
+
+
+@given(
+    st.floats(-1.0, 1.0),
+    st.floats(-0.3, 0.3),
+    st.floats(-300.0, 300.0),
+    st.sampled_from([5e-4, 1e-3]),
+    st.sampled_from([0.0, 3.0]),
+)
+@example(1.0, 0.2, 30.0, 5e-4, 0.0)  # all of it slips, and goes on
+@example(1.0 - 0.5 * SLIPS_ALL, 0.2, 30.0, 5e-4, 3.0)
+@example(-1.0, 0.01, -10.0, 1e-3, 3.0)  # turned about
+def test_a_steps_speed_balances_its_forces(
+    bent: float, rate: float, push_N: float, span: float, more_N: float
+) -> None:
+    """inertia·(u − v) and the contact's mean force over the way make up the push, at any speed."""
+    breakaway = {"breakaway_N": FRICTION_N + more_N} if more_N else {}
+    p = pack(bench({**YIELDS, **breakaway}))[0]["parameters"]["friction"]
+    inertia = 2.0 * 4.0 / span
+    start = bent * float(running_friction(p, rate)) / STIFFNESS
+    u, after = yielding_speed(p, start, rate, push_N, inertia, span, 0.0)
+    ends, mean = yielded(p, running_friction(p, u), start, u * span)
+    fading = math.exp(-((u / p["stribeck_rate"]) ** 2))
+    force = STIFFNESS * mean + p["contact_damping"] * fading * (ends - start) / span
+    speeds = abs(u) + abs(rate)
+    assert inertia * (u - rate) + force == pytest.approx(push_N, abs=1e-6 * inertia * speeds + 1e-9)
+    assert after == pytest.approx(ends, abs=1e-6 * TRAVEL_m)
 
 
 def test_a_small_force_is_held_by_spring_and_contact_together() -> None:
