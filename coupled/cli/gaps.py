@@ -174,7 +174,7 @@ def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
     from coupled.files import read_text
-    from coupled.gap.findings.summary import change, plain
+    from coupled.gap.findings.summary import change
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
 
@@ -182,9 +182,8 @@ def _write_improved(
     remark = f"{shown(rig_file.name)} with what was found in {names}:\n{whole.summary}\n"
     for effect in whole.effects:
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
-    for setting in whole.settings:
-        moved = f"{100 * (setting.factor - 1):+.2f} %, within its tolerance"
-        remark += f"changed: {plain(setting.name)} {moved}\n"
+    for setting in (one for one in whole.settings if one.moved):
+        remark += f"changed: {setting.words}, within its tolerance\n"
     changes = differences(read_rig(rig_file), whole.improved)
     write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))
 

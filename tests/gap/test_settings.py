@@ -10,6 +10,7 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import contact, settings
+from coupled.gap.findings.result import SettingResult
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
 
@@ -61,3 +62,24 @@ def test_a_filed_friction_that_yields_before_it_slips_is_no_gap(tmp_path: Path) 
     assert loader.gap is not None and loader.gap > 2.0  # as filed, it slips at once
     yields = found.improved.controls["column"].loader.friction_stiffness
     assert yields == pytest.approx(1e4, rel=0.15)  # its share walks with it
+    length_m = found.as_dict()["friction_yields_m"]
+    assert length_m == pytest.approx(1.5 / yields)
+    assert f"friction that yields by {1e3 * length_m:.2g} mm before it slips" in found.summary
+
+
+@pytest.mark.parametrize(
+    ("result", "moved", "words"),
+    [
+        (SettingResult("damping", "loader", 1.0149), True, "damping +1.5 %"),
+        (SettingResult("servo_frequency", "linkage", 0.9996), False, "servo frequency -0.0 %"),
+        (
+            SettingResult("friction_yields_rad", "loader", yields=2.34e-3),
+            True,
+            "friction that yields by 2.3 mrad before it slips",
+        ),
+    ],
+)
+def test_a_setting_says_what_it_was_found_to_be(
+    result: SettingResult, moved: bool, words: str
+) -> None:
+    assert (result.moved, result.words) == (moved, words)

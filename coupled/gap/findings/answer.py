@@ -9,7 +9,7 @@ import numpy as np
 
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect, Parameter, field_of
-from coupled.gap.effects.settings import settings
+from coupled.gap.effects.settings import contact, is_dry, settings
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import credibility
 from coupled.gap.findings.result import (
@@ -25,7 +25,7 @@ from coupled.gap.search.choose import Choice, Found
 from coupled.gap.search.courses import course_in
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE
-from coupled.record.channels import ControlName
+from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -80,6 +80,10 @@ def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[Setting
                 factor = float(p.entered(filed, value) / filed)
                 name = field_of(rig, control, p.key)
                 found.append(SettingResult(name, setting.stage, factor))
+    length = next((one.value_key(one.free[0]) for one in contact(rig, control)), "")
+    if is_dry(rig, control) and length in choice.fit.values:
+        name = f"friction_yields_{unit_of(control)}"
+        found.append(SettingResult(name, "loader", yields=choice.fit.values[length]))
     return tuple(found)
 
 

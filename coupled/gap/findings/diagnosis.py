@@ -115,8 +115,9 @@ class Diagnosis(Findings):
             "budget": {one.stage: one.as_dict() for one in self.budget},
             "budget_95": {one.stage: one.intervals() for one in self.budget},
             "shrink": self.shrink.as_dict(),
-            "settings": {setting.name: setting.factor for setting in self.settings},
+            "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
+        found |= {one.name: one.yields for one in self.settings if one.yields is not None}
         if self.choice.circled:
             found["circled"] = True
         if self.filtered:

@@ -154,11 +154,28 @@ class EffectResult:
 
 @dataclass(frozen=True)
 class SettingResult:
-    """What a setting of the nominal rig was found to be, over its nominal value."""
+    """What a setting of the nominal rig was found to be, over its nominal value.
+
+    Of filed friction, by how much it `yields` before it slips, m or rad, where the file says none.
+    """
 
     name: str
     stage: str
-    factor: float
+    factor: float = 1.0
+    yields: float | None = None
+
+    @property
+    def moved(self) -> bool:
+        """Whether it is off by what its words show."""
+        return self.yields is not None or abs(self.factor - 1.0) >= 5e-4
+
+    @property
+    def words(self) -> str:
+        """What it is, in words."""
+        if self.yields is None:
+            return f"{self.name.replace('_', ' ')} {100 * (self.factor - 1):+.1f} %"
+        unit = "mrad" if self.name.endswith("rad") else "mm"
+        return f"friction that yields by {1e3 * self.yields:.2g} {unit} before it slips"
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import dotted
@@ -144,17 +144,19 @@ def _settings(found: Findings) -> str:
     for stage in found.stages:
         if not stage.within_settings:
             continue
-        off = [
-            f"{plain(setting.name)} {100 * (setting.factor - 1):+.1f} %"
-            for setting in found.settings
-            if setting.stage == stage.name
-        ]
+        off = [one.words for one in found.settings if one.stage == stage.name and one.moved]
         if off:
             said.append(
-                f"The {stage.name} stands at {stage.gap:.3g} floors because of {' and '.join(off)},"
+                f"The {stage.name} stands at {stage.gap:.3g} floors because of {_joined(off)},"
                 " within the tolerance of each, and has no gap."
             )
     return " ".join(said)
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Return some words as one writes them: a, b and c."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _since(found: Findings) -> str:
