@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from coupled.gap.search.damped import descend
-from coupled.gap.thresholds import REFUSED
 
 Floats = NDArray[np.float64]
 RNG = np.random.default_rng(11)
@@ -74,7 +73,21 @@ def test_among_jumps_a_fit_ends_after_few_steps_that_bring_nothing(jump: float) 
     found = descend(residual, lambda x: law, np.array([5.0, -5.0]), WIDE, most=40, enough=1e-8)
     least = np.linalg.lstsq(law, noise, rcond=None)[0]
     assert found.x == pytest.approx(least, abs=0.03)
-    assert found.asked == len(asked) <= 8 + REFUSED
+    assert found.asked == len(asked) <= 9
+
+
+def test_where_each_place_nearby_is_worse_three_steps_end_a_fit() -> None:
+    """A little is foretold, and none of it comes: what stands there is held by a jump."""
+    law, first = RNG.normal(size=(500, 2)), np.array([0.02, 0.01])
+    noise = RNG.normal(size=500)
+
+    def residual(x: Floats) -> Floats:
+        return np.append(law @ x - noise, 0.0 if np.array_equal(x, first) else 9.0)
+
+    found = descend(residual, lambda x: np.vstack((law, [0.0, 0.0])), first, WIDE, 40, 1e-12)
+    assert found.refused
+    assert np.array_equal(found.x, first)
+    assert found.asked == 1 + 3
 
 
 def test_no_more_is_asked_than_allowed() -> None:
