@@ -155,6 +155,7 @@ DAMPED_MORE = 10.0  # chosen: times as much after each more of them,
 REFUSED = 3  # of which so many end a fit, chosen, where they foretold less than this
 JUMPS_HIDE = 0.01  # chosen: of its cost; and
 HOPELESS = 6  # chosen: so many, whatever they foretold
+REACHED = 0.75  # chosen: of what a step foretold, from which the next may be twice as long
 ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
 SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
 

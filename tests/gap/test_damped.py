@@ -90,6 +90,24 @@ def test_where_each_place_nearby_is_worse_three_steps_end_a_fit() -> None:
     assert found.asked == 1 + 3
 
 
+@pytest.mark.parametrize("start", [0.3, 3.0])
+def test_a_limit_is_found_from_where_it_does_too_much_and_from_where_it_does_little(
+    start: float,
+) -> None:
+    """What stiffens goes by 1/limit²: slopes at a small one lead far beyond where it matters."""
+    shape = np.random.default_rng(3).normal(size=400)
+    ends = (np.array([0.01]), np.array([50.0]))
+    found = descend(
+        lambda x: 20.0 * (x[0] ** -2.0 - 1.0) * shape,
+        lambda x: (-40.0 * x[0] ** -3.0 * shape)[:, None],
+        np.array([start]),
+        ends,
+        most=40,
+        enough=1e-6,
+    )
+    assert found.x[0] == pytest.approx(1.0, rel=1e-2)
+
+
 def test_no_more_is_asked_than_allowed() -> None:
     found = descend(
         lambda x: np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]),

@@ -188,6 +188,21 @@ def test_a_breakaway_that_surely_stands_above_running_friction_says_something(
     assert says_nothing(Case(filed, "column", []), stribeck, found) is silent
 
 
+@pytest.mark.parametrize(
+    ("filed", "limit_m", "silent"),
+    [(9e-5, (0.0155, 0.0166), False), (9e-5, (-3.0, 5.0), True), (0.0, (0.0155, 0.0166), True)],
+)
+def test_a_bend_that_surely_stiffens_may_begin_as_it_is_filed(
+    filed: float, limit_m: tuple[float, float], silent: bool
+) -> None:
+    stiffening = BY_NAME["stiffening_bend"]
+    bend, limit = (stiffening.value_key(p) for p in stiffening.free)
+    low, high = {bend: -1e-6, limit: limit_m[0]}, {bend: 9.2e-5, limit: limit_m[1]}
+    rig = bench({"bend_m_per_N": filed, "controls.column.compensation.bend_m_per_N": filed})
+    found = Fit((stiffening,), low, low, high, (), rig, 1.0)
+    assert says_nothing(Case(rig, "column", []), stiffening, found) is silent
+
+
 @pytest.mark.parametrize(("changed", "left"), [("flight", 1.0), ("controls", 1.4)])
 def test_what_a_surface_stands_off_may_be_where_another_aircraft_trims(
     changed: str, left: float

@@ -22,6 +22,7 @@ from coupled.gap.thresholds import (
     DAMPING_NEXT,
     HOPELESS,
     JUMPS_HIDE,
+    REACHED,
     REFUSED,
 )
 
@@ -61,9 +62,12 @@ def descend(
     left, jacobian = residual(x), slopes(x)
     cost, asked = 0.5 * float(left @ left), 1
     damping, refused = DAMPING_FIRST, 0
+    # Slopes lead far beyond where a limit or a play stops to matter, and none leads back.
+    reach = max(float(np.linalg.norm(x)), 1.0)
     scale = np.linalg.norm(jacobian, axis=0)
     while asked < most:
-        step, foretold = _step(jacobian, left, x, ends, damping, scale)
+        near = np.maximum(ends[0], x - reach), np.minimum(ends[1], x + reach)
+        step, foretold = _step(jacobian, left, x, near, damping, scale)
         if foretold <= enough * cost:
             break
         there = np.clip(x + step, *ends)
@@ -81,7 +85,7 @@ def descend(
         x, left, cost, jacobian = there, other, reached, slopes(there)
         scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
         damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
-        refused = 0
+        reach, refused = 2.0 * reach if gain > REACHED else reach, 0
         if little:
             break
     return Reached(x, cost, left, jacobian, asked, refused > 0)

@@ -74,7 +74,8 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
 
     By its first number, the level; the others shape it. Of a limit, none is no size. A number that
     counts from another of the rig, as the bend of what has hysteresis, may well be as it is filed;
-    where a breakaway surely stands above the running friction, what is filed of that may be right.
+    where a breakaway surely stands above the running friction, or a limit is surely one, what is
+    filed of the level may be right.
     """
     level = next((p for p in effect.free if not p.above), None)
     if level is None or level.inverse:
@@ -83,7 +84,7 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     if key not in fitted.low:
         return False
     filed = float(value_of(case.nominal, case.control, level.key)) > 0.0
-    if filed and any(_stands_above(case, effect, fitted)):
+    if filed and any([*_stands_above(case, effect, fitted), *_limits(effect, fitted)]):
         return False
     return fitted.low[key] <= nothing <= fitted.high[key]
 
@@ -95,6 +96,12 @@ def _stands_above(case: Case, effect: Effect, fitted: Fit) -> list[bool]:
         for p in effect.free
         if p.above
     ]
+
+
+def _limits(effect: Effect, fitted: Fit) -> list[bool]:
+    """Tell of each limit whether it is one: its interval lies between its bounds."""
+    limits = [(p, effect.value_key(p)) for p in effect.free if p.inverse]
+    return [p.low < fitted.low[key] and fitted.high[key] < p.high for p, key in limits]
 
 
 def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
