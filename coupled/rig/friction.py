@@ -157,20 +157,14 @@ def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load
 
 
 @stage
-def _curvatures(
-    p: FrictionParameters, level: float, rate: float, span: float
-) -> tuple[float, float]:
-    """Return half of the most that a yielding contact may curve with speed, N·s²/d².
+def _curvatures(p: FrictionParameters, level: float, span: float) -> tuple[float, float]:
+    """Return half of the most that a yielding contact curves with speed, N·s²/d², beyond fading.
 
     Of its mean force over the way, and of what it carries at the end.
     """
     most = level / p.stiffness
     bowed = 0.5 * p.stiffness * span * span / ((1.0 - p.elastic_share) * most)
-    curved = bowed / 3.0
-    if abs(rate) < FADED * p.stribeck_rate:
-        curved += 2.0 * p.contact_damping / p.stribeck_rate
-        curved += (p.breakaway - p.running) / (p.stribeck_rate * p.stribeck_rate)
-    return curved, bowed
+    return bowed / 3.0, bowed
 
 
 @seldom
@@ -203,7 +197,8 @@ def yielding_speed(
     spring = p.stiffness * (0.5 * span)
     bends = _bending(p, level, bent, free)
     u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
-    curved, bowed = _curvatures(p, level, u, span)
+    curved, bowed = _curvatures(p, level, span)
+    faded = FADED * p.stribeck_rate
     for _ in range(NEWTON_STEPS):
         level, fading = _slipping(p, load, u), u / p.stribeck_rate
         damping = 0.0
@@ -223,8 +218,10 @@ def yielding_speed(
         # This one, or the next by their ratio, or by how much force and bend may curve.
         if step <= near or step * step <= near * last:
             break
-        if step * step * curved <= near * slope and step * step * bowed <= SOLVED * level:
-            break
+        if min(abs(u), abs(v)) > faded:  # else the slope lacks how damping and level fade
+            square = step * step
+            if square * curved <= near * slope and square * bowed <= SOLVED * level:
+                break
         last = step
     return u, after
 

@@ -87,6 +87,7 @@ def test_a_closed_loop_loses_what_its_branches_enclose(amplitude: float) -> None
 @example(1.0, 0.2, 30.0, 5e-4, 0.0)  # all of it slips, and goes on
 @example(1.0 - 0.5 * SLIPS_ALL, 0.2, 30.0, 5e-4, 3.0)
 @example(-1.0, 0.01, -10.0, 1e-3, 3.0)  # turned about
+@example(1.0, 0.0, 53.0, 5e-4, 3.0)  # from its breakaway
 def test_a_steps_speed_balances_its_forces(
     bent: float, rate: float, push_N: float, span: float, more_N: float
 ) -> None:
