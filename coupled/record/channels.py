@@ -8,6 +8,7 @@ sensors hold what is read; `hand_force` is what the pilot feels, whatever the ga
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Literal
 
 from coupled.errors import InputError
@@ -93,6 +94,7 @@ def motion_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:
     return LONGITUDINAL + (LATERAL if set(controls) - {"column"} else ())
 
 
+@cache
 def control_channels(control: str) -> tuple[str, ...]:
     """Return the channels of one control, in the kernel's order."""
     return tuple(f"{control}_{name.format(d=unit_of(control))}" for name in _CONTROL)

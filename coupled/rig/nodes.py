@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
+from coupled.rig.compiled import long_entry
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -39,7 +39,34 @@ class Nodes:
 @lru_cache(maxsize=8)
 def _on_nodes(samples: bytes, substeps: int) -> Floats:
     values = np.frombuffer(samples)
-    cubic, square, slope, start = CubicSpline(np.arange(len(values)), values).c[:, :, None]
-    share = np.arange(substeps) / substeps
-    inner = ((cubic * share + square) * share + slope) * share + start
-    return np.append(inner, values[-1])
+    out = np.empty((len(values) - 1) * substeps + 1)
+    _splined(values, np.empty((2, len(values))), substeps, out)
+    return out
+
+
+@long_entry
+def _splined(y: Floats, work: Floats, substeps: int, out: Floats) -> None:
+    """Write a cubic spline's values, so many a sample, and the last; for four samples or more.
+
+    Its third derivative does not jump at the second sample, nor at the last but one. The slopes at
+    the samples solve a tridiagonal system (de Boor, A Practical Guide to Splines, 1978, ch. IV),
+    whose rows are brought to a diagonal in order.
+    """
+    last = len(y) - 1
+    slope, above = work[0], work[1]
+    slope[0], above[0] = 0.5 * (5.0 * (y[1] - y[0]) + (y[2] - y[1])), 2.0
+    for i in range(1, last):
+        above[i] = 1.0 / (4.0 - above[i - 1])
+        slope[i] = (3.0 * (y[i + 1] - y[i - 1]) - slope[i - 1]) * above[i]
+    end = 0.5 * (5.0 * (y[last] - y[last - 1]) + (y[last - 1] - y[last - 2]))
+    slope[last] = (end - 2.0 * slope[last - 1]) / (1.0 - 2.0 * above[last - 1])
+    out[last * substeps] = y[last]
+    step = 1.0 / substeps
+    for i in range(last - 1, -1, -1):
+        slope[i] -= above[i] * slope[i + 1]
+        rise = y[i + 1] - y[i]
+        cubic = slope[i] + slope[i + 1] - 2.0 * rise
+        square = rise - slope[i] - cubic
+        for node in range(substeps):
+            share = node * step
+            out[i * substeps + node] = ((cubic * share + square) * share + slope[i]) * share + y[i]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.record.channels import ELEVATOR, PRESSURE, channel, motion_channels
+from coupled.rig.compiled import long_entry
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -22,18 +23,25 @@ def stamped(signal: Floats, late: float) -> Floats:
     """Return a signal as recorded, stamped so many frames late; shape (frames,), four or more."""
     if late == 0.0:
         return signal
+    given = np.ascontiguousarray(signal, dtype=np.float64)
+    return _moved(given, late, np.empty_like(given))
+
+
+@long_entry
+def _moved(signal: Floats, late: float, out: Floats) -> Floats:
+    """Return a signal as it was so many frames before."""
     last = len(signal) - 1
-    at = np.clip(np.arange(last + 1, dtype=np.float64) - late, 0.0, last)
-    k = np.clip(np.floor(at).astype(np.intp), 1, last - 2)
-    u = at - k
-    weights = (
-        -u * (u - 1.0) * (u - 2.0) / 6.0,
-        (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
-        -(u + 1.0) * u * (u - 2.0) / 2.0,
-        (u + 1.0) * u * (u - 1.0) / 6.0,
-    )
-    near = np.stack([signal[k + i] for i in (-1, 0, 1, 2)])
-    return np.asarray(np.sum(np.stack(weights) * near, axis=0))
+    for i in range(last + 1):
+        at = min(max(i - late, 0.0), float(last))
+        k = min(max(int(at), 1), last - 2)
+        u = at - k
+        out[i] = (
+            -u * (u - 1.0) * (u - 2.0) / 6.0 * signal[k - 1]
+            + (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0 * signal[k]
+            - (u + 1.0) * u * (u - 2.0) / 2.0 * signal[k + 1]
+            + (u + 1.0) * u * (u - 1.0) / 6.0 * signal[k + 2]
+        )
+    return out
 
 
 def moved_channels(controls: Sequence[str]) -> tuple[str, ...]:

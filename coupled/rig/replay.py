@@ -186,7 +186,7 @@ def replay_surface(rig: Rig, control: str, estimated: Floats, pressure_Pa: Float
 def _one(rig: Rig, control: str) -> tuple[Any, Any]:
     """Return parameters and state of one control at rest, each of shape (1,)."""
     packed = pack(rig, only=control)
-    return packed["parameters"].copy(), packed["state"].copy()
+    return packed["parameters"], packed["state"]
 
 
 @long_entry

@@ -9,24 +9,23 @@ from itertools import count
 import numpy as np
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect, value_of
+from coupled.gap.effects.effect import Effect
 from coupled.gap.search.case import Case
-from coupled.gap.search.descent import Descent, leaves_noise
-from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.descent import Descent
+from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import informative
+from coupled.gap.search.laws import Starts, law_starts, leaves_only_noise, may_gain
 from coupled.gap.search.screen import screen
 from coupled.gap.thresholds import (
     BEHIND_GAIN,
     BEHIND_SHARE,
-    HARDLY,
     RACE_BEHIND,
     RACE_EVALUATIONS,
     RACE_FLIGHTS,
 )
 from coupled.parallel import in_threads
 
-Starts = list[dict[str, float]]
 Fits = list[tuple[Effect, Fit]]
 
 
@@ -46,35 +45,9 @@ def fitted_candidates(
     screened = screen(case, current, candidates)
     laws = [one for one in screened if one[0].dry and not one[0].yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
-    found += _fitted(case, current, [(law, _law_starts(case, law, s, found)) for law, s in laws])
+    laws = [one for one in laws if may_gain(case, one[0], found)]
+    found += _fitted(case, current, [(law, law_starts(case, law, s, found)) for law, s in laws])
     return informative(case, current, found)
-
-
-def _law_starts(
-    case: Case, law: Effect, starts: Starts, found: Sequence[tuple[Effect, Fit]]
-) -> Starts:
-    """Return where the fit of a law of friction starts, beside those that were fitted.
-
-    With the contact that plain friction was found with; the richer of two laws where the plainer
-    one ended, too, and only there where that one left noise alone.
-    """
-    beside = _contact_of(case, found)
-    from_plainer = _from_plainer(case, law, found)
-    if from_plainer and any(one.yielding and _leaves_noise(case, one, f) for one, f in found):
-        return from_plainer
-    return [*({**beside, **start} for start in starts), *from_plainer]
-
-
-def _contact_of(case: Case, found: Sequence[tuple[Effect, Fit]]) -> dict[str, float]:
-    """Return how plain friction yields by its fit, if it was fitted."""
-    return {
-        one.value_key(p): fitted.values[one.value_key(p)]
-        for plain, fitted in found
-        if plain.yielding
-        for one in case.contact
-        for p in one.free
-        if one.value_key(p) in fitted.values
-    }
 
 
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
@@ -150,7 +123,7 @@ def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits
     is left as it is where another leaves noise alone of the same outputs, and it is far behind.
     """
     best = _least(begun)
-    noise = {name for name, one in best.items() if _leaves_noise(case, *one)}
+    noise = {name for name, one in best.items() if leaves_only_noise(case, *one)}
     least = {
         best[name][0].shows_in: best[name][1].cost
         for name in sorted(noise, key=lambda name: -best[name][1].cost)
@@ -169,13 +142,6 @@ def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits
         <= (1.0 if effect.name in noise else RACE_BEHIND) * best[effect.name][1].cost
     ]
     return racing, [best[name] for name in best if name in left]
-
-
-def _leaves_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
-    """Tell whether an effect, as fitted, leaves noise alone of the outputs that it shows in."""
-    ours = touched(case.outputs, [effect])
-    squares = [0.5 * float(np.sum(o.residual(fitted.rig, "fitted", wide=True) ** 2)) for o in ours]
-    return leaves_noise(sum(squares), sum(int(o.rows("fitted").sum()) for o in ours))
 
 
 def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
@@ -197,38 +163,6 @@ def _near_the_best(
     least = most - max(BEHIND_GAIN, BEHIND_SHARE * most)
     near = {one.effect.name for one in ranked if one.gain >= least}
     return [each for each in found if each[0].name in near]
-
-
-def _from_plainer(
-    case: Case, effect: Effect, found: Sequence[tuple[Effect, Fit]]
-) -> list[dict[str, float]]:
-    """Return where a richer law's fit starts by what its plainer one was fitted to, if it was."""
-    if effect.alike is None:
-        return []
-    starts = []
-    for plain, fitted in found:
-        if plain.name == effect.alike.plainer:
-            alike = {**fitted.values, **imitating(case, effect, plain, fitted)}
-            starts += [alike, {**alike, **_hardly_richer(case, effect, fitted)}]
-    return starts
-
-
-def _hardly_richer(case: Case, effect: Effect, fitted: Fit) -> dict[str, float]:
-    """Return the numbers of a richer law that stand above another, hardly above it."""
-    return {
-        effect.value_key(p): HARDLY * float(value_of(fitted.rig, case.control, p.above))
-        for p in effect.free
-        if p.above
-    }
-
-
-def imitating(case: Case, richer: Effect, plain: Effect, fitted: Fit) -> dict[str, float]:
-    """Return the values by which a richer law is nearly the plainer one that was fitted."""
-    assert richer.alike is not None
-    known = {p.name: fitted.values[plain.value_key(p)] for p in plain.free}
-    base = float(value_of(case.nominal, case.control, richer.alike.base))
-    values = richer.alike.values(known, base)
-    return {richer.value_key(p): values[p.name] for p in richer.free}
 
 
 def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:

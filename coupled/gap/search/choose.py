@@ -13,18 +13,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, apply, possible
-from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.search.candidates import fitted_candidates, imitating
+from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.search.laws import family, other_laws
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     FAINT_GAP,
-    LAW_GAIN,
     LEAST_GAIN,
     MOST_EFFECTS,
     NEEDLESS_GAIN,
@@ -160,44 +159,12 @@ def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]
     ]
     rivals = [other for other in others if other.gain > best.gain - RIVAL_GAIN]
     gaps = stage_gaps(case.outputs, settled.rig)
-    family = _family(best.effect)
-    if family and all(gaps.get(at, 0.0) < FAINT_GAP for at in best.effect.shows_in):
-        rivals = [other for other in rivals if other.effect not in family]
-        rivals += _other_laws(case, best, ranked)
+    laws = family(best.effect)
+    if laws and all(gaps.get(at, 0.0) < FAINT_GAP for at in best.effect.shows_in):
+        rivals = [other for other in rivals if other.effect not in laws]
+        rivals += other_laws(case, best, ranked)
     weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
     return Found(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
-
-
-def _family(effect: Effect) -> tuple[Effect, ...]:
-    """Return an effect with those that pass for it, or for which it passes, in a faint gap."""
-    found: list[Effect] = []
-    for richer in EFFECTS:
-        if richer.alike is not None and effect.name in (richer.name, richer.alike.plainer):
-            found += [BY_NAME[richer.alike.plainer], richer]
-    return tuple(dict.fromkeys(found))
-
-
-def _other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
-    """Return the effects that a faint gap does not distinguish from the best.
-
-    The richer of two laws excludes the plainer by its gain; the plainer never excludes the
-    richer, which may pass for it.
-    """
-    if best.effect.alike is not None:
-        plainer = best.effect.alike.plainer
-        return [
-            one for one in ranked if one.effect.name == plainer and one.gain > best.gain - LAW_GAIN
-        ]
-    found = []
-    for richer in _family(best.effect):
-        if richer.alike is None:
-            continue
-        values = {**best.fit.values, **imitating(case, richer, best.effect, best.fit)}
-        effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
-        rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
-        fitted = replace(best.fit, effects=effects, values=values, rig=rig)
-        found.append(Candidate(best.gain, richer, fitted))
-    return found
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:

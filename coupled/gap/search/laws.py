@@ -1,0 +1,202 @@
+"""Laws of dry friction beside one another: where the richer one's fit starts, and whether it pays.
+
+A richer law holds the plainer one. Where the plainer leaves noise alone, what the richer could gain
+is foretold at the plainer one's end, by how a little of what it has more turns the residual: the
+score test (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). It costs a replay or two, a fit a hundred.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, apply, possible, value_of
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.case import Case
+from coupled.gap.search.descent import leaves_noise
+from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.slopes import Slope
+from coupled.gap.signals.output import Output, memory
+from coupled.gap.thresholds import HARDLY, LAW_FORETOLD, LAW_GAIN, RICHER
+from coupled.parallel import go_on
+
+Starts = list[dict[str, float]]
+Fits = Sequence[tuple[Effect, Fit]]
+
+
+def law_starts(case: Case, law: Effect, starts: Starts, found: Fits) -> Starts:
+    """Return where the fit of a law of friction starts, beside those that were fitted.
+
+    With the contact that plain friction was found with; the richer of two laws where the plainer
+    one ended, too, and only there where that one left noise alone.
+    """
+    beside = _contact_of(case, found)
+    from_plainer = _from_plainer(case, law, found)
+    if from_plainer and any(one.yielding and leaves_only_noise(case, one, f) for one, f in found):
+        return from_plainer
+    return [*({**beside, **start} for start in starts), *from_plainer]
+
+
+def may_gain(case: Case, law: Effect, found: Fits) -> bool:
+    """Tell whether a law of friction may gain beside the plain one that was fitted.
+
+    All may but a richer one where plain friction leaves noise alone, and little is foretold.
+    """
+    for plain, fitted in found:
+        if plain.yielding and leaves_only_noise(case, plain, fitted):
+            foretold = _foretold(case, law, plain, fitted)
+            return foretold is None or foretold >= LAW_FORETOLD
+    return True
+
+
+def leaves_only_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether an effect, as fitted, leaves noise alone of the outputs that it shows in."""
+    ours = touched(case.outputs, [effect])
+    squares = [0.5 * float(np.sum(o.residual(fitted.rig, "fitted", wide=True) ** 2)) for o in ours]
+    return leaves_noise(sum(squares), sum(int(o.rows("fitted").sum()) for o in ours))
+
+
+def imitating(case: Case, richer: Effect, plain: Effect, fitted: Fit) -> dict[str, float]:
+    """Return the values by which a richer law is nearly the plainer one that was fitted."""
+    assert richer.alike is not None
+    known = {p.name: fitted.values[plain.value_key(p)] for p in plain.free}
+    base = float(value_of(case.nominal, case.control, richer.alike.base))
+    values = richer.alike.values(known, base)
+    return {richer.value_key(p): values[p.name] for p in richer.free}
+
+
+def family(effect: Effect) -> tuple[Effect, ...]:
+    """Return an effect with those that pass for it, or for which it passes, in a faint gap."""
+    found: list[Effect] = []
+    for richer in EFFECTS:
+        if richer.alike is not None and effect.name in (richer.name, richer.alike.plainer):
+            found += [BY_NAME[richer.alike.plainer], richer]
+    return tuple(dict.fromkeys(found))
+
+
+def other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
+    """Return the effects that a faint gap does not distinguish from the best.
+
+    The richer of two laws excludes the plainer by its gain; the plainer never excludes the
+    richer, which may pass for it.
+    """
+    if best.effect.alike is not None:
+        plainer = best.effect.alike.plainer
+        return [
+            one for one in ranked if one.effect.name == plainer and one.gain > best.gain - LAW_GAIN
+        ]
+    found = []
+    for richer in family(best.effect):
+        if richer.alike is None:
+            continue
+        values = {**best.fit.values, **imitating(case, richer, best.effect, best.fit)}
+        effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
+        rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
+        fitted = replace(best.fit, effects=effects, values=values, rig=rig)
+        found.append(Candidate(best.gain, richer, fitted))
+    return found
+
+
+def _contact_of(case: Case, found: Fits) -> dict[str, float]:
+    """Return how plain friction yields by its fit, if it was fitted."""
+    return {
+        one.value_key(p): fitted.values[one.value_key(p)]
+        for plain, fitted in found
+        if plain.yielding
+        for one in case.contact
+        for p in one.free
+        if one.value_key(p) in fitted.values
+    }
+
+
+def _from_plainer(case: Case, effect: Effect, found: Fits) -> Starts:
+    """Return where a richer law's fit starts by what its plainer one was fitted to, if it was."""
+    if effect.alike is None:
+        return []
+    starts = []
+    for plain, fitted in found:
+        if plain.name == effect.alike.plainer:
+            alike = {**fitted.values, **imitating(case, effect, plain, fitted)}
+            hardly = _above(case, effect, fitted, HARDLY)
+            starts += [alike, {**alike, **hardly}]
+    return starts
+
+
+def _above(case: Case, effect: Effect, fitted: Fit, times: float) -> dict[str, float]:
+    """Return the numbers of a richer law that stand above another, so many times it."""
+    return {
+        effect.value_key(p): times * float(value_of(fitted.rig, case.control, p.above))
+        for p in effect.free
+        if p.above
+    }
+
+
+def _little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Starts:
+    """Return values by which a richer law is a little more than the plain one that was fitted.
+
+    None where it does not hold that one.
+    """
+    if law.alike is not None and law.alike.plainer == plain.name:
+        alike = {**fitted.values, **imitating(case, law, plain, fitted)}
+        each = [_above(case, law, fitted, times) for times in (HARDLY, RICHER)]
+        shapes = {law.value_key(p): p for p in law.free if p.shape}
+        starts = {key: {key: value} for key, p in shapes.items() for value in p.starts}
+        return [{**alike, **start, **above} for start in (*starts.values(), {}) for above in each]
+    if law.even is None or law.even[0] != plain.name:
+        return []
+    level = fitted.values[plain.value_key(plain.free[0])]
+    if level <= 0.0:
+        return []
+    both = {law.value_key(p): level for p in law.free}
+    first = law.value_key(law.free[0])
+    return [{**fitted.values, **both, first: HARDLY * level}]
+
+
+def _foretold(case: Case, law: Effect, plain: Effect, fitted: Fit) -> float | None:
+    """Return the log-likelihood that a richer law is foretold to gain over a plain one.
+
+    All that was fitted goes along, by its slopes. None where that cannot be foretold.
+    """
+    tries = _little_richer(case, law, plain, fitted)
+    keys, slope = _slope_of(plain, fitted)
+    if slope is None or not tries:
+        return None
+    ours = _of_a_slope(case, fitted, keys)
+    rows = np.concatenate([output.rows("fitted") for output in ours])
+    now = np.concatenate([output.residual(fitted.rig, wide=True) for output in ours])
+    if len(now) != len(slope.left):
+        return None
+    base, left = np.linalg.qr(slope.jacobian[rows])[0], now[rows]
+    effects = [law if one is plain else one for one in fitted.effects]
+    effects += case.nuisances(effects)
+    most = 0.0
+    for values in tries:
+        rig = possible(case.nominal, case.control, effects, {**case.neutral, **values})
+        if rig is None:
+            return None
+        go_on()
+        there = np.concatenate([output.residual(rig, wide=True) for output in ours])
+        turn = (there - now)[rows]
+        turn -= base @ (base.T @ turn)
+        less, power = -float(left @ turn), float(turn @ turn)
+        if law.even is None:  # no breakaway is under the running friction
+            less = max(less, 0.0)
+        most = max(most, 0.5 * less * less / power if power > 0.0 else 0.0)
+    memories = max(memory(output.residual(fitted.rig, "fitted", wide=True)) for output in ours)
+    return most / (float(np.mean(left**2)) * memories)
+
+
+def _slope_of(plain: Effect, fitted: Fit) -> tuple[tuple[str, ...], Slope | None]:
+    """Return the numbers that were fitted with a law's level, and how the residual goes by them."""
+    key = plain.value_key(plain.free[0])
+    return next((each for each in fitted.slopes.items() if key in each[0]), ((), None))
+
+
+def _of_a_slope(case: Case, fitted: Fit, keys: Sequence[str]) -> list[Output]:
+    """Return the outputs by which numbers were fitted together."""
+    every = (*fitted.effects, *case.nuisances(fitted.effects))
+    together = [one for one in every if any(one.value_key(p) in keys for p in one.free)]
+    return touched(case.outputs, together)
