@@ -191,6 +191,7 @@ MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leav
 SIMPLER_GAIN = 6.0  # chosen: by which more numbers must win in the loader where fewer close the gap
 SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dry friction is exact
 FAINT_GAP = 2.0  # under which the law of dry friction is open: 5 of 67 blind records, seeds 2 to 6
+STRAINED_GAIN = 30.0  # chosen: by which an effect must beat settings at their ends within a limit
 LAW_GAIN = 12.0  # by which the richer law must win there; the same records
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
 BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again

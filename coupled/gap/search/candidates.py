@@ -35,12 +35,11 @@ def fitted_candidates(
     """Return the effects that show in some outputs, fitted beside the current ones, best first."""
     # A law of friction with its contact's numbers as its own is one beside which they are settings.
     same = {effect.yielding for effect in library} if case.contact else set()
+    chosen = {effect.name for effect in current.effects}
     candidates = [
         effect
         for effect in library
-        if effect not in current.effects
-        and effect.name not in same
-        and outputs & set(effect.shows_in)
+        if effect.name not in chosen and effect.name not in same and outputs & set(effect.shows_in)
     ]
     screened = screen(case, current, candidates)
     laws = [one for one in screened if one[0].dry and not one[0].yielding]

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.effect import Effect
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import family, other_laws
+from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
@@ -216,52 +217,8 @@ def _round(
         if ranked and ranked[0].gain >= LEAST_GAIN:
             return ranked
         idle.add(output)
-    marked = _marked(case, current, library)
+    marked = shown_by_mark(case, current, library)
     if wide or marked:
         return marked or tried
-    ranked = fitted_candidates(case, current, library, _strained(case, current))
-    return ranked if _surely_beyond(case, ranked) else []
-
-
-def _marked(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
-    """Return the candidate that an output shows by its mark, though it is within its limit.
-
-    Its gain is what that output says alone: there the mark is known, and has no number to fit.
-    """
-    for effect in library:
-        ours = [output for output in case.outputs if output.stage == effect.mark]
-        if not ours or effect in current.effects:
-            continue
-        effects = (*current.effects, effect)
-        beside = (*effects, *case.nuisances(effects))
-        rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
-        shown = [] if rig is None else [(effect, replace(current, rig=rig))]
-        if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
-            fitted = [(effect, case.fit(effects, "fitted", current.values, effect))]
-            return ranked_by_gain(ours, current, fitted)
-    return []
-
-
-def _strained(case: Case, current: Fit) -> set[str]:
-    """Return the stages of which a setting stands at the end of its tolerance.
-
-    It may then keep a stage within its limit that is off by more.
-    """
-    known = {} if case.only_wide else case.known
-    ends = [one for one in known.values() for p in one.free if one.value_key(p) in current.at_bound]
-    return {stage for one in ends for stage in one.shows_in}
-
-
-def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:
-    """Tell whether the best candidate is a number off by more than its setting, and nothing else.
-
-    In a stage within its limit no other effect is claimed.
-    """
-    ends = case.ends(ranked[0].effect) if ranked else None
-    if ends is None:
-        return False
-    best = ranked[0]
-    (number,) = best.effect.free
-    key = best.effect.value_key(number)
-    beyond = best.fit.low[key] > ends[1] or best.fit.high[key] < ends[0]
-    return beyond and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])
+    beside = {at for at, gap in now.items() if gap > limits[at]}
+    return beside_a_larger(case, current, library, beside) or strained(case, current, library)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
@@ -24,6 +25,8 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     """
     open_ones = [one for one in found if says_nothing(case, *one)]
     clear = [one for one in found if one not in open_ones]
+    held = [_alone(case, *one) for one in open_ones if _goes_along(one[0])]
+    clear += [one for one in held if not says_nothing(case, *one)]
     ranked = ranked_by_gain(case.outputs, current, clear)
     asked = _clear_on_all(case, current, ranked, open_ones)
     if asked:
@@ -36,6 +39,29 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     others = ranked_by_gain(case.outputs, current, single) if single else ranked
     # Two that are one law differ by rounding alone: the library's order settles it.
     return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
+
+
+def _goes_along(effect: Effect) -> bool:
+    """Tell whether an effect has numbers beside its level that the rig has without it."""
+    return len(effect.free) > 1 and all(p.mode == "factor" for p in effect.free[1:])
+
+
+def _alone(case: Case, effect: Effect, fitted: Fit) -> tuple[Effect, Fit]:
+    """Return an effect of its level alone, and its fit; its other numbers stay as they are filed.
+
+    A dead time and how fast the servo is beside it may be one number to a record.
+    """
+    level = effect.free[0]
+    alone = replace(effect, parameters=(level,))
+    others = [one for one in fitted.effects if one is not effect]
+    start = {key: value for key, value in fitted.values.items() if key in _keys(case, others)}
+    start[effect.value_key(level)] = level.starts[0]
+    return alone, case.fit((*others, alone), "fitted", start, alone)
+
+
+def _keys(case: Case, effects: Sequence[Effect]) -> set[str]:
+    every = (*effects, *case.nuisances(effects))
+    return {one.value_key(p) for one in every for p in one.free}
 
 
 def _clear_on_all(

@@ -1,0 +1,98 @@
+"""What is claimed of a gap that noise, a setting or the physics of a right effect might leave.
+
+There an effect must do more than gain: it is known by its mark, or stands beyond what a setting can
+be, or leaves noise alone of what a larger gap beside it would have hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.search.candidates import fitted_candidates
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate, ranked_by_gain
+from coupled.gap.signals.output import stage_limits
+from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN, STRAINED_GAIN
+
+
+def beside_a_larger(
+    case: Case, current: Fit, library: Sequence[Effect], outputs: set[str]
+) -> list[Candidate]:
+    """Return the candidates for outputs over their limits by no more than a right effect may leave.
+
+    None but where the best leaves noise alone.
+    """
+    limits = stage_limits(case.outputs)
+    for at in sorted(outputs if current.effects else ()):
+        ranked = fitted_candidates(case, current, library, {at})
+        best = ranked[0] if ranked and ranked[0].gain >= LEAST_GAIN else None
+        if best is not None and case.gaps(best.fit.rig)[at] <= limits[at]:
+            return ranked
+    return []
+
+
+def strained(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
+    """Return the candidates for the stages of which a setting stands at the end of its tolerance.
+
+    It may then keep a stage within its limit that is off by more. None but where the best is surely
+    beyond its setting, or gains far more than any setting there and needs none at its end.
+    """
+    at_end = _at_end(case, current)
+    ranked = fitted_candidates(case, current, library, {s for one in at_end for s in one.shows_in})
+    return ranked if _surely_beyond(case, ranked) or _relieves(ranked, at_end) else []
+
+
+def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
+    """Return the candidate that an output shows by its mark, though it is within its limit.
+
+    Its gain is what that output says alone: there the mark is known, and has no number to fit.
+    """
+    for effect in library:
+        ours = [output for output in case.outputs if output.stage == effect.mark]
+        if not ours or effect in current.effects:
+            continue
+        effects = (*current.effects, effect)
+        beside = (*effects, *case.nuisances(effects))
+        rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
+        shown = [] if rig is None else [(effect, replace(current, rig=rig))]
+        if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
+            fitted = [(effect, case.fit(effects, "fitted", current.values, effect))]
+            return ranked_by_gain(ours, current, fitted)
+    return []
+
+
+def _at_end(case: Case, current: Fit) -> list[Effect]:
+    """Return the settings that stand at the end of their tolerance, and would gain beyond."""
+    known = {} if case.only_wide else case.known
+    at = set(current.at_bound)
+    return [one for one in known.values() if any(one.value_key(p) in at for p in one.free)]
+
+
+def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:
+    """Tell whether the best candidate is a number off by more than its setting, and nothing else.
+
+    In a stage within its limit no other effect is claimed.
+    """
+    ends = case.ends(ranked[0].effect) if ranked else None
+    if ends is None:
+        return False
+    best = ranked[0]
+    (number,) = best.effect.free
+    key = best.effect.value_key(number)
+    beyond = best.fit.low[key] > ends[1] or best.fit.high[key] < ends[0]
+    return beyond and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])
+
+
+def _relieves(ranked: Sequence[Candidate], at_end: Sequence[Effect]) -> bool:
+    """Tell whether the best candidate alone gains far more than chance, and needs no setting so.
+
+    No law of dry friction does: a contact's settings take up what is left of one.
+    """
+    if not ranked or ranked[0].effect.dry or ranked[0].gain < STRAINED_GAIN:
+        return False
+    best = ranked[0]
+    still = {one.value_key(p) for one in at_end for p in one.free} & set(best.fit.at_bound)
+    return not still and all(other.gain < best.gain - RIVAL_GAIN for other in ranked[1:])

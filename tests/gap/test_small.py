@@ -1,0 +1,100 @@
+"""Effects of gaps that a setting, or the physics of a larger effect, might leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import searched
+from coupled.gap.search.information import informative
+from coupled.gap.signals.output import Output
+from coupled.rig.rig import Rig
+from tests.support.rigs import bench
+
+Floats = NDArray[np.float64]
+FRAMES = 6000
+RNG = np.random.default_rng(11)
+FIRST, SECOND, UNKNOWN = RNG.normal(size=(3, FRAMES))
+NOISE = RNG.normal(size=FRAMES)
+OFFSET, WEIGHT = BY_NAME["force_offset"], BY_NAME["bob_weight"]
+
+
+def answered(
+    measured: Floats, predict: Callable[[Rig], Floats], stage: str = "loader", frames: int = FRAMES
+) -> Case:
+    """Return a case of one output with a floor of 1."""
+    measured = (measured + NOISE)[:frames]
+    output = Output(stage, "x", measured, lambda rig: predict(rig)[:frames], 1.0, 120.0)
+    return Case(bench(), "column", [output])
+
+
+def offset_and_weight(rig: Rig) -> Floats:
+    loader = rig.controls["column"].loader
+    return loader.offset * FIRST + loader.bob_weight * SECOND
+
+
+@pytest.mark.parametrize(
+    ("unknown", "found"), [(0.0, {"force_offset", "bob_weight"}), (0.9, {"force_offset"})]
+)
+def test_an_effect_beside_a_larger_one_is_claimed_where_it_leaves_noise_alone(
+    unknown: float, found: set[str]
+) -> None:
+    """A gap of 30 floors may leave one of 1.9: 1.3 and 1.6 are beside it, and one effect is seen.
+
+    With something unknown the second effect leaves more than noise, and is not claimed.
+    """
+    measured = 30.0 * FIRST + 0.8 * SECOND + unknown * UNKNOWN
+    case = answered(measured, offset_and_weight)
+    choice = searched(case, [OFFSET, WEIGHT])
+    assert {step.effect.name for step in choice.steps} == found
+    assert choice.fit.values[OFFSET.value_key(OFFSET.free[0])] == pytest.approx(30.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("size", "frames", "found"), [(1.0, 6000, {"force_offset"}), (0.9, 1500, set[str]())]
+)
+def test_an_effect_that_gains_far_more_than_settings_is_found_within_the_limit(
+    size: float, frames: int, found: set[str]
+) -> None:
+    """A mass at the end of its tolerance leaves 1.15 floors of an offset that acts much like it.
+
+    Of less, over 12 s, that says too little: the mass is at its end, the gain under 30.
+    """
+    nominal = bench().controls["column"].loader.mass
+    ours = 0.25 * SECOND + 2.5 * FIRST
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        return 100.0 * (loader.mass / nominal - 1.0) * FIRST + loader.offset * ours
+
+    case = answered(size * ours, predict, frames=frames)
+    settled = case.fit(())
+    assert case.outputs[0].gap(settled.rig) < case.outputs[0].limit
+    assert len(settled.at_bound) == 1
+    assert {s.effect.name for s in searched(case, [OFFSET, BY_NAME["inertia"]]).steps} == found
+
+
+def test_a_dead_time_is_found_where_the_servo_s_own_speed_may_stand_for_it() -> None:
+    """By the sum of both alone; with both free its interval holds none at all."""
+    t = np.arange(FRAMES) / 120.0
+    servo = BY_NAME["servo_delay"]
+    nominal = bench({"servo_frequency_Hz": 10.0})
+
+    def predict(rig: Rig) -> Floats:
+        loader = rig.controls["column"].loader
+        late = loader.servo_delay + 0.1 / loader.servo_frequency
+        return np.asarray(20.0 * np.sin(5.0 * (t - late)))
+
+    output = Output("linkage", "x", 20.0 * np.sin(5.0 * (t - 0.03)) + NOISE, predict, 1.0, 120.0)
+    case = Case(nominal, "column", [output])
+    current = case.fit(())
+    both = case.fit((servo,), "fitted", only=servo)
+    (best,) = informative(case, current, [(servo, both)])
+    assert (best.effect.name, [p.name for p in best.effect.free]) == ("servo_delay", ["delay_s"])
+    assert best.fit.values["servo_delay.delay_s"] == pytest.approx(0.02, abs=1e-3)
+    assert best.gain > 100.0
