@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from coupled.gap.findings.flexible import free_share
 from coupled.gap.findings.summary import in_figures
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import Output, spread
+from coupled.gap.stages.airframe import airframe_outputs
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from tests.support import gaps
+from tests.support.records import NOISE
 
 Floats = NDArray[np.float64]
 RATE_Hz = 120.0
@@ -129,3 +137,30 @@ def test_a_hum_is_no_noise_and_a_filtered_log_is_seen() -> None:
     assert not heard.filtered
     kernel = np.hanning(9)
     assert noise_of(np.convolve(motion + noise, kernel / kernel.sum(), "valid")).filtered
+
+
+def airframe_floor(rig: Rig, record: Record, noise: Floats) -> tuple[float, float]:
+    """Return the pitch rate's gap and floor with noise on the recorded elevator."""
+    data = record.data.copy()
+    data[:, record.channels.index("elevator_rad")] += noise
+    first = airframe_outputs(rig, Record(record.channels, data))[0]
+    return first.gap(rig), first.floor
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_coloured_noise_of_a_surface_reaches_the_airframes_floor(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its colour is heard beside where the host put the surface: by itself it gave gaps of 1.3."""
+    still = {name: level for name, level in NOISE.items() if name != "elevator_rad"}
+    monkeypatch.setattr(gaps, "NOISE", still)
+    rig = gaps.nominal_rig(True)
+    record = gaps.made(tmp_path, rig, {}, 3)
+    lagged = np.random.default_rng(seed).normal(size=len(record) + 200)
+    memory = math.exp(-2.0 * math.pi * 4.0 / 120.0)
+    noise = lfilter([math.sqrt(1.0 - memory**2)], [1.0, -memory], lagged)[200:]
+    assert airframe_floor(rig, record, 1e-4 * noise)[0] < 1.1
+    # A surface that goes elsewhere than it is put is no noise.
+    faulty = gaps.made(tmp_path, rig, {"surface_lag": {"lag_s": 0.05}}, 3)
+    plain = airframe_floor(rig, record, 0.0 * noise)[1]
+    assert airframe_floor(rig, faulty, 0.0 * noise)[1] == pytest.approx(plain, rel=0.1)

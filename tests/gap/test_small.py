@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,14 @@ def test_an_effect_beside_a_larger_one_is_claimed_where_it_leaves_noise_alone(
     choice = searched(case, [OFFSET, WEIGHT])
     assert {step.effect.name for step in choice.steps} == found
     assert choice.fit.values[OFFSET.value_key(OFFSET.free[0])] == pytest.approx(30.0, rel=0.01)
+
+
+def test_beside_dry_friction_a_remainder_is_no_effect() -> None:
+    """How a contact yields leaves as much, and other effects would take it up."""
+    rubbing = bench({"friction_N": 2.0, "friction_stiffness_N_per_m": 1e4})
+    case = answered(30.0 * FIRST + 0.8 * SECOND, offset_and_weight)
+    choice = searched(replace(case, nominal=rubbing), [OFFSET, WEIGHT])
+    assert [step.effect.name for step in choice.steps] == ["force_offset"]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
@@ -23,10 +24,12 @@ def beside_a_larger(
 ) -> list[Candidate]:
     """Return the candidates for outputs over their limits by no more than a right effect may leave.
 
-    None but where the best leaves noise alone.
+    None but where the best leaves noise alone. Not beside dry friction, of which no law is exact.
     """
     limits = stage_limits(case.outputs)
-    for at in sorted(outputs if current.effects else ()):
+    rubs = is_dry(case.nominal, case.control) or any(effect.dry for effect in current.effects)
+    exact = outputs - {"loader"} if rubs else outputs
+    for at in sorted(exact if current.effects else ()):
         ranked = fitted_candidates(case, current, library, {at})
         best = ranked[0] if ranked and ranked[0].gain >= LEAST_GAIN else None
         if best is not None and case.gaps(best.fit.rig)[at] <= limits[at]:

@@ -18,8 +18,9 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import heard
-from coupled.gap.stages.openloop import Moved, Points
+from coupled.gap.stages.openloop import Moved, Points, about
 from coupled.gap.thresholds import (
     SURFACE_SHAKE,
     SURFACE_GUST_m_per_s,
@@ -135,11 +136,20 @@ def moved(
         position, filed = record[name], filed_trim(rig, control)
         trim, jump = trims.get(control, (filed, 0.0))
         step = np.where(np.arange(len(position)) > 0, jump, 0.0)
-        level, smooth = heard(position), smoothed(position - step) + step
+        smooth = smoothed(position - step) + step
+        level = left_noise(heard(position), position, position - _led(rig, record, control, trim))
         error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
         found.append(Moved(name, smooth, points, trim, filed))
         wrong.append(Moved(name, smooth + error, points, trim, filed))
     return found, wrong
+
+
+def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
+    """Return where the host's own command puts a surface that stands there in trim, rad."""
+    points = surface_points(rig, control)
+    assert points is not None
+    held = about(trim, filed_trim(rig, control), points)
+    return np.interp(held + _asked(rig, record, control), *points)
 
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
