@@ -179,7 +179,7 @@ RIPPLE_PERIODS = 60.0  # chosen: the most of them
 # Fits of candidates that are finished (`candidates`).
 HARDLY = 1.05  # chosen: times the running friction, a breakaway where Coulomb's friction begins
 RICHER = 1.5  # chosen: the same, by which it is foretold what a breakaway would gain
-LAW_FORETOLD = 3.0  # chosen: half of SIMPLER_GAIN, under which a richer law is not fitted
+SHAPES = (0.25, 1.0, 4.0)  # chosen: and times the usual speed over which it fades
 BEHIND_GAIN = 20.0  # chosen: log-likelihood by which a fit by wide steps is behind the best,
 BEHIND_SHARE = 0.2  # chosen: and share of the best's gain, from which it is left at that
 

@@ -14,7 +14,7 @@ from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import ranked_by_gain
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import LAW_FORETOLD
+from coupled.gap.thresholds import SIMPLER_GAIN
 from tests.support.gaps import made, nominal_rig
 
 PLAIN, STRIBECK = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
@@ -52,7 +52,7 @@ def test_a_richer_law_is_not_fitted_where_the_plain_one_leaves_noise(tmp_path: P
     assert laws.leaves_only_noise(case, *fitted[0])
     for law in (STRIBECK, UNEVEN):
         foretold = laws._foretold(case, law, *fitted[0])
-        assert foretold is not None and 0.0 <= foretold < LAW_FORETOLD
+        assert foretold is not None and 0.0 <= foretold < SIMPLER_GAIN
         assert not laws.may_gain(case, law, fitted)
     assert laws.may_gain(case, BY_NAME["load_friction"], fitted)  # it does not hold the plain one
     said: list[str] = []
@@ -66,7 +66,7 @@ def test_a_breakaway_that_shows_is_foretold_as_its_fit_finds_it(tmp_path: Path) 
     case = judged(tmp_path, "breaks away a little")
     plain = plainly(case)
     foretold = laws._foretold(case, STRIBECK, PLAIN, plain)
-    assert foretold is not None and foretold > 2.0 * LAW_FORETOLD
+    assert foretold is not None and foretold > 2.0 * SIMPLER_GAIN
     starts = laws.law_starts(case, STRIBECK, [], [(PLAIN, plain)])
     fits = [(STRIBECK, case.fit((STRIBECK,), "fitted", start, STRIBECK)) for start in starts]
     assert ranked_by_gain(case.outputs, plain, fits)[0].gain > foretold

@@ -2,7 +2,7 @@
 
 A richer law holds the plainer one. Where the plainer leaves noise alone, what the richer could gain
 is foretold at the plainer one's end, by how a little of what it has more turns the residual: the
-score test (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). It costs a replay or two, a fit a hundred.
+score test (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). It costs six replays, a fit a hundred.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, memory
-from coupled.gap.thresholds import HARDLY, LAW_FORETOLD, LAW_GAIN, RICHER
+from coupled.gap.thresholds import HARDLY, LAW_GAIN, RICHER, SHAPES, SIMPLER_GAIN
 from coupled.parallel import go_on
 
 Starts = list[dict[str, float]]
@@ -48,7 +48,7 @@ def may_gain(case: Case, law: Effect, found: Fits) -> bool:
     for plain, fitted in found:
         if plain.yielding and leaves_only_noise(case, plain, fitted):
             foretold = _foretold(case, law, plain, fitted)
-            return foretold is None or foretold >= LAW_FORETOLD
+            return foretold is None or foretold >= SIMPLER_GAIN
     return True
 
 
@@ -141,10 +141,10 @@ def _little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Start
     """
     if law.alike is not None and law.alike.plainer == plain.name:
         alike = {**fitted.values, **imitating(case, law, plain, fitted)}
-        each = [_above(case, law, fitted, times) for times in (HARDLY, RICHER)]
-        shapes = {law.value_key(p): p for p in law.free if p.shape}
-        starts = {key: {key: value} for key, p in shapes.items() for value in p.starts}
-        return [{**alike, **start, **above} for start in (*starts.values(), {}) for above in each]
+        shape = {law.value_key(p): p.starts[0] for p in law.free if p.shape}
+        each = [{key: k * value for key, value in shape.items()} for k in SHAPES]
+        above = [_above(case, law, fitted, times) for times in (HARDLY, RICHER)]
+        return [{**alike, **one, **more} for one in each for more in above]
     if law.even is None or law.even[0] != plain.name:
         return []
     level = fitted.values[plain.value_key(plain.free[0])]
