@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from coupled.gap.search.descent import Descent, leaves_noise
@@ -19,7 +20,7 @@ ENDS = (np.full(2, -5.0), np.full(2, 5.0))
 RIG = gaps.nominal_rig(False)
 
 
-def straight(scaled: Floats, wide: bool = False) -> Floats:
+def straight(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
     """Return a linear residual; by wide steps, one whose least is elsewhere."""
     return LAW @ scaled - SAID + (0.3 * LAW[:, 0] if wide else 0.0)
 
@@ -32,8 +33,23 @@ def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_wide_ones() -> None:
     assert np.allclose(found, least - [0.3, 0.0], atol=5e-3)
 
 
+def test_slopes_may_be_rough_and_the_end_is_the_exact_residuals() -> None:
+    """Differences ask for what costs less; what is made least is what was asked for."""
+    asked: list[bool] = []
+
+    def replayed(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+        asked.append(rough)
+        return straight(scaled) + (0.05 * LAW[:, 1] * scaled[1] if rough else 0.0)
+
+    least = np.linalg.lstsq(LAW, SAID, rcond=None)[0]
+    found = Descent("own").end(replayed, [np.array([1.0, 1.0])], ENDS, stepped=True)
+    assert np.allclose(found.x, least, atol=0.02)
+    assert found.fun == pytest.approx(straight(found.x))
+    assert asked.count(True) > asked.count(False)
+
+
 def test_of_two_starts_the_one_that_leads_lower_is_kept_whatever_their_order() -> None:
-    def double(scaled: Floats, wide: bool = False) -> Floats:
+    def double(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         """Return a residual with two hollows, at -2 and 2, of which the one at 2 is deeper."""
         return np.concatenate(((scaled[0] ** 2 - 4.0) * np.ones(50), 0.5 * (scaled - 2.0)))
 
@@ -46,7 +62,7 @@ def test_of_two_starts_the_one_that_leads_lower_is_kept_whatever_their_order() -
 def test_a_start_that_is_far_behind_is_given_up() -> None:
     asked: list[float] = []
 
-    def far(scaled: Floats, wide: bool = False) -> Floats:
+    def far(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         """Return a residual with a flat shelf far off, from which nothing leads away."""
         asked.append(float(scaled[0]))
         return np.full(50, 2.0 + min(float(scaled[0] - 1.0) ** 2, 50.0 + 1e-3 * float(scaled[0])))

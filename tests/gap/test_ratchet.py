@@ -73,3 +73,11 @@ def test_noise_of_a_held_force_walks_no_contact(tmp_path: Path) -> None:
         outputs = Reader(rig, held(real, seed, tmp_path), "column", surface_points).outputs()
         (loader,) = (output for output in outputs if output.stage == "loader")
         assert loader.gap(real) < 1.6
+        # Slopes are taken without putting the walk back: a replay for three, and nearly the same.
+        assert loader.rough is not None
+        assert np.any(loader.rough(real) != loader.predict(real))
+        other = rig.changed({stiffness: 7.5 / 1.4e-4, "controls.column.loader.friction_N": 7.6})
+        moved, roughly = (
+            output_of(other) - output_of(real) for output_of in (loader.predict, loader.rough)
+        )
+        assert float(moved @ roughly) > 0.5 * float(np.linalg.norm(moved) * np.linalg.norm(roughly))

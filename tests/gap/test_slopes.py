@@ -25,7 +25,7 @@ class Curved:
     def __init__(self) -> None:
         self.asked = 0
 
-    def __call__(self, scaled: Floats, wide: bool = False) -> Floats:
+    def __call__(self, scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         self.asked += 1
         made: Floats = LAW @ scaled + CURVED @ scaled**2 - SAID
         return made

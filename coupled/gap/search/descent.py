@@ -30,9 +30,12 @@ EVERY = slice(None)
 
 
 class Residual(Protocol):
-    """Scaled parameters' residual in floors, by wide steps of the loader where asked for."""
+    """Scaled parameters' residual in floors, by wide steps of the loader where asked for.
 
-    def __call__(self, scaled: Floats, wide: bool = False) -> Floats:
+    A `rough` one is to take slopes by.
+    """
+
+    def __call__(self, scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         """Return it, shape (frames,)."""
 
 
@@ -80,15 +83,15 @@ class Descent:
         Where nothing is `stepped` finer than the frames, all steps are alike. With a single start,
         `slope` may be what another fit that ended there knew.
         """
-        near = partial(residual, wide=True)
+        near, sloping = partial(residual, wide=True), partial(residual, wide=True, rough=True)
         best: End | None = None
         if self.steps != "own" or not stepped:
             share = WIDE_DIFFERENCE if stepped else 0.0
-            search = _Search(near, near, ends, rows, share, smooth=not stepped)
+            search = _Search(near, sloping, ends, rows, share, smooth=not stepped)
             best = self._raced(search, firsts, slope)
         if self.steps != "wide" and stepped:
             first, known = (firsts[0], slope) if best is None else (best.x, best.slope)
-            best = _Search(residual, near, ends, rows).down(first, self.most, known)
+            best = _Search(residual, sloping, ends, rows).down(first, self.most, known)
         assert best is not None
         return best
 

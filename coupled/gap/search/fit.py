@@ -176,13 +176,13 @@ def _fit(
     scale = np.array([_scale(p) for p in frees])
     frames = sum(len(output.measured) for output in ours)
 
-    def residual(scaled: Floats, wide: bool = False) -> Floats:
+    def residual(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
             return np.full(frames, _FAR)
-        return np.concatenate([output.residual(rig, wide=wide) for output in ours])
+        return np.concatenate([output.residual(rig, "all", wide, rough) for output in ours])
 
     if not ours:
         known = dict(zip(keys, _starts(keys, frees, start)[0], strict=True))

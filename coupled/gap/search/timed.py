@@ -101,4 +101,4 @@ def timed(
         before = bare(less)
         return before + size * (output.predict(rig) - before)
 
-    return replace(output, predict=predict, _known=[])
+    return replace(output, predict=predict, rough=None, _known=[])

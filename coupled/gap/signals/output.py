@@ -84,6 +84,7 @@ class Output:
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
     One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
     that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
+    `rough` predicts nearly as well with fewer replays, where slopes are asked for.
     """
 
     stage: str
@@ -100,6 +101,7 @@ class Output:
     missed: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
     stepped: bool = False
     mismatch: float = 0.0
+    rough: Predict | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
@@ -111,16 +113,19 @@ class Output:
         change = stepped.residual(rig, wide=True) - stepped.residual(rig)
         return float(np.sqrt(np.mean(change**2))) < WIDE_NEAR
 
-    def residual(self, rig: Rig, part: Part = "all", wide: bool = False) -> Floats:
+    def residual(
+        self, rig: Rig, part: Part = "all", wide: bool = False, rough: bool = False
+    ) -> Floats:
         """Return measured less predicted, in floors, shape (frames,), of a part's stretches.
 
-        A `wide` one is by wide steps of the loader (`steps`).
+        A `wide` one is by wide steps of the loader (`steps`), a `rough` one to take slopes by.
         """
         rig = widely_stepped(rig) if wide and self.stepped else rig
-        key = (rig.controls, rig.flight, rig.substeps)
+        predict = self.rough if rough and self.rough is not None else self.predict
+        key = (rig.controls, rig.flight, rig.substeps, predict is self.predict)
         left = next((left for known, left in self._known if known == key), None)
         if left is None:
-            left = (self.measured - self.predict(rig)) / self.floor
+            left = (self.measured - predict(rig)) / self.floor
             self._known[:] = [*self._known[1 - _KEPT :], (key, left)]
         return left if part == "all" else left[self.rows(part)]
 

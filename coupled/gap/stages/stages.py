@@ -210,13 +210,13 @@ class Reader(Reading):
         answer = driven(force, smooth)
         walks = force is not noisy_force and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
-        return [self._made("loader", *made)]
+        whole = self._made("loader", *made)
+        return [replace(whole, rough=lambda rig: answer(rig, 0.0)) if walks else whole]
 
     def _answering(self) -> list[Output]:
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
-        # At the end of a play it jumps.
-        own = min(self.heard("force"), between_jumps(force), key=lambda noise: noise.rms)
+        own = min(self.heard("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
         made = (force, motion.predict(), motion.noisy, own, self.imposed)
         return [self._made("loader", self.name_of("force"), *made)]
 
