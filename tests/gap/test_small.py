@@ -36,7 +36,7 @@ def answered(
 
 def offset_and_weight(rig: Rig) -> Floats:
     loader = rig.controls["column"].loader
-    return loader.offset * FIRST + loader.bob_weight * SECOND
+    return np.asarray(loader.offset * FIRST + loader.bob_weight * SECOND)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_an_effect_that_gains_far_more_than_settings_is_found_within_the_limit(
 
     def predict(rig: Rig) -> Floats:
         loader = rig.controls["column"].loader
-        return 100.0 * (loader.mass / nominal - 1.0) * FIRST + loader.offset * ours
+        return np.asarray(100.0 * (loader.mass / nominal - 1.0) * FIRST + loader.offset * ours)
 
     case = answered(size * ours, predict, frames=frames)
     settled = case.fit(())
