@@ -16,6 +16,7 @@ from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit, touched
 from coupled.gap.thresholds import (
+    RACE_BEHIND,
     SCREEN_FACTORS,
     SCREEN_LESS,
     SCREEN_NEAR,
@@ -34,7 +35,7 @@ def screen(
     """Return the candidates whose signature takes most of the residual, and where to start.
 
     There is a start for each shape that an effect of several parameters begins from. One without
-    a parameter costs next to nothing to fit, and is always among them.
+    a parameter is always among them, unless it leaves far more than there was.
     """
     found = in_threads(lambda effect: _screened(case, current, effect), candidates)
     scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
@@ -64,7 +65,8 @@ def _screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dic
             # A limit that is never met leaves the residual as it is, and a fit where it was.
             if size > SCREEN_SHOWN * len(now) and float(left @ left) < least:
                 least, start = float(left @ left), values
-        starts += [start] if start or not effect.free else []
+        hopeless = not effect.free and least > RACE_BEHIND * float(now @ now)
+        starts += [start] if start or not (effect.free or hopeless) else []
     return best, starts
 
 
