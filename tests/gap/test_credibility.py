@@ -7,11 +7,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.answer import verdict_of
-from coupled.gap.findings.credibility import Credibility, Regime, remainder
+from coupled.gap.findings.credibility import Credibility, Regime, credibility, remainder
 from coupled.gap.findings.result import EffectResult, StageResult
+from coupled.gap.search.case import Case
+from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import REMAINDER
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+from tests.support.rigs import bench
 
 BOUND = 1.2
 
@@ -69,3 +76,25 @@ def test_what_imitates_is_unexplained_though_nothing_remains() -> None:
     assert verdict(0.97, 1.5) == "mostly"
     assert verdict(0.4, 1.0) == verdict(0.4, 1.5) == "unexplained"
     assert verdict(0.49, 1.0, ("stiffening_bend",)) == "ambiguous"
+
+
+@pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])
+def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -> None:
+    """It moves as much at any rate: a lag for it is larger where the pressure goes slowly."""
+    rng, frames, rate_Hz = np.random.default_rng(4), 6000, 120.0
+    rates = np.repeat(rng.uniform(9.0, 14.0, 20) * np.tile([1.0, -1.0], 10), frames // 20)
+    pressure = 900.0 + np.cumsum(rates) / rate_Hz
+    rig = bench()
+
+    def lagged(one: Rig) -> NDArray[np.float64]:
+        return np.asarray(pressure - rates * one.controls["column"].schedule.pressure_lag)
+
+    measured = pressure - lag_s * rates - width_Pa * np.sign(rates)
+    measured += rng.normal(0.0, 0.05, frames)
+    output = Output("schedule", "x", measured, lagged, 0.05, rate_Hz)
+    case, lag = Case(rig, "column", [output]), BY_NAME["pressure_lag"]
+    record = Record(
+        ("time_s", "dynamic_pressure_Pa"), np.column_stack((np.arange(frames) / rate_Hz, pressure))
+    )
+    found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
+    assert found.value > 0.99 if lag_s else found.value < 0.1

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import (
     DRIFT,
     FLEXIBLE_LEFT,
+    HOST_DRIFT,
     LEAST_OF_A_HALF,
     LEAST_REMAINDER,
     REMAINDER,
@@ -91,7 +92,7 @@ class Credibility:
 
     `remainder` is how much what remains says against it, 0 to 1 (`remainder`); `beside_flexible`
     and `against_flexible`, what the free model leaves alone over what the effects do, are None
-    where next to nothing does.
+    where next to nothing does. `may_drift` is from which drift an effect is hardly the cause.
     """
 
     effect: str
@@ -99,6 +100,7 @@ class Credibility:
     beside_flexible: float | None = None
     against_flexible: float | None = None
     remainder: float = 0.0
+    may_drift: float = DRIFT
 
     @property
     def worst(self) -> Regime | None:
@@ -119,7 +121,7 @@ class Credibility:
     @property
     def value(self) -> float:
         """A number from 1, as large everywhere and no function of a signal, to 0; smooth."""
-        same = 1.0 / (1.0 + (self.drift / DRIFT) ** 4)
+        same = 1.0 / (1.0 + (self.drift / self.may_drift) ** 4)
         if self.beside_flexible is None or self.against_flexible is None:
             return same
         needed = FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)
@@ -169,11 +171,14 @@ def credibility(
         left = output.residual(found.rig)
         action = output.residual(without) - left
         acts.append(_Acts(output, records[output.record], action, left))
-    regimes = _regimes(case, acts)
+    plain = Credibility(effect.name, _regimes(case, acts))
+    if effect.stage == "schedule":  # what a host works out of q̄ alone is known exactly
+        plain = replace(plain, may_drift=HOST_DRIFT)
     if remains < LEAST_REMAINDER or not acts or effect.signature.drawing == "time":
-        return Credibility(effect.name, regimes)
+        return plain
     most = max(acts, key=lambda one: float(one.action @ one.action))
-    return Credibility(effect.name, regimes, *_flexible(case, found, most), remains)
+    beside, against = _flexible(case, found, most)
+    return replace(plain, beside_flexible=beside, against_flexible=against, remainder=remains)
 
 
 def _flexible(case: Case, found: Fit, one: _Acts) -> tuple[float, float]:
@@ -216,6 +221,8 @@ def _dividing(case: Case, one: _Acts) -> dict[str, Floats]:
                 found[name] = signal
         elif name == "time_s" or "pressure" in name:
             found[name] = signal
+            if "rate" in name:  # a hysteresis moves as much at any rate, and a lag does not
+                found[f"size of {name}"] = np.abs(signal)
         elif "cubed" not in name:
             found[f"size of {name}"] = np.abs(signal - float(np.median(signal)))
     pressure = "dynamic_pressure_Pa"
