@@ -165,6 +165,7 @@ SHARES_IN = 0.3  # chosen: of the largest part, from which a number belongs to s
 
 # Screening (`screen`).
 SCREENED = 6  # chosen: candidates fitted in a round,
+SCREENED_BESIDE = 8  # chosen: and beside another effect, of which the size is not known yet,
 SCREENED_LEAST = 3  # chosen: and no fewer, however little they take beside the best
 SCREEN_NEAR = 0.15  # chosen: share of what the best takes, from which others are fitted, too
 SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
@@ -185,14 +186,12 @@ BEHIND_SHARE = 0.2  # chosen: and share of the best's gain, from which it is lef
 
 # Choosing (`choose`).
 LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it
+FIRST_OF_TWO = 3  # chosen: effects that are tried with another beside them, where none is worth it
 RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only answer
-NO_GAP_LEFT = 0.01  # floors²: a tenth of the floor is no gap to close; chosen
 MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leave
 SIMPLER_GAIN = 6.0  # chosen: by which more numbers must win in the loader where fewer close the gap
 SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dry friction is exact
-FAINT_GAP = 2.0  # under which the law of dry friction is open: 5 of 67 blind records, seeds 2 to 6
 STRAINED_GAIN = 30.0  # chosen: by which an effect must beat settings at their ends within a limit
-LAW_GAIN = 12.0  # by which the richer law must win there; the same records
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
 BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again
 NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen

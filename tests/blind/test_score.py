@@ -25,6 +25,7 @@ FACTOR = {
     "bend": {"bend_m_per_N": 9e-5},
 }
 STAGE = {"inertia": "loader", "viscous_damping": "loader", "bend": "linkage", "cogging": "loader"}
+STAGE |= {"stribeck_friction": "loader"}
 
 
 def truth(category: str, *names: str, ratio: float = 5.0, missing: tuple[str, ...] = ()) -> Truth:
@@ -174,6 +175,20 @@ def test_other_readings_of_a_truth(
     known = replace(truth("single", "inertia"), readings=(RUBS, YIELDS))
     answer = Answer("r", known, verdict, found, possible, guilty, frozenset(), 0.99)
     assert (answer.exact, answer.stage_right) == (exact, stage)
+
+
+@pytest.mark.parametrize(
+    ("friction", "exact"),
+    [("coulomb_friction", True), ("presliding_friction", True), ("load_friction", False)],
+)
+def test_a_reading_goes_by_all_of_its_names(friction: str, exact: bool) -> None:
+    """A breakaway that the record does not show is plain friction, and so friction that yields."""
+    plain = Reading(("bend", "coulomb_friction"), ("linkage", "loader"), True)
+    known = replace(truth("pair", "bend", "stribeck_friction"), readings=(plain,))
+    found = {name: FoundEffect(0.9, {}) for name in ("bend", friction)}
+    stages = frozenset(("linkage", "loader"))
+    answer = Answer("r", known, "effect", found, frozenset(found), stages, frozenset(), 0.99)
+    assert answer.exact == exact
 
 
 def test_a_budgets_shares_are_held_against_the_twins_own() -> None:

@@ -16,8 +16,9 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search import choose, information
+from coupled.gap.search.candidates import _possible
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import searched
+from coupled.gap.search.choose import _is_open, searched
 from coupled.gap.search.descent import End
 from coupled.gap.search.fit import Fit, _half_width, fit
 from coupled.gap.search.gain import Candidate
@@ -258,3 +259,31 @@ def test_a_servos_dead_time_is_no_slower_servo(tmp_path: Path) -> None:
     delay = effect.parameters[0]
     assert delay.low is not None and delay.high is not None
     assert delay.low < 0.02 < delay.high
+
+
+@pytest.mark.parametrize(("frame_rate_Hz", "possible"), [(120.0, False), (240.0, True)])
+def test_a_mode_too_fast_for_the_frames_is_none(frame_rate_Hz: float, possible: bool) -> None:
+    """A bend was named a mode of 76 Hz in a record of 120 Hz."""
+    mode = BY_NAME["structural_mode"]
+    still = Output("linkage", "x", np.zeros(FRAMES), lambda rig: np.zeros(FRAMES), 1.0, 120.0)
+    case = Case(bench(), "column", [replace(still, frame_rate_Hz=frame_rate_Hz)])
+    values = {mode.value_key(p): p.starts[0] for p in mode.free}
+    values["structural_mode.frequency_Hz"] = 76.0
+    found = replace(case.fit(()), effects=(mode,), values=values, at_bound=())
+    assert bool(_possible(case, [(mode, found)])) == possible
+
+
+@pytest.mark.parametrize("at_bound", [False, True])
+def test_what_all_of_the_record_puts_at_a_bound_is_no_cause(at_bound: bool) -> None:
+    """A damping by the square of the speed was put down to friction that fades by its most."""
+    rng = np.random.default_rng(9)
+    shape, noise = rng.normal(size=(2, FRAMES))
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        return np.asarray(rig.controls["column"].loader.offset * shape)
+
+    made_by = Output("loader", "x", 3.0 * shape + noise, predict, 1.0, 120.0)
+    case, offset = Case(bench(), "column", [made_by]), BY_NAME["force_offset"]
+    found = case.fit((offset,))
+    key = offset.value_key(offset.free[0])
+    assert _is_open(case, offset, replace(found, at_bound=(key,) if at_bound else ())) == at_bound

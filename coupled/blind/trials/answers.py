@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from coupled.blind.trials.key import Key
+from coupled.blind.trials.readings import same_law
 from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
 from coupled.files import check_format, read_json
@@ -83,9 +84,10 @@ class Answer:
 
     @property
     def _laws(self) -> list[frozenset[str]]:
-        """The sets of effects that are the truth."""
-        same = (frozenset(one.names) for one in self.truth.readings if one.sure)
-        return [self.truth.names, *same]
+        """The sets of effects that are the truth, each by all of its names."""
+        sure = [one.names for one in self.truth.readings if one.sure]
+        same = [one.names for names in sure for one in same_law(names)]
+        return [self.truth.names, *map(frozenset, (*sure, *same))]
 
     @property
     def names_right(self) -> bool:

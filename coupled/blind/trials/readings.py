@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-import numpy as np
-
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
-from coupled.gap.signals.output import Output, memory
-from coupled.gap.thresholds import NO_GAP_LEFT, RIVAL_GAIN
+from coupled.gap.search.gain import likelier_by
+from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
@@ -76,7 +73,7 @@ def not_distinguished(rig: Rig, record: Record, effects: Sequence[str]) -> Itera
         case = Case(rig, "column", [o for o in outputs if o.stage in shown])
         right = case.fit([BY_NAME[n] for n in here])
         wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
-        if _gain(case.outputs, right, wrong) < RIVAL_GAIN:
+        if likelier_by(case.outputs, right, wrong) < RIVAL_GAIN:
             yield reading({other, *effects} - {name}, sure=sure)
 
 
@@ -84,14 +81,3 @@ def reading(names: Iterable[str], *, sure: bool) -> Reading:
     """Return a reading with the stages of its effects."""
     known = sorted(names)
     return Reading(tuple(known), tuple(sorted({BY_NAME[name].stage for name in known})), sure)
-
-
-def _gain(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
-    """Return the log-likelihood by which the right fit beats the wrong one."""
-    gain = 0.0
-    for output in outputs:
-        left = output.residual(right.rig)
-        after, before = (float(np.mean(output.residual(r.rig) ** 2)) for r in (right, wrong))
-        count = 0.5 * len(left) / memory(left)
-        gain += count * float(np.log((before + NO_GAP_LEFT) / (after + NO_GAP_LEFT)))
-    return gain

@@ -21,8 +21,9 @@ from coupled.gap.findings.result import (
 )
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice, Found
+from coupled.gap.search.choose import Choice
 from coupled.gap.search.courses import course_in
+from coupled.gap.search.rivals import Found
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE
 from coupled.record.channels import ControlName, unit_of

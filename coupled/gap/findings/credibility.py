@@ -92,7 +92,8 @@ class Credibility:
 
     `remainder` is how much what remains says against it, 0 to 1 (`remainder`); `beside_flexible`
     and `against_flexible`, what the free model leaves alone over what the effects do, are None
-    where next to nothing does. `may_drift` is from which drift an effect is hardly the cause.
+    where next to nothing does. In a stage that is `exact` an effect drifts by less, and leaves
+    nothing: what a host works out of q̄ has no noise of its own.
     """
 
     effect: str
@@ -100,7 +101,7 @@ class Credibility:
     beside_flexible: float | None = None
     against_flexible: float | None = None
     remainder: float = 0.0
-    may_drift: float = DRIFT
+    exact: bool = False
 
     @property
     def worst(self) -> Regime | None:
@@ -121,7 +122,9 @@ class Credibility:
     @property
     def value(self) -> float:
         """A number from 1, as large everywhere and no function of a signal, to 0; smooth."""
-        same = 1.0 / (1.0 + (self.drift / self.may_drift) ** 4)
+        same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
+        if self.exact:
+            return same * (1.0 - self.remainder)
         if self.beside_flexible is None or self.against_flexible is None:
             return same
         needed = FLEXIBLE_LEFT / max(self.beside_flexible, 1e-9)
@@ -171,14 +174,14 @@ def credibility(
         left = output.residual(found.rig)
         action = output.residual(without) - left
         acts.append(_Acts(output, records[output.record], action, left))
-    plain = Credibility(effect.name, _regimes(case, acts))
-    if effect.stage == "schedule":  # what a host works out of q̄ alone is known exactly
-        plain = replace(plain, may_drift=HOST_DRIFT)
+    plain = Credibility(effect.name, _regimes(case, acts), remainder=remains)
+    if effect.stage == "schedule":
+        return replace(plain, exact=True)
     if remains < LEAST_REMAINDER or not acts or effect.signature.drawing == "time":
         return plain
     most = max(acts, key=lambda one: float(one.action @ one.action))
     beside, against = _flexible(case, found, most)
-    return replace(plain, beside_flexible=beside, against_flexible=against, remainder=remains)
+    return replace(plain, beside_flexible=beside, against_flexible=against)
 
 
 def _flexible(case: Case, found: Fit, one: _Acts) -> tuple[float, float]:

@@ -144,13 +144,24 @@ def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits
 
 
 def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
-    """Return the effects fitted that are away from their bounds, and beyond their settings."""
+    """Return the effects fitted that are away from their bounds, and beyond their settings.
+
+    Not those of a frequency too fast for the frames, but a tone's, which is known to fold.
+    """
+    fastest = 0.5 * min(output.frame_rate_Hz for output in case.outputs)
     return [
         (effect, fitted)
         for effect, fitted in found
         if not any(effect.value_key(p) in fitted.at_bound for p in effect.free)
         and not _within_tolerance(case, effect, fitted)
+        and all(fitted.values[key] < fastest for key in _frequencies(effect))
     ]
+
+
+def _frequencies(effect: Effect) -> list[str]:
+    """Return the names of an effect's numbers that are frequencies, in Hz, and do not fold."""
+    numbers = [p for p in effect.free if p.name == "frequency_Hz" and not p.folds]
+    return [effect.value_key(p) for p in numbers]
 
 
 def _near_the_best(

@@ -11,20 +11,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing
-from coupled.gap.search.laws import family, other_laws
+from coupled.gap.search.intwo import in_two
+from coupled.gap.search.rivals import Found, found_by, separated, tried_again
 from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
-    FAINT_GAP,
     LEAST_GAIN,
     MOST_EFFECTS,
     NEEDLESS_GAIN,
@@ -32,16 +30,6 @@ from coupled.gap.thresholds import (
     SIMPLER_GAIN,
     SIMPLER_SHARE,
 )
-
-
-@dataclass(frozen=True)
-class Found:
-    """One effect found: its gain, and the others that the record does not distinguish from it."""
-
-    effect: Effect
-    gain: float
-    probability: float
-    rivals: tuple[Candidate, ...]
 
 
 @dataclass(frozen=True)
@@ -68,7 +56,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
     idle: set[str] = set()  # guilty outputs for which nothing was found
-    stood: list[set[str]] = [set()]  # the sets of effects that the search has stood at
+    stood = [settled]  # the fits that the search has stood at
     circled, halves = False, None
     while len(steps) < MOST_EFFECTS:
         ranked = _round(case, settled, current, library, idle)
@@ -76,7 +64,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
-        steps.append(_step(case, settled, best, ranked))
+        steps.append(found_by(best, ranked))
         halves = found = best.fit
         current = case.fit((*current.effects, best.effect), start=found.values, near=found)
         idle -= set(best.effect.shows_in)
@@ -89,48 +77,75 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
         needless = _needless(case, current)
         if needless is not None:
             steps = [step for step in steps if step.effect is not needless]
-            rest = tuple(effect for effect in current.effects if effect is not needless)
-            current = case.fit(rest, start=current.values)
+            current = _with_only(case, stood, steps, current)
             if needless is best.effect:
                 break
             # Effects that displace one another would be found and dropped without end.
-            now = {step.effect.name for step in steps}
-            circled = now in stood
+            circled = any(set(one.effects) == set(current.effects) for one in stood)
             if circled:
                 break
-        stood.append({step.effect.name for step in steps})
-    yields = yielding_reading(case, current)
-    if yields is not None:
-        plain, law, start = yields
-        steps = [replace(one, effect=law) if one.effect is plain else one for one in steps]
-        current = case.fit([one.effect for one in steps], start=start)
-    empty = [step for step in steps if says_nothing(case, step.effect, current)]
-    if empty:
-        steps = [step for step in steps if step not in empty]
-        current = case.fit([step.effect for step in steps], start=current.values)
-    if len(steps) > 1:
-        steps = [_again(case, settled, current, step) for step in steps]
+        stood.append(current)
+    steps, current = _looked_over(case, library, stood, steps, current)
     tried = next((gains for gains in rounds if gains), {})
     if halves is not None and halves.effects != current.effects:
         halves = None
     return Choice(tuple(steps), current, settled, tried, tuple(rounds), circled, halves)
 
 
-def _again(case: Case, settled: Fit, current: Fit, step: Found) -> Found:
-    """Return a step whose rivals are tried again, now that the other effects are known."""
-    if not step.rivals:
-        return step
-    rest = tuple(effect for effect in current.effects if effect is not step.effect)
+def _looked_over(
+    case: Case, library: Sequence[Effect], stood: list[Fit], steps: list[Found], current: Fit
+) -> tuple[list[Found], Fit]:
+    """Return the steps and the fit, each effect looked at once more beside all the others."""
+    if len(steps) > 1:
+        steps, current = _law_again(case, stood[0], library, steps, current)
+    yields = yielding_reading(case, current)
+    if yields is not None:
+        plain, law, start = yields
+        steps = [replace(one, effect=law) if one.effect is plain else one for one in steps]
+        current = case.fit([one.effect for one in steps], start=start)
+    empty = [step for step in steps if _is_open(case, step.effect, current)]
+    if empty:
+        steps = [step for step in steps if step not in empty]
+        current = _with_only(case, stood, steps, current)
+    if len(steps) > 1:
+        steps = [tried_again(case, current, step) for step in steps]
+    return [separated(case, current, step) for step in steps], current
+
+
+def _is_open(case: Case, effect: Effect, current: Fit) -> bool:
+    """Tell whether all of the record leaves an effect open, or at a bound of one of its numbers."""
+    at_bound = any(effect.value_key(p) in current.at_bound for p in effect.free)
+    return at_bound or says_nothing(case, effect, current)
+
+
+def _with_only(case: Case, stood: Sequence[Fit], steps: Sequence[Found], current: Fit) -> Fit:
+    """Return the fit of the effects that are left, or the one that did better before others."""
+    effects = [step.effect for step in steps]
+    before = [one for one in stood if set(one.effects) == set(effects)]
+    return min([case.fit(effects, start=current.values), *before], key=lambda one: one.cost)
+
+
+def _law_again(
+    case: Case, settled: Fit, library: Sequence[Effect], steps: list[Found], current: Fit
+) -> tuple[list[Found], Fit]:
+    """Return the steps and the fit with the law of dry friction that the other effects leave.
+
+    Beside what was not found yet, plain friction passed for a richer law.
+    """
+    plain = next((effect for effect in current.effects if effect.yielding), None)
+    if plain is None:
+        return steps, current
+    rest = tuple(effect for effect in current.effects if effect is not plain)
     without = case.fit(rest, "fitted", current.values)
-    tries = [step.effect, *(rival.effect for rival in step.rivals)]
-    found = [
-        (effect, case.fit((*rest, effect), "fitted", current.values))
-        for effect in tries
-        if effect not in rest
-    ]
-    ranked = ranked_by_gain(case.outputs, without, found)
-    own = next(candidate for candidate in ranked if candidate.effect is step.effect)
-    return _step(case, settled, own, ranked)
+    dry = [effect for effect in library if effect.dry]
+    ranked = fitted_candidates(case, without, dry, set(plain.shows_in))
+    best = _simplest(case, settled, ranked) if ranked else None
+    if best is None or best.gain < LEAST_GAIN or best.effect.alike is None:
+        return steps, current
+    found = found_by(best, ranked)
+    steps = [found if one.effect is plain else one for one in steps]
+    effects = [one.effect for one in steps]
+    return steps, case.fit(effects, start=best.fit.values, near=best.fit)
 
 
 def _needless(case: Case, current: Fit) -> Effect | None:
@@ -146,26 +161,6 @@ def _needless(case: Case, current: Fit) -> Effect | None:
         if missed < NEEDLESS_GAIN and (least is None or missed < least[0]):
             least = (missed, effect)
     return None if least is None else least[1]
-
-
-def _step(case: Case, settled: Fit, best: Candidate, ranked: Sequence[Candidate]) -> Found:
-    """Return a found effect with its rivals; what holds it as a special case is none.
-
-    Unless the gap is faint: there one law of dry friction passes for another.
-    """
-    others = [
-        other
-        for other in ranked
-        if other is not best and len(other.effect.free) <= len(best.effect.free)
-    ]
-    rivals = [other for other in others if other.gain > best.gain - RIVAL_GAIN]
-    gaps = stage_gaps(case.outputs, settled.rig)
-    laws = family(best.effect)
-    if laws and all(gaps.get(at, 0.0) < FAINT_GAP for at in best.effect.shows_in):
-        rivals = [other for other in rivals if other.effect not in laws]
-        rivals += other_laws(case, best, ranked)
-    weights = sum(float(np.exp(min(other.gain - best.gain, 0.0))) for other in others)
-    return Found(best.effect, best.gain, 1.0 / (1.0 + weights), tuple(rivals))
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:
@@ -214,6 +209,8 @@ def _round(
     for output in sorted(wide - idle, key=lambda at: -now[at]):
         ranked = fitted_candidates(case, current, library, {output})
         tried = tried or ranked
+        if ranked and ranked[0].gain < LEAST_GAIN:
+            ranked = in_two(case, settled, library, output, ranked)
         if ranked and ranked[0].gain >= LEAST_GAIN:
             return ranked
         idle.add(output)

@@ -36,7 +36,7 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     if ranked and ranked[0].gain >= LEAST_GAIN:
         return ranked
     single = [one for one in open_ones if len(one[0].free) == 1]
-    others = ranked_by_gain(case.outputs, current, single) if single else ranked
+    others = ranked_by_gain(case.outputs, current, [*clear, *single])
     # Two that are one law differ by rounding alone: the library's order settles it.
     return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
 

@@ -8,19 +8,16 @@ score test (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948). It costs six replays, a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, apply, possible, value_of
-from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.effects.effect import Effect, possible, value_of
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import leaves_noise
 from coupled.gap.search.fit import Fit, touched
-from coupled.gap.search.gain import Candidate
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, memory
-from coupled.gap.thresholds import HARDLY, LAW_GAIN, RICHER, SHAPES, SIMPLER_GAIN
+from coupled.gap.thresholds import HARDLY, RICHER, SHAPES, SIMPLER_GAIN
 from coupled.parallel import go_on
 
 Starts = list[dict[str, float]]
@@ -66,38 +63,6 @@ def imitating(case: Case, richer: Effect, plain: Effect, fitted: Fit) -> dict[st
     base = float(value_of(case.nominal, case.control, richer.alike.base))
     values = richer.alike.values(known, base)
     return {richer.value_key(p): values[p.name] for p in richer.free}
-
-
-def family(effect: Effect) -> tuple[Effect, ...]:
-    """Return an effect with those that pass for it, or for which it passes, in a faint gap."""
-    found: list[Effect] = []
-    for richer in EFFECTS:
-        if richer.alike is not None and effect.name in (richer.name, richer.alike.plainer):
-            found += [BY_NAME[richer.alike.plainer], richer]
-    return tuple(dict.fromkeys(found))
-
-
-def other_laws(case: Case, best: Candidate, ranked: Sequence[Candidate]) -> list[Candidate]:
-    """Return the effects that a faint gap does not distinguish from the best.
-
-    The richer of two laws excludes the plainer by its gain; the plainer never excludes the
-    richer, which may pass for it.
-    """
-    if best.effect.alike is not None:
-        plainer = best.effect.alike.plainer
-        return [
-            one for one in ranked if one.effect.name == plainer and one.gain > best.gain - LAW_GAIN
-        ]
-    found = []
-    for richer in family(best.effect):
-        if richer.alike is None:
-            continue
-        values = {**best.fit.values, **imitating(case, richer, best.effect, best.fit)}
-        effects = (*(e for e in best.fit.effects if e is not best.effect), richer)
-        rig = apply(case.nominal, case.control, (*effects, *case.nuisances(effects)), values)
-        fitted = replace(best.fit, effects=effects, values=values, rig=rig)
-        found.append(Candidate(best.gain, richer, fitted))
-    return found
 
 
 def _contact_of(case: Case, found: Fits) -> dict[str, float]:

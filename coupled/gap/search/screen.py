@@ -23,6 +23,7 @@ from coupled.gap.thresholds import (
     SCREEN_SHOWN,
     SCREEN_SIZES,
     SCREENED,
+    SCREENED_BESIDE,
     SCREENED_LEAST,
 )
 from coupled.parallel import go_on, in_threads
@@ -35,13 +36,15 @@ def screen(
     """Return the candidates whose signature takes most of the residual, and where to start.
 
     There is a start for each shape that an effect of several parameters begins from. One without
-    a parameter is always among them, unless it leaves far more than there was.
+    a parameter is always among them, unless it leaves far more than there was. Beside an effect
+    more are kept: its size is not right until the other's is known, and so neither is what is left.
     """
     found = in_threads(lambda effect: _screened(case, current, effect), candidates)
     scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
     scores.sort(key=lambda item: -item[0])
     near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
-    most = min(SCREENED, max(SCREENED_LEAST, len(near)))
+    many = SCREENED_BESIDE if current.effects else SCREENED
+    most = min(many, max(SCREENED_LEAST, len(near)))
     kept = scores[:most] + [item for item in scores[most:] if not item[2].free]
     return [(effect, starts) for _, starts, effect in kept]
 
