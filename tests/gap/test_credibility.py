@@ -98,3 +98,14 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -
     )
     found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
     assert found.value > 0.99 if lag_s else found.value < 0.1
+
+
+@pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])
+def test_what_remains_of_an_exact_stage_is_held_against_an_effect(
+    remains: float, value: float
+) -> None:
+    """A lag took 80 % of a hysteresis at rates that hardly change, and does not drift."""
+    assert Credibility("pressure_lag", (), remainder=remains, exact=True).value == pytest.approx(
+        value
+    )
+    assert Credibility("coulomb_friction", (), remainder=remains).value == 1.0

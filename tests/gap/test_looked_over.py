@@ -1,0 +1,72 @@
+"""What is looked at once more when a search has ended: laws of friction, and fits that ended worse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search import choose
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import _law_again, _with_only
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.rivals import Found
+from coupled.gap.signals.output import Output
+from coupled.rig.rig import Rig
+from tests.support.rigs import bench
+
+FRAMES = 2400
+SHAPE, OTHER, NOISE = np.random.default_rng(2).normal(size=(3, FRAMES))
+OFFSET, PLAIN, RICHER = (
+    BY_NAME[name] for name in ("force_offset", "coulomb_friction", "stribeck_friction")
+)
+
+
+def rubbing_with_an_offset() -> Case:
+    def predict(rig: Rig) -> NDArray[np.float64]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * SHAPE + loader.friction * OTHER)
+
+    measured = 3.0 * SHAPE + 2.0 * OTHER + NOISE
+    return Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
+
+
+def steps_of(*effects: Effect) -> list[Found]:
+    return [Found(effect, 50.0, 1.0, ()) for effect in effects]
+
+
+@pytest.mark.parametrize(("gain", "named"), [(40.0, RICHER), (5.0, PLAIN)])
+def test_a_law_of_friction_is_asked_again_beside_what_was_found_later(
+    monkeypatch: pytest.MonkeyPatch, gain: float, named: Effect
+) -> None:
+    """Before the offset was known, plain friction passed for a breakaway."""
+    case = rubbing_with_an_offset()
+    asked: list[tuple[set[str], set[bool]]] = []
+
+    def candidates(
+        case: Case, without: Fit, library: list[Effect], outputs: set[str]
+    ) -> list[Candidate]:
+        asked.append(({one.name for one in without.effects}, {one.dry for one in library}))
+        return [Candidate(gain, RICHER, case.fit((*without.effects, RICHER), "fitted"))]
+
+    monkeypatch.setattr(choose, "fitted_candidates", candidates)
+    current = case.fit((PLAIN, OFFSET))
+    library = [OFFSET, PLAIN, RICHER]
+    steps, anew = _law_again(case, case.fit(()), library, steps_of(PLAIN, OFFSET), current)
+    assert asked == [({"force_offset"}, {True})]
+    assert [step.effect for step in steps] == [named, OFFSET]
+    assert set(anew.effects) == {named, OFFSET}
+
+
+def test_an_effect_dropped_leaves_the_best_fit_that_is_known() -> None:
+    """A refit from where the other effect had moved the numbers may end in a hollow."""
+    case = rubbing_with_an_offset()
+    both, known = case.fit((PLAIN, OFFSET)), case.fit((PLAIN,))
+    assert _with_only(case, [], steps_of(PLAIN), both).cost == pytest.approx(known.cost, rel=1e-3)
+    better = replace(known, cost=0.5 * known.cost)
+    assert _with_only(case, [case.fit(()), better, both], steps_of(PLAIN), both) is better
