@@ -36,7 +36,7 @@ from coupled.plots.trials import draw_score
 from tests.support.commands import ROOT
 
 SCORED = "the version of 23 November 2026"  # whose diagnoses the file scores
-SINCE = "No threshold was set on them; they were scored once, and two faults were mended since."
+SINCE = "No threshold was set on them, and they were scored once."
 JSON, FIGURE = ROOT / "docs" / "blind-score.json", ROOT / "docs" / "blind-score.png"
 README, TABLE = ROOT / "README.md", ROOT / "docs" / "diagnosis.md"
 NOT_SCORED = Share(0, 0, None, None, None)  # by an older version

@@ -1,4 +1,4 @@
-"""What is looked at once more when a search has ended: laws of friction, and fits that ended worse."""
+"""What is looked at once more when a search has ended: the law of friction, and fits."""
 
 from __future__ import annotations
 
