@@ -18,6 +18,8 @@ from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import Output, spread
 from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support import gaps
@@ -164,3 +166,23 @@ def test_coloured_noise_of_a_surface_reaches_the_airframes_floor(
     faulty = gaps.made(tmp_path, rig, {"surface_lag": {"lag_s": 0.05}}, 3)
     plain = airframe_floor(rig, record, 0.0 * noise)[1]
     assert airframe_floor(rig, faulty, 0.0 * noise)[1] == pytest.approx(plain, rel=0.1)
+
+
+def test_a_late_force_may_have_reached_the_host_with_another_noise(tmp_path: Path) -> None:
+    """Beside δc's noise, K̂ times that which the host had, and that of the record moved in time.
+
+    By 3.6 frames, between frames: the cubic through four weighs them −0.056, 0.448, 0.672, −0.064.
+    """
+    rig = gaps.nominal_rig(False)
+    record = gaps.made(tmp_path, rig, {}, 4)
+
+    def floor(of: Rig) -> float:
+        outputs = Reader(of, record, "column", surface_points).outputs()
+        return next(output.floor for output in outputs if output.stage == "compensation")
+
+    late = rig.changed({"controls.column.sensing.force_stamp_s": 0.03})
+    moved = 0.056**2 + 0.448**2 + 0.672**2 + 0.064**2
+    force = Reader(rig, record, "column", surface_points).heard("force").rms
+    host = (rig.controls["column"].compensation.bend * force) ** 2
+    more = floor(late) ** 2 - floor(rig) ** 2
+    assert more == pytest.approx((1.0 + moved) * host, rel=0.06)

@@ -12,12 +12,15 @@ from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.fit import fit
+from coupled.gap.stages import ratchet
+from coupled.gap.stages.ratchet import unratcheted
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.records import NOISE
+from tests.support.rigs import bench
 
 PLAY_m = 8e-4
 
@@ -64,7 +67,9 @@ def held(rig: Rig, seed: int, tmp_path: Path) -> Record:
     return fly(Manoeuvre(noisy, {"column": pilot}, 30.0, seed=seed, bench=still))
 
 
-def test_noise_of_a_held_force_walks_no_contact(tmp_path: Path) -> None:
+def test_noise_of_a_held_force_walks_no_contact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Driven by the force as measured, the true rig itself would leave 3.5 floors, and 2.5."""
     stiffness = "controls.column.loader.friction_stiffness_N_per_m"
     rig = nominal_rig(False).changed({"controls.column.loader.friction_N": 7.5})
@@ -76,8 +81,39 @@ def test_noise_of_a_held_force_walks_no_contact(tmp_path: Path) -> None:
         # Slopes are taken without putting the walk back: a replay for three, and nearly the same.
         assert loader.rough is not None
         assert np.any(loader.rough(real) != loader.predict(real))
+        monkeypatch.setattr(ratchet, "PUSHED", (1e9, 2e9))  # all of it is put back, of both rigs
         other = rig.changed({stiffness: 7.5 / 1.4e-4, "controls.column.loader.friction_N": 7.6})
         moved, roughly = (
             output_of(other) - output_of(real) for output_of in (loader.predict, loader.rough)
         )
+        monkeypatch.undo()
         assert float(moved @ roughly) > 0.5 * float(np.linalg.norm(moved) * np.linalg.norm(roughly))
+
+
+@pytest.mark.parametrize(
+    ("held", "kept"),
+    [(1.0, 0.0), (0.6, 0.0), (0.0, 1.0)],  # of the push foretold, what noise gave
+)
+def test_a_push_that_noise_did_not_give_is_left(held: float, kept: float) -> None:
+    """Noise pushed a play by next to nothing, and half as much again by 0.4 of a floor.
+
+    What was foretold left the true rig 0.94 floors off, for 0.81, and its play 10 % too small.
+    """
+    rng = np.random.default_rng(3)
+    pushed, real = rng.normal(size=(2, 2000))
+    measured = real + 0.3 * rng.normal(size=2000)
+    rig = bench({"play_m": PLAY_m})
+
+    def at(rig: Rig, times: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        more = (2.0**0.5 - 1.0) * abs(times)  # as much noise again pushes √2 times as far
+        return np.asarray(real + (held + more) * pushed)
+
+    answer = unratcheted(rig, "column", at, measured)
+    np.testing.assert_allclose(answer, real + (held - 1.0 + kept) * pushed, atol=1e-12)
+
+
+def test_a_linkage_without_play_is_not_pushed() -> None:
+    def at(rig: Rig, times: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        return np.full(10, times)
+
+    assert np.all(unratcheted(bench(), "column", at, np.ones(10)) == 0.0)

@@ -5,7 +5,8 @@ trembles on; each greatest tremble pushes the grip's side of a play, and none dr
 fit finds the play too large, by 1 % of 0.8 mm at 20 μm of noise, and by 2 % at 40. It is pushed as
 far as the tremble is large: the stage is driven once more with as much noise again, and what that
 changes is taken off in proportion (simulation and extrapolation: Cook and Stefanski, JASA 89,
-1994). With the noise of both signs, what goes straight with it falls out.
+1994). With the noise of both signs, what goes straight with it falls out. Noise may be too small to
+push what half as much again does push: then the record shows none of it, and it is left.
 
 A contact of dry friction that yields walks likewise: where the force rests, each tremble of F as
 measured lets it slip a little, and it gives way as the real one, which never felt that, does not.
@@ -23,7 +24,7 @@ from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import RATCHET, WALKED, WALKED_BY, WALKED_N
+from coupled.gap.thresholds import PUSHED, RATCHET, WALKED, WALKED_BY, WALKED_N
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.nodes import Nodes
 from coupled.rig.rig import Rig
@@ -52,19 +53,21 @@ def passed_noise(
     return Nodes(computed), force
 
 
-def unratcheted(rig: Rig, control: ControlName, at: Driven) -> Floats:
+def unratcheted(rig: Rig, control: ControlName, at: Driven, measured: Floats) -> Floats:
     """Return what a linkage makes of its input, without what noise does to its play.
 
-    `at` drives it with so many times a sample of the input's noise added.
+    `at` drives it with so many times a sample of the input's noise added; shapes (frames,).
     """
     loader = rig.controls[control].loader
     plain = at(rig, 0.0)
     if loader.play == 0.0 and loader.bend_hysteresis_share == 0.0:
         return plain
-    return _put_back(plain, at(rig, 1.0), at(rig, -1.0))
+    return _put_back(measured, plain, at(rig, 1.0), at(rig, -1.0))
 
 
-def unwalked(rig: Rig, control: ControlName, at: Driven, times: float = 1.0) -> Floats:
+def unwalked(
+    rig: Rig, control: ControlName, at: Driven, measured: Floats, times: float = 1.0
+) -> Floats:
     """Return what a loader makes of its force, without what noise does to a contact that yields.
 
     The force holds so many `times` the noise that is passed.
@@ -72,7 +75,7 @@ def unwalked(rig: Rig, control: ControlName, at: Driven, times: float = 1.0) -> 
     plain = at(rig, 0.0)
     if rig.controls[control].loader.friction_stiffness == 0.0 or not is_dry(rig, control):
         return plain
-    return _put_back(plain, at(rig, times), at(rig, -times))
+    return _put_back(measured, plain, at(rig, times), at(rig, -times))
 
 
 def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
@@ -93,6 +96,15 @@ def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
     return bool(walked > WALKED * shaken)
 
 
-def _put_back(plain: Floats, up: Floats, down: Floats) -> Floats:
-    """Return an answer without what noise has pushed it by, from two with as much noise again."""
-    return plain + RATCHET * (plain - 0.5 * (up + down))
+def _put_back(measured: Floats, plain: Floats, up: Floats, down: Floats) -> Floats:
+    """Return an answer without what noise has pushed it by, from two with as much noise again.
+
+    All that is foretold is taken off, unless the answer then departs from what was measured by
+    more: between the two shares of `PUSHED`, part of it. A play's size takes up what is small of a
+    push, and what is measured cannot say then how large it was.
+    """
+    push = RATCHET * (plain - 0.5 * (up + down))
+    before, after = (float(np.mean((measured - one) ** 2)) for one in (plain, plain + push))
+    some, much = PUSHED
+    worse = after / before - 1.0 if before > 0.0 else 0.0
+    return plain + min(max((much - worse) / (much - some), 0.0), 1.0) * push

@@ -34,6 +34,7 @@ from coupled.gap.signals.floors import (
 from coupled.gap.signals.output import Hides, Output, Predict, echoed, felt, heard, spread
 from coupled.gap.signals.reading import Reading
 from coupled.gap.signals.served import asked, left, services
+from coupled.gap.stages.compensated import compensated
 from coupled.gap.stages.imposed import Imposed
 from coupled.gap.stages.openloop import about
 from coupled.gap.stages.product import Product
@@ -64,7 +65,6 @@ from coupled.rig.nodes import Nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
-    replay_compensation,
     replay_schedule,
     replay_surface,
 )
@@ -193,7 +193,10 @@ class Reader(Reading):
             return at
 
         def predicted(at: Driven, times: float = 1.0) -> Predict:
-            return lambda rig: unwalked(rig, self.control, at, times) if walks else at(rig, 0.0)
+            def walked(rig: Rig) -> Floats:
+                return unwalked(rig, self.control, at, computed, times)
+
+            return walked if walks else lambda rig: at(rig, 0.0)
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + NOISE_TRIES, own)
@@ -248,7 +251,7 @@ class Reader(Reading):
                 )
                 return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
-            return lambda rig: unratcheted(rig, self.control, at)
+            return lambda rig: unratcheted(rig, self.control, at, measured)
 
         def noisy(rig: Rig, k: int) -> Floats:
             f = with_error(smooth_force, k + NOISE_TRIES, force_level)
@@ -258,20 +261,8 @@ class Reader(Reading):
         return [self._made("linkage", self.name_of("deflection"), *made, "computed")]
 
     def _compensation(self) -> list[Output]:
-        """Return δ̂ against the host's arithmetic on what the record says that it read.
-
-        Its floor is δc's noise, though both hold the same: F may be stamped a little late.
-        """
-        computed, recorded, others = self.signal("computed"), self.signal("force"), self.others()
-
-        def predict(rig: Rig) -> Floats:
-            force = self.sensed(rig).as_the_host_had_it(recorded)
-            missed = self.missed.under(rig, self.control)
-            return replay_compensation(rig, self.control, computed, force, others, missed)
-
-        floor = max(self.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
-        name = self.name_of("estimate")
-        return [self._output("compensation", name, self.signal("estimate"), predict, floor)]
+        """Return δ̂ against the host's arithmetic on what the record says that it read."""
+        return [self._output("compensation", *compensated(self))]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

@@ -1,0 +1,42 @@
+"""The compensation's output: δ̂, by the host's own arithmetic on the δc and F that it read."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.signals.floors import unsmoothed
+from coupled.gap.signals.output import Predict
+from coupled.gap.signals.reading import Reading
+from coupled.gap.thresholds import ROUNDING_SPAN
+from coupled.rig.replay import replay_compensation
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+
+
+def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
+    """Return the channel's name, δ̂ as recorded, how a rig predicts it, and its floor, d.
+
+    The floor is δc's noise, though both hold the same: F may be stamped a little late. Where the
+    rig has it late, the record may hold another noise of F than the host had.
+    """
+    computed, recorded = reading.signal("computed"), reading.signal("force")
+    control, others = reading.control, reading.others()
+
+    def made(rig: Rig, force: Floats) -> Floats:
+        missed = reading.missed.under(rig, control)
+        return replay_compensation(rig, control, computed, force, others, missed)
+
+    def predict(rig: Rig) -> Floats:
+        return made(rig, reading.sensed(rig).as_the_host_had_it(recorded))
+
+    floor = max(reading.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
+    rig = reading.rig
+    if rig.controls[control].sensing.force_stamp != 0.0:
+        level, late = reading.heard("force"), reading.sensed(rig).as_the_host_had_it
+        shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
+        floor = math.hypot(floor, *(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
+    return reading.name_of("estimate"), reading.signal("estimate"), predict, floor
