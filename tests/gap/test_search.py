@@ -16,14 +16,17 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search import choose, information
-from coupled.gap.search.candidates import _possible
+from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import _is_open, searched
 from coupled.gap.search.descent import End
 from coupled.gap.search.fit import Fit, _half_width, fit
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.search.screen import screen
 from coupled.gap.signals.output import Output
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
@@ -270,7 +273,7 @@ def test_a_mode_too_fast_for_the_frames_is_none(frame_rate_Hz: float, possible: 
     values = {mode.value_key(p): p.starts[0] for p in mode.free}
     values["structural_mode.frequency_Hz"] = 76.0
     found = replace(case.fit(()), effects=(mode,), values=values, at_bound=())
-    assert bool(_possible(case, [(mode, found)])) == possible
+    assert bool(may_be_causes(case, [(mode, found)])) == possible
 
 
 @pytest.mark.parametrize("at_bound", [False, True])
@@ -287,3 +290,16 @@ def test_what_all_of_the_record_puts_at_a_bound_is_no_cause(at_bound: bool) -> N
     found = case.fit((offset,))
     key = offset.value_key(offset.free[0])
     assert _is_open(case, offset, replace(found, at_bound=(key,) if at_bound else ())) == at_bound
+
+
+def test_a_play_with_a_stiff_contact_has_a_start_near_it(tmp_path: Path) -> None:
+    """From softer ones a fit ended at no play at all, with a contact that stood for a bend."""
+    rig, soft = nominal_rig(False), BY_NAME["soft_backlash"]
+    true = {"play_{d}": 1.45e-4, "stiffness_N_per_{d}": 3.6e5}
+    outputs = Reader(rig, made(tmp_path, rig, {soft.name: true}, 3), "column", surface_points)
+    case = Case(rig, "column", [one for one in outputs.outputs() if one.stage == "linkage"])
+    [(_, starts)] = screen(case, case.fit(()), [soft])
+    off = [
+        max(abs(np.log2(s[soft.value_key(p)] / true[p.name])) for p in soft.free) for s in starts
+    ]
+    assert min(off) < 1.0

@@ -115,6 +115,14 @@ EFFECTS: tuple[Effect, ...] = (
     ),
 )
 BY_NAME = {effect.name: effect for effect in EFFECTS}
+# One law in a limit that a record may not leave: a rig that does not bend, a short lag, a lift that
+# is all of the angle of attack.
+ONE_LAW = (
+    ("force_zero", "force_offset"),
+    ("force_skew", "transport_delay"),
+    ("viscous_damping", "modifying_lag"),
+    ("mass", "lift_slope"),
+)
 
 
 def _ends(effect: Effect) -> tuple[float, float, float]:

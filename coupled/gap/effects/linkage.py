@@ -39,7 +39,7 @@ LINKAGE: tuple[Effect, ...] = (
             replace(
                 limit(
                     *("stiffness_N_per_{d}", "loader.play_stiffness_N_per_{d}"),
-                    *(1e3, 1e8, 1e5, 2e4),
+                    *(1e3, 1e8, 5e5, 1e5, 2e4),
                 ),
                 scanned=False,
                 shape=True,

@@ -87,10 +87,10 @@ def _fitted(
 
     racing, given_up = _still_racing(case, in_threads(begin, tries))
     fits = [*in_threads(go_on, racing), *given_up]
-    found = _possible(case, list(_least(fits).values()))
+    found = may_be_causes(case, list(_least(fits).values()))
     near = _near_the_best(case, current, found)
     far = [each for each in found if each not in near]
-    return far + _possible(case, in_threads(finish, near))
+    return far + may_be_causes(case, in_threads(finish, near))
 
 
 def _beside(
@@ -143,7 +143,7 @@ def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits
     return racing, [best[name] for name in best if name in left]
 
 
-def _possible(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
+def may_be_causes(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
     """Return the effects fitted that are away from their bounds, and beyond their settings.
 
     Not those of a frequency too fast for the frames, but a tone's, which is known to fold.

@@ -18,6 +18,7 @@ from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.intwo import in_two
+from coupled.gap.search.onelaw import same_in_a_limit
 from coupled.gap.search.rivals import Found, found_by, separated, tried_again
 from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
@@ -109,7 +110,11 @@ def _looked_over(
         current = _with_only(case, stood, steps, current)
     if len(steps) > 1:
         steps = [tried_again(case, current, step) for step in steps]
-    return [separated(case, current, step) for step in steps], current
+    last = []
+    for step in steps:
+        one, current = same_in_a_limit(case, library, current, separated(case, current, step))
+        last.append(one)
+    return last, current
 
 
 def _is_open(case: Case, effect: Effect, current: Fit) -> bool:

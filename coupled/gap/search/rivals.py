@@ -36,7 +36,7 @@ def found_by(best: Candidate, ranked: Sequence[Candidate]) -> Found:
         if other is not best and len(other.effect.free) <= len(best.effect.free)
     ]
     rivals = tuple(other for other in others if other.gain > best.gain - RIVAL_GAIN)
-    weights = sum(_weight(best.gain - other.gain) for other in others)
+    weights = sum(weight(best.gain - other.gain) for other in others)
     return Found(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
 
 
@@ -72,12 +72,12 @@ def separated(case: Case, current: Fit, step: Found) -> Found:
         other = [rival.effect if one is step.effect else one for one in current.effects]
         start = {**current.values, **rival.fit.values}
         less = likelier_by(case.outputs, current, case.fit(other, start=start))
-        weights += _weight(less) - _weight(step.gain - rival.gain)
+        weights += weight(less) - weight(step.gain - rival.gain)
         if less < RIVAL_GAIN:
             rivals.append(rival)
     return Found(step.effect, step.gain, 1.0 / (1.0 + max(weights, 0.0)), tuple(rivals))
 
 
-def _weight(less: float) -> float:
+def weight(less: float) -> float:
     """Return the likelihood of an effect over the best's, by how much log-likelihood it lacks."""
     return math.exp(min(-less, 0.0))

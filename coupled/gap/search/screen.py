@@ -39,7 +39,7 @@ def screen(
     a parameter is always among them, unless it leaves far more than there was. Beside an effect
     more are kept: its size is not right until the other's is known, and so neither is what is left.
     """
-    found = in_threads(lambda effect: _screened(case, current, effect), candidates)
+    found = in_threads(lambda effect: screened(case, current, effect), candidates)
     scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
     scores.sort(key=lambda item: -item[0])
     near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
@@ -49,7 +49,7 @@ def screen(
     return [(effect, starts) for _, starts, effect in kept]
 
 
-def _screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:
+def screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:
     """Return the power that an effect's signature takes, floors², and the starts of its fits."""
     ours = touched(case.outputs, [effect])
     now = np.concatenate([output.residual(current.rig, wide=True) for output in ours])
