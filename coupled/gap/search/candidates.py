@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import count
 
 import numpy as np
@@ -30,9 +30,16 @@ Fits = list[tuple[Effect, Fit]]
 
 
 def fitted_candidates(
-    case: Case, current: Fit, library: Sequence[Effect], outputs: set[str]
+    case: Case,
+    current: Fit,
+    library: Sequence[Effect],
+    outputs: set[str],
+    always: Collection[str] = (),
 ) -> list[Candidate]:
-    """Return the effects that show in some outputs, fitted beside the current ones, best first."""
+    """Return the effects that show in some outputs, fitted beside the current ones, best first.
+
+    Those named in `always` are fitted however little their signature takes.
+    """
     # A law of friction with its contact's numbers as its own is one beside which they are settings.
     same = {effect.yielding for effect in library} if case.contact else set()
     chosen = {effect.name for effect in current.effects}
@@ -41,7 +48,7 @@ def fitted_candidates(
         for effect in library
         if effect.name not in chosen and effect.name not in same and outputs & set(effect.shows_in)
     ]
-    screened = screen(case, current, candidates)
+    screened = screen(case, current, candidates, always)
     laws = [one for one in screened if one[0].dry and not one[0].yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
     laws = [one for one in laws if may_gain(case, one[0], found)]

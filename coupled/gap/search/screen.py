@@ -7,7 +7,7 @@ leaves least is where a fit starts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -31,12 +31,13 @@ from coupled.rig.rig import Rig
 
 
 def screen(
-    case: Case, current: Fit, candidates: Sequence[Effect]
+    case: Case, current: Fit, candidates: Sequence[Effect], always: Collection[str] = ()
 ) -> list[tuple[Effect, list[dict[str, float]]]]:
     """Return the candidates whose signature takes most of the residual, and where to start.
 
     There is a start for each shape that an effect of several parameters begins from. One without
-    a parameter is always among them, unless it leaves far more than there was. Beside an effect
+    a parameter is always among them, unless it leaves far more than there was, and so are those
+    named in `always`. Beside an effect
     more are kept: its size is not right until the other's is known, and so neither is what is left.
     """
     found = in_threads(lambda effect: screened(case, current, effect), candidates)
@@ -45,7 +46,8 @@ def screen(
     near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
     many = SCREENED_BESIDE if current.effects else SCREENED
     most = min(many, max(SCREENED_LEAST, len(near)))
-    kept = scores[:most] + [item for item in scores[most:] if not item[2].free]
+    others = (item for item in scores[most:] if not item[2].free or item[2].name in always)
+    kept = [*scores[:most], *others]
     return [(effect, starts) for _, starts, effect in kept]
 
 

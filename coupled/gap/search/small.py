@@ -44,8 +44,10 @@ def strained(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candid
     beyond its setting, or gains far more than any setting there and needs none at its end.
     """
     at_end = _at_end(case, current)
-    ranked = fitted_candidates(case, current, library, {s for one in at_end for s in one.shows_in})
-    return ranked if _surely_beyond(case, ranked) or _relieves(ranked, at_end) else []
+    shown = {s for one in at_end.values() for s in one.shows_in}
+    ranked = fitted_candidates(case, current, library, shown, at_end)
+    relieved = _relieves(ranked, list(at_end.values()))
+    return ranked if _surely_beyond(case, ranked) or relieved else []
 
 
 def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
@@ -67,11 +69,16 @@ def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[C
     return []
 
 
-def _at_end(case: Case, current: Fit) -> list[Effect]:
-    """Return the settings that stand at the end of their tolerance, and would gain beyond."""
+def _at_end(case: Case, current: Fit) -> dict[str, Effect]:
+    """Return the settings that stand at the end of their tolerance, and would gain beyond.
+
+    By the names of the effects that free the same numbers.
+    """
     known = {} if case.only_wide else case.known
     at = set(current.at_bound)
-    return [one for one in known.values() if any(one.value_key(p) in at for p in one.free)]
+    return {
+        name: one for name, one in known.items() if any(one.value_key(p) in at for p in one.free)
+    }
 
 
 def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:
