@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import _with_contact_anew
 from coupled.gap.search.contact import allowing_for_contact, contact_start
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import GUILTY_FROM, MISMATCH
+from coupled.rig.rig import Rig
 from tests.support.rigs import bench
 
 
@@ -52,3 +56,30 @@ def test_how_filed_friction_yields_is_known_as_well_as_an_effects_physics(
     gap = Output(stage, "x", np.full(2400, 21.0), lambda rig: np.zeros(2400), 1.0, 120.0)
     found = allowing_for_contact(gap, rig, "column")
     assert found.limit == pytest.approx(1.0 + 20.0 * MISMATCH if allowed else GUILTY_FROM)
+
+
+def test_a_contact_is_sought_anew_beside_what_it_was_found_without() -> None:
+    """A deflection's scale was found beside a contact that had made up for it, and stayed there.
+
+    1.6 floors were left where 1.0 can be, and a scale of the force was found in them.
+    """
+    nominal = bench({"friction_N": 4.0})
+    true_m = 2e-4
+    wave = np.sin(0.1 * np.arange(2400))
+    noise = np.random.default_rng(1).normal(size=2400)
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        stiffness = rig.controls["column"].loader.friction_stiffness
+        return np.asarray((3.0 * math.log(4.0 / stiffness / true_m) if stiffness else 9.0) * wave)
+
+    case = Case(nominal, "column", [Output("loader", "x", noise, predict, 1.0, 120.0)])
+    best = case.fit(())
+    length = case.contact[0].value_key(case.contact[0].free[0])
+    hollow = nominal.changed({"controls.column.loader.friction_stiffness_N_per_m": 4.0 / 6e-6})
+    held = replace(best, rig=hollow, values={**best.values, length: 6e-6}, cost=1e6)
+    assert case.gaps(held.rig)["loader"] > 2.0
+    found = _with_contact_anew(case, held)
+    assert found.values[length] == pytest.approx(true_m, rel=0.1)
+    assert case.gaps(found.rig)["loader"] < 1.1
+    # Within its limit it stays as it was found.
+    assert _with_contact_anew(case, found) is found

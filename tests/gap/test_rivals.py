@@ -10,6 +10,8 @@ import pytest
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import searched
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.rivals import Found, separated
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.rig.rig import Rig
@@ -43,3 +45,26 @@ def test_the_whole_record_tells_two_effects_of_one_number_apart(
     assert names == ({"force_offset"} if told else {"force_offset", "bob_weight"})
     assert all(one.gain > step.gain - RIVAL_GAIN for one in step.rivals)
     assert (step.probability > 0.98) == told
+
+
+def test_a_rival_that_all_of_the_record_is_surely_for_takes_the_place() -> None:
+    """A scale of the force of 0.97 stood as a rival of a gradient, which held 5 less likelihood."""
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + SECOND * 0.1))
+
+    measured = FIRST + SECOND * 0.1 + NOISE
+    case = Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
+    half = case.fit((WEIGHT,), "fitted")
+    wrong = Found(OFFSET, 50.0, 0.6, (Candidate(49.5, WEIGHT, half),))
+    step, last = separated(case, case.fit((OFFSET,)), wrong)
+    assert step.effect is WEIGHT
+    assert last.effects == (WEIGHT,)
+    assert not step.rivals
+    assert step.probability > 0.9
+    right = Found(WEIGHT, 50.0, 0.6, (Candidate(49.5, OFFSET, case.fit((OFFSET,), "fitted")),))
+    kept, same = separated(case, last, right)
+    assert kept.effect is WEIGHT
+    assert same is last
+    assert not kept.rivals

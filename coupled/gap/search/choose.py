@@ -68,6 +68,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
         steps.append(found_by(best, ranked))
         halves = found = best.fit
         current = case.fit((*current.effects, best.effect), start=found.values, near=found)
+        current = _with_contact_anew(case, current)
         idle -= set(best.effect.shows_in)
         even = read_even(case, current)
         if even is not None:
@@ -112,9 +113,23 @@ def _looked_over(
         steps = [tried_again(case, current, step) for step in steps]
     last = []
     for step in steps:
-        one, current = same_in_a_limit(case, library, current, separated(case, current, step))
+        one, current = separated(case, current, step)
+        one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current
+
+
+def _with_contact_anew(case: Case, current: Fit) -> Fit:
+    """Return a fit, or the one with the contact of dry friction sought anew if that leaves less.
+
+    Where the loader is over its limit: what the contact was found beside lacked this effect.
+    """
+    contact = {one.value_key(p) for one in case.contact for p in one.free}
+    over = case.gaps(current.rig).get("loader", 0.0) > stage_limits(case.outputs).get("loader", 0.0)
+    if not over or contact.isdisjoint(current.values):
+        return current
+    start = {key: value for key, value in current.values.items() if key not in contact}
+    return min([current, case.fit(current.effects, start=start)], key=lambda one: one.cost)
 
 
 def _is_open(case: Case, effect: Effect, current: Fit) -> bool:

@@ -31,7 +31,7 @@ def same_in_a_limit(
     where it does so for it. Beside dry friction one may stand in a hollow: the other is fitted with
     its contact sought anew, too, and the one found again from where that ended.
     """
-    other = _other(library, step.effect, current)
+    other = _other(case, library, step.effect, current)
     if other is None:
         return step, current
     effects = [other if one is step.effect else one for one in current.effects]
@@ -56,11 +56,13 @@ def same_in_a_limit(
     return Found(step.effect, step.gain, probability, (*rival, *others)), here
 
 
-def _other(library: Sequence[Effect], effect: Effect, current: Fit) -> Effect | None:
+def _other(case: Case, library: Sequence[Effect], effect: Effect, current: Fit) -> Effect | None:
     """Return the effect that is the same law in a limit, if it was not found as well."""
+    judged = {output.stage for output in case.outputs}
     pair = next((pair for pair in ONE_LAW if effect.name in pair), ())
     named = (one for one in library if one.name in pair and one is not effect)
-    return next((one for one in named if one not in current.effects), None)
+    shown = (one for one in named if judged & {*one.shows_in})
+    return next((one for one in shown if one not in current.effects), None)
 
 
 def _starts(case: Case, current: Fit, step: Found, other: Effect) -> list[dict[str, float]]:

@@ -57,25 +57,35 @@ def tried_again(case: Case, current: Fit, step: Found) -> Found:
     return found_by(own, ranked)
 
 
-def separated(case: Case, current: Fit, step: Found) -> Found:
-    """Return a step without the rivals of as many numbers that the whole record tells from it.
+def separated(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
+    """Return a step without the rivals of as many numbers that all of the record tells from it.
 
+    One that all of the record tells from it for the rival takes its place, and its fit is returned.
     Not beside dry friction, where a fit may stand in a hollow beside its end.
     """
     if is_dry(case.nominal, case.control) or any(effect.dry for effect in current.effects):
-        return step
-    weights, rivals = 1.0 / step.probability - 1.0, list[Candidate]()
+        return step, current
+    asked = [Candidate(step.gain, step.effect, current)]
+    left = list[Candidate]()
     for rival in step.rivals:
         if len(rival.effect.free) != len(step.effect.free) or rival.effect in current.effects:
-            rivals.append(rival)
+            left.append(rival)
             continue
         other = [rival.effect if one is step.effect else one for one in current.effects]
         start = {**current.values, **rival.fit.values}
-        less = likelier_by(case.outputs, current, case.fit(other, start=start))
-        weights += weight(less) - weight(step.gain - rival.gain)
-        if less < RIVAL_GAIN:
-            rivals.append(rival)
-    return Found(step.effect, step.gain, 1.0 / (1.0 + max(weights, 0.0)), tuple(rivals))
+        asked.append(Candidate(rival.gain, rival.effect, case.fit(other, start=start)))
+    least = min(asked, key=lambda one: likelier_by(case.outputs, current, one.fit))
+    surely = likelier_by(case.outputs, current, least.fit) <= -RIVAL_GAIN
+    best = least if surely else asked[0]
+    odds = 1.0 / step.probability - 1.0
+    for one in asked[1:]:
+        odds -= weight(step.gain - one.gain)
+    for one in asked:
+        if one is not best:
+            less = likelier_by(case.outputs, best.fit, one.fit)
+            odds += weight(less)
+            left += [one] if less < RIVAL_GAIN else []
+    return Found(best.effect, step.gain, 1.0 / (1.0 + max(odds, 0.0)), tuple(left)), best.fit
 
 
 def weight(less: float) -> float:
