@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -76,6 +76,30 @@ def test_what_imitates_is_unexplained_though_nothing_remains() -> None:
     assert verdict(0.97, 1.5) == "mostly"
     assert verdict(0.4, 1.0) == verdict(0.4, 1.5) == "unexplained"
     assert verdict(0.49, 1.0, ("stiffening_bend",)) == "ambiguous"
+
+
+@pytest.mark.parametrize(
+    ("probability", "held", "said"),
+    [(0.05, 0.97, "mostly"), (0.48, 0.97, "ambiguous"), (0.05, 0.3, "ambiguous")],
+)
+def test_a_doubtful_small_effect_leaves_open_only_itself(
+    probability: float, held: float, said: str
+) -> None:
+    """An offset of 2 % of a gap, at 0.05, made ambiguous what a friction of 0.97 explained."""
+    friction, offset = (cast(Any, SimpleNamespace(name=n, stage="loader")) for n in ("f", "o"))
+    steps = (
+        SimpleNamespace(effect=friction, rivals=()),
+        SimpleNamespace(effect=offset, rivals=("z",)),
+    )
+    stage = StageResult("loader", gap=8.0, settled=8.0, limit=BOUND, left=1.0, guilty=True)
+    shares = {"f": held, "o": 0.02}
+    budget: Any = SimpleNamespace(stage="loader", of=shares.__getitem__)
+    found = [
+        EffectResult("f", "loader", 0.97, ()),
+        EffectResult("o", "loader", probability, ()),
+    ]
+    choice: Any = SimpleNamespace(steps=steps)
+    assert verdict_of(choice, [stage], found, [budget]) == said
 
 
 @pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])

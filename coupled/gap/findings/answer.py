@@ -40,7 +40,8 @@ def verdict_of(
     """Return the verdict; `mostly` where what is certain leaves structure, but holds more.
 
     An effect that is not certain, though no other rivals it, explains nothing: it may imitate what
-    is missing so well that nothing seems to remain.
+    is missing so well that nothing seems to remain. Nor is it open which of two it is, if neither
+    is credible and what is certain holds most.
     """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -49,14 +50,17 @@ def verdict_of(
         s.guilty and (s.name not in blamed or s.unexplained) for s in stages
     )
     known = {one.stage: one for one in budget}
-    if left and not all(_held(known.get(name), sure) >= MOST for name in guilty):
+    held = all(_held(known.get(name), sure) >= MOST for name in guilty)
+    if left and not held:
         return "unexplained"
     if not choice.steps:
         # A floor that hides much of a stage lets nobody say whether it has a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
-    if any(step.rivals for step in choice.steps):
+    rivals = {step.effect.name: len(step.rivals) for step in choice.steps if step.rivals}
+    together = [one.probability * (1 + rivals[one.name]) for one in effects if one.name in rivals]
+    if rivals and not (held and sure and max(together) < CERTAIN):
         return "ambiguous"
-    return "mostly" if left else "effect"
+    return "mostly" if left or rivals else "effect"
 
 
 def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
