@@ -93,8 +93,9 @@ SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axi
 RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size ratchets a play by √2 times as much
 # By how much more, mean square, an answer may depart from what was measured without the push that
-# noise is foretold to give it, to be left without; 0.35 to 1.9 in three blind records (seeds 2029,
-# 2030) in which noise pushed next to nothing, under 0.05 where it does.
+# noise is foretold to give it, to be left without; 0.35 to 3.4 in three blind records (seeds 2029,
+# 2030) in which noise pushed next to nothing, under 0.01 in eight with a play, and −0.7 to −0.9
+# in three with a contact, where it does.
 PUSHED = (0.1, 0.3)
 # Of what noise shakes δc by, from which it walks a contact, and is put back at thrice the time: of
 # 24 blind records, seed 103, five.

@@ -180,6 +180,11 @@ class Case:
         known = {} if near is None else near.slopes
         return fit(*given, replace(descent, known=self._known, slopes=known))
 
+    def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return fitted values without those of the contact, which a fit then seeks anew."""
+        contact = {one.value_key(p) for one in self.contact for p in one.free}
+        return {key: value for key, value in values.items() if key not in contact}
+
     def _with_contact(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
     ) -> dict[str, float]:

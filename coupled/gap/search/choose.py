@@ -124,11 +124,10 @@ def _with_contact_anew(case: Case, current: Fit) -> Fit:
 
     Where the loader is over its limit: what the contact was found beside lacked this effect.
     """
-    contact = {one.value_key(p) for one in case.contact for p in one.free}
+    start = case.but_for_contact(current.values)
     over = case.gaps(current.rig).get("loader", 0.0) > stage_limits(case.outputs).get("loader", 0.0)
-    if not over or contact.isdisjoint(current.values):
+    if not over or start == current.values:
         return current
-    start = {key: value for key, value in current.values.items() if key not in contact}
     return min([current, case.fit(current.effects, start=start)], key=lambda one: one.cost)
 
 

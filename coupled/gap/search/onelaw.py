@@ -70,8 +70,7 @@ def _starts(case: Case, current: Fit, step: Found, other: Effect) -> list[dict[s
     rest = tuple(effect for effect in current.effects if effect is not step.effect)
     sizes = screened(case, replace(current, effects=rest), other)[1]
     begun = {**current.values, **(sizes[0] if sizes else {})}
-    contact = {one.value_key(p) for one in case.contact for p in one.free}
-    anew = {key: value for key, value in begun.items() if key not in contact}
+    anew = case.but_for_contact(begun)
     return [begun, anew] if anew != begun else [begun]
 
 

@@ -74,12 +74,10 @@ def separated(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
         other = [rival.effect if one is step.effect else one for one in current.effects]
         start = {**current.values, **rival.fit.values}
         asked.append(Candidate(rival.gain, rival.effect, case.fit(other, start=start)))
-    least = min(asked, key=lambda one: likelier_by(case.outputs, current, one.fit))
-    surely = likelier_by(case.outputs, current, least.fit) <= -RIVAL_GAIN
-    best = least if surely else asked[0]
+    lacks = [likelier_by(case.outputs, current, one.fit) for one in asked]
+    best = asked[lacks.index(min(lacks)) if min(lacks) <= -RIVAL_GAIN else 0]
     odds = 1.0 / step.probability - 1.0
-    for one in asked[1:]:
-        odds -= weight(step.gain - one.gain)
+    odds -= sum(weight(step.gain - one.gain) for one in asked[1:])
     for one in asked:
         if one is not best:
             less = likelier_by(case.outputs, best.fit, one.fit)

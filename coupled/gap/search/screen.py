@@ -37,8 +37,8 @@ def screen(
 
     There is a start for each shape that an effect of several parameters begins from. One without
     a parameter is always among them, unless it leaves far more than there was, and so are those
-    named in `always`. Beside an effect
-    more are kept: its size is not right until the other's is known, and so neither is what is left.
+    named in `always`. Beside an effect more are kept: its size is not right until the other's is
+    known, and so neither is what is left.
     """
     found = in_threads(lambda effect: screened(case, current, effect), candidates)
     scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]

@@ -6,7 +6,7 @@ fit finds the play too large, by 1 % of 0.8 mm at 20 μm of noise, and by 2 % at
 far as the tremble is large: the stage is driven once more with as much noise again, and what that
 changes is taken off in proportion (simulation and extrapolation: Cook and Stefanski, JASA 89,
 1994). With the noise of both signs, what goes straight with it falls out. Noise may be too small to
-push what half as much again does push: then the record shows none of it, and it is left.
+push what √2 times as much does: then the record shows no push, and none is taken off.
 
 A contact of dry friction that yields walks likewise: where the force rests, each tremble of F as
 measured lets it slip a little, and it gives way as the real one, which never felt that, does not.
