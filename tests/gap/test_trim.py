@@ -83,6 +83,25 @@ def test_a_trim_is_distinguished_from_an_offset(
     assert found.position == pytest.approx(place, abs=1e-9 if not elsewhere else 4 * found.error)
 
 
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [("surface_lag", "lag_s", 0.05), ("cable_stretch", "loss_per_Pa", 5e-5)],
+)
+@pytest.mark.parametrize("motion", [True, False], ids=["with motion", "without"])
+def test_what_a_surface_lacks_of_its_command_is_no_other_trim(
+    tmp_path: Path, rig: Rig, name: str, parameter: str, value: float, motion: bool
+) -> None:
+    """Where the command moves at once: the mean over the first second is 14 of its errors off."""
+    whole = made(tmp_path, rig, {name: {parameter: value}}, 4)
+    kept = [i for i, one in enumerate(whole.channels) if motion or one not in WEIGHED]
+    record = Record(tuple(whole.channels[i] for i in kept), whole.data[:, kept])
+    found = trim_of(rig, record, "column")
+    assert found is not None
+    own = own_trim(rig, "column")
+    assert (found.position, found.jump) == (own, 0.0)
+    assert abs(found.measured - own) < 2.0 * found.error < 2e-4
+
+
 def test_the_trim_is_an_output_that_the_right_model_meets(tmp_path: Path, rig: Rig) -> None:
     record = made(tmp_path, rig, {"mass": {"factor": 1.1}}, 4)
     (output,) = [out for out in airframe_outputs(rig, record) if out.channel == TRIM]

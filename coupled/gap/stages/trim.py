@@ -13,6 +13,7 @@ against: with the angle of attack in trim it tells lift, moment and weight apart
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,14 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.output import heard, memory, white
 from coupled.gap.stages.openloop import about, fly_open_loop
 from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
-from coupled.gap.thresholds import TRIM_SIGMAS, TRIM_SINCE, TRIM_FLIGHT_s, TRIM_LAGS_s, TRIM_s
+from coupled.gap.thresholds import (
+    TRIM_ANSWERED,
+    TRIM_SIGMAS,
+    TRIM_SINCE,
+    TRIM_FLIGHT_s,
+    TRIM_LAGS_s,
+    TRIM_s,
+)
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.replay import replay_surface
@@ -70,7 +78,9 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
     """Return by how much a surface stands off its trim and command at first, and its error, rad.
 
-    None where the record does not hold the command.
+    Beside what it lacks of the command or lags behind it: where the command moves at once, a lag
+    and a cable's stretch would pass for another trim. None where the record does not hold the
+    command.
     """
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
@@ -85,7 +95,25 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
     noise = heard(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # how few values coloured noise has
-    return float(np.mean(left)), noise.rms * float(np.sqrt(crowded / (rows - 1)))
+    return _constant(left, smoothed(asked)[: rows - 1], noise.rms * math.sqrt(crowded))
+
+
+def _constant(left: Floats, command: Floats, noise: float) -> tuple[float, float]:
+    """Return the constant in what is left beside a command, and its standard error.
+
+    A share of the command and of its rate are fitted with it. Where they bring nothing and the
+    constant is sure all the same, it is the mean, which is known better.
+    """
+    answers = np.column_stack([np.ones(len(left)), command, np.gradient(command)])
+    answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300) / math.sqrt(len(left))
+    spread = np.linalg.pinv(answers.T @ answers)
+    found = spread @ (answers.T @ left)
+    error = noise * math.sqrt(spread[0, 0])
+    about_it = left - np.mean(left)
+    brought = float(about_it @ about_it - np.sum((left - answers @ found) ** 2))
+    if abs(found[0]) > TRIM_SIGMAS * error and brought < TRIM_ANSWERED * noise**2:
+        return float(np.mean(left)), noise / math.sqrt(len(left))
+    return float(found[0]), error
 
 
 def _followed(
