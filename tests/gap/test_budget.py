@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,18 @@ def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) 
     assert budget["bend"] == pytest.approx(bend, abs=0.01)
     assert budget["backlash"] == pytest.approx(1.0 - bend, abs=0.01)
     assert budget[NOISE] < 0.02
+    # A stage before it of which nothing is explained is said after it.
+    loader = replace(found.stage("loader"), gap=1.36, guilty=True)
+    nothing = replace(found.budget[0], stage="loader", effects=())
+    beside = replace(
+        found,
+        verdict="mostly",
+        stages=tuple(loader if one.name == "loader" else one for one in found.stages),
+        budget=(nothing, *found.budget),
+    )
+    explained, _, rest = beside.summary.partition("of the linkage's gap; what remains is noise. ")
+    assert explained.startswith(("Bend", "Backlash"))
+    assert rest.startswith("No effect of the library explains the loader's gap of 1.36 floors.")
 
 
 def test_a_floor_that_an_effect_raises_is_of_its_own_power() -> None:

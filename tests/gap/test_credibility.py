@@ -102,6 +102,30 @@ def test_a_doubtful_small_effect_leaves_open_only_itself(
     assert verdict_of(choice, [stage], found, [budget]) == said
 
 
+@pytest.mark.parametrize(
+    ("loader", "linkage", "probability", "said"),
+    [
+        (1.3, 8.0, 0.97, "mostly"),  # log 1.3 is 11 % of both
+        (5.0, 8.0, 0.97, "mostly"),  # 44 %
+        (9.0, 8.0, 0.97, "unexplained"),  # 51 %
+        (1.3, 8.0, 0.4, "unexplained"),  # and what is found may only imitate
+    ],
+)
+def test_a_stage_that_nothing_explains_counts_by_its_gap(
+    loader: float, linkage: float, probability: float, said: str
+) -> None:
+    """A loader at 1.35 floors of 1.24 made unexplained a play that closed a gap of 15."""
+    play: Any = SimpleNamespace(name="soft_backlash", stage="linkage")
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=play, rivals=()),))
+    stages = [
+        StageResult("loader", gap=loader, settled=loader, limit=BOUND, left=loader, guilty=True),
+        StageResult("linkage", gap=linkage, settled=linkage, limit=BOUND, left=1.0, guilty=True),
+    ]
+    budget: Any = SimpleNamespace(stage="linkage", of=lambda name: 1.0)
+    found = [EffectResult("soft_backlash", "linkage", probability, ())]
+    assert verdict_of(choice, stages, found, [budget]) == said
+
+
 @pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])
 def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -> None:
     """It moves as much at any rate: a lag for it is larger where the pressure goes slowly."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -41,17 +41,19 @@ def verdict_of(
 
     An effect that is not certain, though no other rivals it, explains nothing: it may imitate what
     is missing so well that nothing seems to remain. Nor is it open which of two it is, if neither
-    is credible and what is certain holds most.
+    is credible and what is certain holds most. A stage of which nothing is explained leaves the
+    others' effects standing where all of them are certain and hold most of the whole gap.
     """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
     sure = {effect.name for effect in effects if effect.probability >= CERTAIN}
-    left = bool(doubted(choice, effects)) or any(
+    open_ones = doubted(choice, effects)
+    left = bool(open_ones) or any(
         s.guilty and (s.name not in blamed or s.unexplained) for s in stages
     )
     known = {one.stage: one for one in budget}
     held = all(_held(known.get(name), sure) >= MOST for name in guilty)
-    if left and not held:
+    if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
         return "unexplained"
     if not choice.steps:
         # A floor that hides much of a stage lets nobody say whether it has a gap.
@@ -72,6 +74,19 @@ def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
 def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
     """Return the share of a stage's gap that some of the effects hold, noise apart."""
     return 0.0 if budget is None else sum(budget.of(name) for name in effects)
+
+
+def _held_together(
+    stages: Sequence[StageResult], known: Mapping[str, StageBudget], effects: Collection[str]
+) -> float:
+    """Return the share that some effects hold of the gaps of all guilty stages.
+
+    A gap counts by its logarithm, as in a likelihood: floors of two stages are no common measure.
+    """
+    wide = [stage for stage in stages if stage.guilty and (stage.settled or 0.0) > 1.0]
+    sizes = {stage.name: math.log(stage.settled or 1.0) for stage in wide}
+    held = sum(size * min(_held(known.get(name), effects), 1.0) for name, size in sizes.items())
+    return held / max(sum(sizes.values()), 1e-300)
 
 
 def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:

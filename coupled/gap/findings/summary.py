@@ -95,21 +95,32 @@ def _what(found: Findings) -> str:
         return (
             f"A gap in the {', '.join(found.guilty)} that no effect of the library explains.{also}"
         )
+    stages = [found.stage(name) for name in found.guilty]
+    acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
     return " ".join(
-        _explained(found, found.stage(name), budgets.get(name)) for name in found.guilty
+        _explained(acting[stage.name], stage, budgets.get(stage.name))
+        for stage in sorted(stages, key=lambda one: not acting[one.name])
     )
 
 
-def _explained(found: Findings, stage: StageResult, budget: StageBudget | None) -> str:
+def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> list[EffectResult]:
+    """Return the effects of a stage, and those of others that hold a share of its gap."""
+    beside = (effect for effect in found.effects if effect.stage != stage.name)
+    shown = [] if budget is None else [e for e in beside if budget.of(e.name) >= FREE_LEAST / 100]
+    return [*(effect for effect in found.effects if effect.stage == stage.name), *shown]
+
+
+def _explained(
+    acting: Sequence[EffectResult], stage: StageResult, budget: StageBudget | None
+) -> str:
     """Return which effects explain how much of a stage's gap, and what remains of it."""
-    ours = [e for e in found.effects if e.stage == stage.name]
-    beside = [e for e in found.effects if e.stage != stage.name]
     if budget is None:
         return f"The gap lies in the {stage.name}."
-    shares = [
-        f"{_effect(effect)}, explains {_per_cent(budget.of(effect.name))}"
-        for effect in (*ours, *(e for e in beside if budget.of(e.name) >= FREE_LEAST / 100))
-    ]
+    if not acting:
+        return (
+            f"No effect of the library explains the {stage.name}'s gap of {stage.gap:.3g} floors."
+        )
+    shares = [f"{_effect(e)}, explains {_per_cent(budget.of(e.name))}" for e in acting]
     said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
     if not stage.unexplained or stage.remains is None:
         return f"{said}; what remains is noise."
