@@ -16,14 +16,15 @@ from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import choose, information
-from coupled.gap.search.candidates import may_be_causes
+from coupled.gap.search.candidates import fitted_candidates, may_be_causes
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import _is_open, searched
+from coupled.gap.search.choose import Choice, _is_open, searched
 from coupled.gap.search.descent import End
 from coupled.gap.search.fit import Fit, _half_width, fit
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.screen import screen
+from coupled.gap.search.search import _kept
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -317,3 +318,53 @@ def test_what_a_setting_at_its_end_frees_is_tried_however_little_it_takes(tmp_pa
     assert always
     more = [effect.name for effect, _ in screen(case, case.fit(()), loader, always)]
     assert set(more) == {*kept, *always}
+
+
+@pytest.mark.parametrize(
+    ("alone", "stands", "dropped"),
+    [(False, 0.0, True), (True, 0.0, False), (False, 5.0, False)],
+    ids=["opens one", "nothing else", "was open"],
+)
+def test_what_opens_a_gap_elsewhere_is_no_cause(alone: bool, stands: float, dropped: bool) -> None:
+    """A scale of the force of 1.2 % for a cubic spring and a breakout: the linkage then stood out.
+
+    It fits the loader better, and would need a bend of its own to undo what it does to the linkage.
+    """
+    first, second, *noise = np.random.default_rng(8).normal(size=(4, FRAMES))
+    zero, offset = BY_NAME["force_zero"], BY_NAME["force_offset"]
+
+    def loader(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        column = rig.controls["column"]
+        own = column.loader.offset * (first + 0.3 * second)
+        return np.asarray(column.sensing.force_zero * first + own)
+
+    def linkage(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        return np.asarray(0.2 * rig.controls["column"].sensing.force_zero * first)
+
+    outputs = [
+        Output("loader", "x", 10.0 * first + noise[0], loader, 1.0, 120.0),
+        Output("linkage", "y", stands * second + noise[1], linkage, 1.0, 120.0),
+    ]
+    case = Case(bench(), "column", outputs)
+    library = [zero] if alone else [zero, offset]
+    found = fitted_candidates(case, case.fit(()), library, {"loader"})
+    assert ("force_zero" in {one.effect.name for one in found}) is not dropped
+    assert len(found) == len(library) - dropped
+
+
+@pytest.mark.parametrize("before", [0, 1, 2], ids=["likelier", "less likely", "one number more"])
+def test_a_search_over_lower_floors_loses_nothing_likelier(before: int) -> None:
+    """A friction by load was found, and beside another trim a Stribeck law in a hollow."""
+    first, second, noise = np.random.default_rng(8).normal(size=(3, FRAMES))
+    offset, weight = BY_NAME["force_offset"], BY_NAME["bob_weight"]
+
+    def moved(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * first + loader.bob_weight * (first + 0.3 * second))
+
+    measured = 1.3 * first + 0.09 * second + noise
+    case = Case(bench(), "column", [Output("loader", "x", measured, moved, 1.0, 120.0)])
+    sets = [(offset,), (weight,), (offset, weight)]
+    choices = [Choice((), case.fit(effects), case.fit(())) for effects in sets]
+    again = choices[1 if before == 0 else 0]
+    assert _kept(case, choices[before], again).fit.effects == (offset,)

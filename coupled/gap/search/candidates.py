@@ -17,6 +17,7 @@ from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import informative
 from coupled.gap.search.laws import Starts, law_starts, leaves_only_noise, may_gain
 from coupled.gap.search.screen import screen
+from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEHIND_GAIN,
     BEHIND_SHARE,
@@ -53,7 +54,8 @@ def fitted_candidates(
     found = _fitted(case, current, [one for one in screened if one not in laws])
     laws = [one for one in laws if may_gain(case, one[0], found)]
     found += _fitted(case, current, [(law, law_starts(case, law, s, found)) for law, s in laws])
-    return informative(case, current, found)
+    closing = [one for one in found if not _opens_a_gap(case, current, one[1])]
+    return informative(case, current, closing or found)
 
 
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
@@ -163,6 +165,20 @@ def may_be_causes(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple
         and not _within_tolerance(case, effect, fitted)
         and all(fitted.values[key] < fastest for key in _frequencies(effect))
     ]
+
+
+def _opens_a_gap(case: Case, current: Fit, fitted: Fit) -> bool:
+    """Tell whether a stage that was within its limit stands out by a floor's power more.
+
+    A cause explains where it shows; what imitates one elsewhere needs another to undo it there.
+    """
+    before, after = (stage_gaps(case.outputs, one.rig) for one in (current, fitted))
+    limits = stage_limits(case.outputs)
+    return any(
+        before[stage] <= limits[stage]
+        and after[stage] ** 2 > before[stage] ** 2 + limits[stage] ** 2
+        for stage in after
+    )
 
 
 def _frequencies(effect: Effect) -> list[str]:

@@ -3,33 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice, searched
 from coupled.gap.search.courses import in_time
-from coupled.gap.search.gain import ranked_by_gain
+from coupled.gap.search.gain import likelier_by, ranked_by_gain
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
-from coupled.gap.thresholds import LATER_LEFT, LATER_TRIED, LEAST_GAIN
+from coupled.gap.thresholds import LATER_LEFT, LATER_TRIED, LEAST_GAIN, RIVAL_GAIN
 
 
 def search(case: Case, library: Sequence[Effect] = EFFECTS) -> tuple[Case, Choice]:
     """Return the effects that explain a record's gap, and the case with the floors they leave.
 
     What a gap does passes for noise. Where a rig with the effects found leaves less of it, the
-    search is made again over that, as long as less comes out.
+    search is made again over that, as long as less comes out; what it then finds has to be as
+    likely as what was found before.
     """
     found = _search(case, library)
     while True:
         anew = case.heard_anew(found.fit.rig) if found.steps else None
         if anew is not None:
-            case, found = anew, _search(anew, library)
+            case, found = anew, _kept(anew, found, _search(anew, library))
             continue
         later = _later(case, found, library)
         if later is None:
             return case, found
         case, found = later
+
+
+def _kept(case: Case, before: Choice, again: Choice) -> Choice:
+    """Return what a search found again, or what it found before where all of the record is for it.
+
+    A search may end in a hollow beside dry friction, by whichever floors. What was found before has
+    no more numbers then, and is fitted anew by these floors.
+    """
+    numbers = [sum(len(one.free) for one in choice.fit.effects) for choice in (before, again)]
+    if set(before.fit.effects) == set(again.fit.effects) or numbers[0] > numbers[1]:
+        return again
+    fitted = case.fit(before.fit.effects, start=before.fit.values)
+    if likelier_by(case.outputs, again.fit, fitted) > -RIVAL_GAIN:
+        return again
+    return replace(before, fit=fitted, settled=again.settled, halves=None)
 
 
 def _later(case: Case, found: Choice, library: Sequence[Effect]) -> tuple[Case, Choice] | None:
