@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import laws
 from coupled.gap.search.candidates import fitted_candidates
@@ -78,3 +80,20 @@ def test_a_law_that_cannot_be_tried_is_fitted(tmp_path: Path) -> None:
     unknown = replace(plainly(case), slopes={})
     assert laws._foretold(case, STRIBECK, PLAIN, unknown) is None
     assert laws.may_gain(case, STRIBECK, [(PLAIN, unknown)])
+
+
+@pytest.mark.parametrize(("amplitude_N", "yields_m"), [(8.0, 4e-4), (45.0, 2e-5)])
+def test_friction_by_a_light_load_may_yield_as_any_does(
+    tmp_path: Path, amplitude_N: float, yields_m: float
+) -> None:
+    """At 8 N a contact that yields by 0.4 mm stood at its bound, as if at 50 N, and left a gap."""
+    rig, load = nominal_rig(False), BY_NAME["load_friction"]
+    contact = {"friction_stiffness_N_per_m": 0.3 * amplitude_N / yields_m}
+    real = rig.changed({f"controls.column.loader.{key}": v for key, v in contact.items()})
+    record = made(tmp_path, real, {"load_friction": {"factor": 0.3}}, 31, amplitude_N)
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    loader = [one.halved(rig) for one in outputs if one.stage == "loader"]
+    case = Case(rig, "column", loader)
+    found = case.fit((load,))
+    assert found.values["load_friction.factor"] == pytest.approx(0.3, rel=0.02)
+    assert case.gaps(found.rig)["loader"] < 1.1

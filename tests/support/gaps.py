@@ -46,7 +46,11 @@ def nominal_rig(flown: bool) -> Rig:
 
 
 def made(
-    folder: Path, nominal: Rig, values: Mapping[str, Mapping[str, float]], seed: int
+    folder: Path,
+    nominal: Rig,
+    values: Mapping[str, Mapping[str, float]],
+    seed: int,
+    amplitude_N: float = 45.0,
 ) -> Record:
     """Return the noisy record of a rig that has the effects of `values`."""
     effects = [BY_NAME[name] for name in values]
@@ -56,7 +60,7 @@ def made(
     of_a_bench = ("column", "dynamic")
     noise = {name: level for name, level in NOISE.items() if flown or name.startswith(of_a_bench)}
     real = real.changed({"noise": noise})
-    t, force = pushes(seed)
+    t, force = pushes(seed, amplitude_N)
     rows = "".join(f"{a:.7f},{b:.6f}\n" for a, b in zip(t, force, strict=True))
     (folder / "force.csv").write_text("time_s,column_force_N\n" + rows)
     pilot = ForceTable(file=str(folder / "force.csv"))

@@ -266,23 +266,22 @@ def dotted(key: str, control: str) -> str:
 
 
 FRICTION, BREAKAWAY = "loader.friction_N", "loader.breakaway_N"
-
-
 DIRECTIONS = ("loader.friction_pull_N", "loader.friction_push_N")
-BY_LOAD, USUAL_LOAD_N = "loader.friction_by_load", 50.0
+BY_LOAD, LIGHT_LOAD_N = "loader.friction_by_load", 10.0
 
 
 def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
     """Return the dry friction of a rig with changes, N, that its contact carries.
 
-    Of what goes with the direction the mean, of what goes with the load that at a usual one.
+    Of what goes with the direction the mean, of what goes with the load that at a light one:
+    a loader that is never loaded more may yield by all that a contact may, too.
     """
 
     def of(key: str) -> float:
         return float(changes.get(key, value_of(rig, control, key)))
 
     running = max(of(FRICTION), of(BREAKAWAY))
-    return running + 0.5 * sum(map(of, DIRECTIONS)) + USUAL_LOAD_N * of(BY_LOAD)
+    return running + 0.5 * sum(map(of, DIRECTIONS)) + LIGHT_LOAD_N * of(BY_LOAD)
 
 
 def _no_less_than_running(
