@@ -21,7 +21,7 @@ from coupled.rig.rig import Rig
 from tests.support.rigs import bench
 
 FRAMES = 2400
-SHAPE, OTHER, NOISE = np.random.default_rng(2).normal(size=(3, FRAMES))
+SHAPE, OTHER, NOISE, THIRD = np.random.default_rng(2).normal(size=(4, FRAMES))
 OFFSET, PLAIN, RICHER = (
     BY_NAME[name] for name in ("force_offset", "coulomb_friction", "stribeck_friction")
 )
@@ -59,6 +59,34 @@ def test_a_law_of_friction_is_asked_again_beside_what_was_found_later(
     library = [OFFSET, PLAIN, RICHER]
     steps, anew = _law_again(case, case.fit(()), library, steps_of(PLAIN, OFFSET), current)
     assert asked == [({"force_offset"}, {True})]
+    assert [step.effect for step in steps] == [named, OFFSET]
+    assert set(anew.effects) == {named, OFFSET}
+
+
+@pytest.mark.parametrize(("above_N", "named"), [(0.0, PLAIN), (4.0, RICHER)])
+def test_a_breakaway_that_took_up_what_was_found_later_is_plain_friction(
+    monkeypatch: pytest.MonkeyPatch, above_N: float, named: Effect
+) -> None:
+    """Beside a damping, one of 1.50 N above 1.29 came to 1.41 ± 0.10 above 1.40."""
+
+    def predict(rig: Rig) -> NDArray[np.float64]:
+        loader = rig.controls["column"].loader
+        above = max(loader.breakaway - loader.friction, 0.0)
+        return np.asarray(loader.offset * SHAPE + loader.friction * OTHER + above * THIRD)
+
+    measured = 3.0 * SHAPE + 2.0 * OTHER + above_N * THIRD + NOISE
+    case = Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
+
+    def candidates(
+        case: Case, without: Fit, library: list[Effect], outputs: set[str]
+    ) -> list[Candidate]:
+        fits = [(law, case.fit((*without.effects, law), "fitted")) for law in (RICHER, PLAIN)]
+        return [Candidate(40.0, law, fitted) for law, fitted in fits]
+
+    monkeypatch.setattr(choose, "fitted_candidates", candidates)
+    current = case.fit((RICHER, OFFSET))
+    library = [OFFSET, PLAIN, RICHER]
+    steps, anew = _law_again(case, case.fit(()), library, steps_of(RICHER, OFFSET), current)
     assert [step.effect for step in steps] == [named, OFFSET]
     assert set(anew.effects) == {named, OFFSET}
 

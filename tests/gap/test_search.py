@@ -368,3 +368,18 @@ def test_a_search_over_lower_floors_loses_nothing_likelier(before: int) -> None:
     choices = [Choice((), case.fit(effects), case.fit(())) for effects in sets]
     again = choices[1 if before == 0 else 0]
     assert _kept(case, choices[before], again).fit.effects == (offset,)
+
+
+@pytest.mark.parametrize(("force_N", "width_N"), [(8.0, 2.0), (45.0, 20.0)])
+def test_a_bend_with_hysteresis_is_sought_at_widths_of_their_own(
+    tmp_path: Path, force_N: float, width_N: float
+) -> None:
+    """Scanned with the bend, a width of 3.7 N began at 250 N, ended at 0, and a mode was named."""
+    rig, loop = nominal_rig(False), BY_NAME["bend_hysteresis"]
+    true = {"bend_{d}_per_N": 6e-5, "share": 0.5, "width_N": width_N}
+    record = made(tmp_path, rig, {loop.name: true}, 12, force_N)
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    case = Case(rig, "column", [one for one in outputs if one.stage == "linkage"])
+    [found] = fitted_candidates(case, case.fit(()), [loop], {"linkage"})
+    assert found.fit.values["bend_hysteresis.width_N"] == pytest.approx(width_N, rel=0.3)
+    assert found.fit.values["bend_hysteresis.share"] == pytest.approx(0.5, abs=0.1)

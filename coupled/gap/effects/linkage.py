@@ -56,7 +56,10 @@ LINKAGE: tuple[Effect, ...] = (
                 value("share", "loader.bend_hysteresis_share", 0, 0.98, 0.3),
                 scanned=False,
             ),
-            value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0),
+            replace(
+                value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0),
+                scanned=False,
+            ),
         ),
         Signature("force", "bent", "loop", 6.0),
     ),

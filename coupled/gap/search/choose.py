@@ -149,22 +149,31 @@ def _law_again(
 ) -> tuple[list[Found], Fit]:
     """Return the steps and the fit with the law of dry friction that the other effects leave.
 
-    Beside what was not found yet, plain friction passed for a richer law.
+    Beside what was not found yet, plain friction passed for a richer law, or such a law took up
+    what that leaves of plain friction.
     """
-    plain = next((effect for effect in current.effects if effect.yielding), None)
-    if plain is None:
+    law = next((one for one in current.effects if _is_open_law(case, library, one, current)), None)
+    if law is None:
         return steps, current
-    rest = tuple(effect for effect in current.effects if effect is not plain)
+    rest = tuple(effect for effect in current.effects if effect is not law)
     without = case.fit(rest, "fitted", current.values)
     dry = [effect for effect in library if effect.dry]
-    ranked = fitted_candidates(case, without, dry, set(plain.shows_in))
+    ranked = fitted_candidates(case, without, dry, set(law.shows_in))
     best = _simplest(case, settled, ranked) if ranked else None
-    if best is None or best.gain < LEAST_GAIN or best.effect.alike is None:
+    if best is None or best.gain < LEAST_GAIN or (best.effect.alike is None) is (law.alike is None):
         return steps, current
     found = found_by(best, ranked)
-    steps = [found if one.effect is plain else one for one in steps]
+    steps = [found if one.effect is law else one for one in steps]
     effects = [one.effect for one in steps]
     return steps, case.fit(effects, start=best.fit.values, near=best.fit)
+
+
+def _is_open_law(case: Case, library: Sequence[Effect], effect: Effect, current: Fit) -> bool:
+    """Tell whether an effect is plain friction, or a law that may be plain friction after all."""
+    if effect.alike is None:
+        return bool(effect.yielding)
+    plainer = (one for one in library if one.name == effect.alike.plainer)
+    return any(may_be_plainer(case, effect, current, one) for one in plainer)
 
 
 def _needless(case: Case, current: Fit) -> Effect | None:
