@@ -342,6 +342,7 @@ def test_units_of_people_are_theirs_and_those_of_files_stay(folder: Path) -> Non
     assert "≤ 44.48 N" in coupled(folder, "check", "held.toml").stdout
     refused = coupled(folder, "compare", "short.toml", "--units", "uk")
     assert refused.returncode == 2
+    assert "'--units': 'uk' is not one of 'si', 'us'" in refused.stderr
 
 
 def test_a_shell_completes_commands() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from coupled.units import DEGREE_rad
 
@@ -26,7 +26,7 @@ class Estimate:
     @property
     def half_width(self) -> float:
         """Half of the 95 % interval, by Student's t."""
-        return float(student.ppf(0.5 + 0.5 * COVERAGE, self.freedom)) * self.error
+        return float(stdtrit(self.freedom, 0.5 + 0.5 * COVERAGE)) * self.error
 
     @property
     def low(self) -> float:

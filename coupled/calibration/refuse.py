@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from coupled.calibration.estimate import Instruments
 from coupled.calibration.readings import Readings
@@ -102,7 +102,7 @@ def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
     variance = instruments.force_variance(force, readings.force_looks) + slope**2 * ruler
     variance += (1e-7 * np.max(np.abs(force))) ** 2
     excess = float(np.sum((force - slope * deflection) ** 2 / variance))
-    return excess > float(chi2.ppf(SURELY, len(force) - 1))
+    return excess > float(chdtri(len(force) - 1, 1.0 - SURELY))
 
 
 def _separating(control: Control, slope: float, strongest: float, d: str) -> str:

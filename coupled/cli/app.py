@@ -93,7 +93,7 @@ def _run() -> int:
     except InputError as error:
         line = _lines_of(error)
     except TyperException as error:  # a word of the command line that it does not know
-        words = " ".join(error.format_message().split())
+        words = " ".join(error.format_message().split()).replace("Value error, ", "")
         line = shown(words, 400) + " (coupled --help shows what there is)"
     except (OSError, MemoryError) as error:
         line = said_of(error)

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.flexible import free_share
@@ -77,7 +77,7 @@ class Regime:
         if error == 0.0:
             return 1.0
         away = abs(self.high - self.low) / error
-        return float(2.0 * student.sf(away, max(self.stretches - 1, 1)))
+        return float(2.0 * stdtr(max(self.stretches - 1, 1), -away))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""

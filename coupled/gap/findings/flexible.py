@@ -13,8 +13,8 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from coupled.gap.noise.filters import filtered
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import BENDS, FLAT, RIDGES, LAGS_s
 
@@ -39,7 +39,7 @@ def free_share(
         each[ALL] = np.column_stack((*each.values(), *crossed))
     best = 0.0, ""
     for name, columns in each.items():
-        answers = [] if response is None else [lfilter(*response, columns, axis=0)]
+        answers = [] if response is None else [filtered(*response, columns)]
         best = max(best, (_taken(output, left, np.hstack((columns, *answers))), name))
     return best
 
@@ -49,7 +49,7 @@ def _functions(signal: Floats, rate_Hz: float) -> Floats:
     found = [signal, *(np.maximum(signal - bend, 0.0) for bend in np.quantile(signal, BENDS))]
     for lag_s in LAGS_s:
         share = -np.expm1(-1.0 / (lag_s * rate_Hz))
-        found.append(lfilter([share], [1.0, share - 1.0], signal))
+        found.append(filtered([share], [1.0, share - 1.0], signal))
     return np.column_stack(found)
 
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import bilinear, welch
 
 from coupled.gap.findings.flexible import free_share
 from coupled.gap.findings.onset import Span, in_time
+from coupled.gap.noise.filters import of_second_order
 from coupled.gap.noise.lines import SeenLine, widest_line
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.output import Output
@@ -203,9 +203,8 @@ def response(
     if output.stage != "loader" or name not in record:
         return None
     loader = rig.controls[control].loader
-    second = [loader.mass, loader.damping, max(float(np.mean(record[name])), 1.0)]
-    above, below = bilinear([1.0], second, output.frame_rate_Hz)
-    return np.asarray(above), np.asarray(below)
+    stiffness = max(float(np.mean(record[name])), 1.0)
+    return of_second_order(loader.mass, loader.damping, stiffness, output.frame_rate_Hz)
 
 
 def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:
@@ -276,8 +275,14 @@ def _follows(
 
 
 def _peak(left: Floats, rate_Hz: float) -> float:
-    frequency, density = welch(left, rate_Hz, nperseg=min(len(left), round(SPECTRUM_s * rate_Hz)))
-    return float(frequency[1:][np.argmax(density[1:])])
+    """Return the frequency, Hz, at which a residual is loudest: of pieces that overlap by half."""
+    many = min(len(left), round(SPECTRUM_s * rate_Hz))
+    pieces = np.lib.stride_tricks.sliding_window_view(left, many)[:: many - many // 2]
+    level = pieces - np.mean(pieces, axis=1, keepdims=True)
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(many) / many)
+    power = np.mean(np.abs(np.fft.rfft(level * taper, axis=1)) ** 2, axis=0)
+    power[-1] *= 0.5 if many % 2 == 0 else 1.0  # it has no other side
+    return float(np.fft.rfftfreq(many, 1.0 / rate_Hz)[1:][np.argmax(power[1:])])
 
 
 def _by(left: Floats, pressure: Floats) -> tuple[PressureBand, ...]:

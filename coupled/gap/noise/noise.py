@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from coupled.gap.noise.filters import filtered
 from coupled.gap.thresholds import (
     COLOUR_FITS,
     COLOURED_BY,
@@ -50,10 +50,8 @@ class Noise:
         if self.memory == 0.0 or not frames:
             return white
         gain = math.sqrt(1.0 - self.memory**2)
-        start = [self.memory * white[0]]  # in its steady state
-        white[1:] *= gain
-        rest = lfilter([1.0], [1.0, -self.memory], white[1:], zi=start)[0]
-        return np.concatenate((white[:1], rest))
+        white[1:] *= gain  # from its steady state
+        return filtered([1.0], [1.0, -self.memory], white)
 
 
 def noise_of(signal: Floats) -> Noise:

@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from coupled.gap.signals.output import memory
 from coupled.gap.thresholds import (
@@ -148,7 +148,7 @@ def course_of_events(at_s: Floats, lasted_s: float) -> Course:
     over_s = lasted_s - first
     waited = count > 1 and (count - 1) * first / over_s > -math.log(ONSET_CHANCE)
     over_s, count = (over_s, count - 1) if waited else (lasted_s, count)
-    low, high = 0.5 * chi2.ppf(0.025, 2 * count), 0.5 * chi2.ppf(0.975, 2 * count + 2)
+    low, high = 0.5 * chdtri(2 * count, 0.975), 0.5 * chdtri(2 * count + 2, 0.025)
     rate = Bounds(count / over_s, float(low) / over_s, float(high) / over_s)
     if not waited:
         return Course("events", rate_per_s=rate)

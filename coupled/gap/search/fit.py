@@ -13,7 +13,7 @@ from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from coupled.gap.effects.effect import Effect, Parameter, possible
 from coupled.gap.search.descent import WHOLE, Descent, End
@@ -248,7 +248,7 @@ def _half_width(found: End, outputs: int, groups: NDArray[np.intp], known: Float
     scatter = scores.T @ scores * (len(names) / freedom) / variance**2
     filled = bread @ (scatter + before) @ bread
     square = np.maximum(np.maximum(np.diag(plain), np.diag(filled)), 0.0)
-    half = student.ppf(0.975, freedom) * np.sqrt(square)
+    half = stdtrit(freedom, 0.975) * np.sqrt(square)
     half[(np.linalg.norm(jacobian, axis=0) < 1e-9) & (known == 0.0)] = np.inf
     return np.asarray(half)
 
