@@ -110,6 +110,7 @@ SURFACE_GUST_m_per_s = 3.0  # chosen: the air that rises meanwhile
 SAME_TRIM_rad = 1e-9  # chosen: by which two trims of one model may differ
 TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
 TRIM_SIGMAS = 4.0  # chosen: of its noise, by which a record starts at another trim than the model's
+TRIM_STILL = 0.25  # chosen: of what it is off, that a command may have moved a surface before
 TRIM_ANSWERED = 13.8  # χ² of two more numbers, 1 in 1000 by chance
 TRIM_FLIGHT_s = (
     15.0  # flown to decide whether a surface that stands off is in trim, and TRIM_LAGS_s:

@@ -16,7 +16,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
 from coupled.gap.stages.surfaces import own_trim, surface_points
-from coupled.gap.stages.trim import WEIGHED, trim_of
+from coupled.gap.stages.trim import WEIGHED, _constant, trim_of
 from coupled.record.channels import ELEVATOR
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -100,6 +100,24 @@ def test_what_a_surface_lacks_of_its_command_is_no_other_trim(
     own = own_trim(rig, "column")
     assert (found.position, found.jump) == (own, 0.0)
     assert abs(found.measured - own) < 2.0 * found.error < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("off_rad", "lag_s", "sure"), [(6e-3, 0.0, True), (0.0, 0.15, False), (0.0, 0.0, False)]
+)
+def test_what_stands_before_the_command_has_moved_is_a_trim(
+    off_rad: float, lag_s: float, sure: bool
+) -> None:
+    """Where the command is a ramp from the first frame on, no fit tells a constant from a lag."""
+    rate, noise = -0.01, 2e-4
+    time = np.arange(1, 120) / 120.0
+    ordered = rate * time
+    late = -rate * lag_s * -np.expm1(-time / max(lag_s, 1e-9))
+    left = off_rad + late + np.random.default_rng(9).normal(0.0, noise, len(time))
+    found, error = _constant(left, ordered, noise)
+    assert (abs(found) > 4.0 * error) is sure
+    if sure:
+        assert (found, error) == pytest.approx((off_rad, noise / len(time) ** 0.5), rel=0.02)
 
 
 def test_the_trim_is_an_output_that_the_right_model_meets(tmp_path: Path, rig: Rig) -> None:

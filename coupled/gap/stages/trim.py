@@ -27,6 +27,7 @@ from coupled.gap.thresholds import (
     TRIM_ANSWERED,
     TRIM_SIGMAS,
     TRIM_SINCE,
+    TRIM_STILL,
     TRIM_FLIGHT_s,
     TRIM_LAGS_s,
     TRIM_s,
@@ -95,25 +96,37 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
     noise = heard(measured)
     crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # how few values coloured noise has
-    return _constant(left, smoothed(asked)[: rows - 1], noise.rms * math.sqrt(crowded))
+    smooth = np.interp(held + smoothed(asked)[: rows - 1], *points)
+    return _constant(left, smooth - np.interp(held, *points), noise.rms * math.sqrt(crowded))
 
 
-def _constant(left: Floats, command: Floats, noise: float) -> tuple[float, float]:
-    """Return the constant in what is left beside a command, and its standard error.
+def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float]:
+    """Return the constant in what a surface is off by, rad, and its standard error.
 
-    A share of the command and of its rate are fitted with it. Where they bring nothing and the
-    constant is sure all the same, it is the mean, which is known better.
+    `ordered` is what the command moves it by. A share of that and of its rate are fitted beside
+    the constant; where they bring nothing and it is sure all the same, it is the mean, which is
+    known better. Sure it is beside them, or before the command has moved the surface by a quarter
+    of it: no lag or stretch is more than the command that it is of.
     """
-    answers = np.column_stack([np.ones(len(left)), command, np.gradient(command)])
-    answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300) / math.sqrt(len(left))
-    spread = np.linalg.pinv(answers.T @ answers)
-    found = spread @ (answers.T @ left)
-    error = noise * math.sqrt(spread[0, 0])
-    about_it = left - np.mean(left)
-    brought = float(about_it @ about_it - np.sum((left - answers @ found) ** 2))
-    if abs(found[0]) > TRIM_SIGMAS * error and brought < TRIM_ANSWERED * noise**2:
-        return float(np.mean(left)), noise / math.sqrt(len(left))
-    return float(found[0]), error
+    answers = np.column_stack([ordered, np.gradient(ordered)])
+    answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300)
+    one = np.ones(len(left))
+    apart = one - answers @ np.linalg.lstsq(answers, one)[0]  # what of a constant they are not
+    known = float(apart @ apart)
+    mean, alone = float(np.mean(left)), noise / math.sqrt(len(left))
+    still = np.maximum.accumulate(np.abs(ordered)) <= TRIM_STILL * abs(mean)
+    count = max(1, int(still.sum()))
+    at_once = abs(float(np.sum(left[still]))) > TRIM_SIGMAS * noise * math.sqrt(count)
+    if known < 1e-9 * len(left):
+        return mean, alone if at_once else abs(mean) + alone
+    found, error = float(apart @ left) / known, noise / math.sqrt(known)
+    if not at_once and abs(found) <= TRIM_SIGMAS * error:
+        return found, error
+    rest = left - found
+    rest -= answers @ np.linalg.lstsq(answers, rest)[0]
+    if float(np.sum((left - mean) ** 2) - rest @ rest) < TRIM_ANSWERED * noise**2:
+        return mean, alone
+    return found, error
 
 
 def _followed(
