@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.effect import value_of
 from coupled.gap.effects.library import BY_NAME, EFFECTS, ONE_LAW
 from coupled.gap.search.case import Case
 from coupled.gap.search.gain import Candidate
@@ -66,6 +67,23 @@ def test_all_of_the_record_says_which_of_two_it_is_or_leaves_both(
     assert {step.effect.name, *(rival.effect.name for rival in step.rivals)} == named
     assert last.effects == (step.effect,)
     assert step.probability == pytest.approx(0.5 if len(named) == 2 else 0.97, abs=0.03)
+
+
+def test_of_two_that_are_one_law_the_one_that_machines_have_is_named() -> None:
+    """A force felt late, where it was found as one that is stamped early."""
+    delay, skew = BY_NAME["transport_delay"], BY_NAME["force_skew"]
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        late = [value_of(rig, "column", one.free[0].key) for one in (delay, skew)]
+        return np.asarray(1e3 * (late[0] - late[1]) * FIRST)
+
+    outputs = [Output("loader", "x", 5.0 * FIRST + NOISE, predict, 1.0, 120.0)]
+    made_case = Case(NOMINAL, "column", outputs)
+    current = made_case.fit((skew,))
+    step, last = same_in_a_limit(made_case, EFFECTS, current, Found(skew, 50.0, 0.97, ()))
+    assert step.effect is delay
+    assert [rival.effect for rival in step.rivals] == [skew]
+    assert last.values[delay.value_key(delay.free[0])] == pytest.approx(0.005, rel=0.1)
 
 
 def test_a_rival_of_half_a_record_counts_once() -> None:
