@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.effects.library import BY_NAME
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search import small
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import searched
+from coupled.gap.search.gain import Candidate
 from coupled.gap.search.information import informative
 from coupled.gap.signals.output import Output
 from coupled.rig.rig import Rig
@@ -107,3 +109,24 @@ def test_a_dead_time_is_found_where_the_servo_s_own_speed_may_stand_for_it() -> 
     assert (best.effect.name, [p.name for p in best.effect.free]) == ("servo_delay", ["delay_s"])
     assert best.fit.values["servo_delay.delay_s"] == pytest.approx(0.02, abs=1e-3)
     assert best.gain > 100.0
+
+
+def test_what_a_setting_at_its_end_frees_is_tried_whatever_its_signature_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A damping of 1.038, of which the setting had taken 1.02, was not among the best six."""
+    asked = list[tuple[object, ...]]()
+
+    def candidates(*given: object) -> list[Candidate]:
+        asked.append(given[3:])
+        return []
+
+    monkeypatch.setattr(small, "fitted_candidates", candidates)
+    damping = BY_NAME["viscous_damping"]
+    monkeypatch.setattr(small, "_at_end", lambda case, current: {damping.name: damping})
+    case = Case(bench(), "column", [])
+    assert small.strained(case, case.fit(()), EFFECTS) == []
+    [(outputs, always)] = asked
+    assert isinstance(always, dict)
+    assert outputs == set(damping.shows_in)
+    assert list(always) == [damping.name]
