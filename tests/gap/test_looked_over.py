@@ -25,6 +25,7 @@ SHAPE, OTHER, NOISE, THIRD = np.random.default_rng(2).normal(size=(4, FRAMES))
 OFFSET, PLAIN, RICHER = (
     BY_NAME[name] for name in ("force_offset", "coulomb_friction", "stribeck_friction")
 )
+UNEVEN = BY_NAME["asymmetric_friction"]
 
 
 def rubbing_with_an_offset() -> Case:
@@ -63,9 +64,12 @@ def test_a_law_of_friction_is_asked_again_beside_what_was_found_later(
     assert set(anew.effects) == {named, OFFSET}
 
 
-@pytest.mark.parametrize(("above_N", "named"), [(0.0, PLAIN), (4.0, RICHER)])
+@pytest.mark.parametrize(
+    ("above_N", "tried", "named"),
+    [(0.0, PLAIN, PLAIN), (4.0, PLAIN, RICHER), (0.0, UNEVEN, RICHER)],
+)
 def test_a_breakaway_that_took_up_what_was_found_later_is_plain_friction(
-    monkeypatch: pytest.MonkeyPatch, above_N: float, named: Effect
+    monkeypatch: pytest.MonkeyPatch, above_N: float, tried: Effect, named: Effect
 ) -> None:
     """Beside a damping, one of 1.50 N above 1.29 came to 1.41 ± 0.10 above 1.40."""
 
@@ -80,7 +84,7 @@ def test_a_breakaway_that_took_up_what_was_found_later_is_plain_friction(
     def candidates(
         case: Case, without: Fit, library: list[Effect], outputs: set[str]
     ) -> list[Candidate]:
-        fits = [(law, case.fit((*without.effects, law), "fitted")) for law in (RICHER, PLAIN)]
+        fits = [(law, case.fit((*without.effects, law), "fitted")) for law in (RICHER, tried)]
         return [Candidate(40.0, law, fitted) for law, fitted in fits]
 
     monkeypatch.setattr(choose, "fitted_candidates", candidates)

@@ -1,7 +1,6 @@
 """Recursive filters of a record's length, each solved as a banded system.
 
-They are all that a diagnosis would need `scipy.signal` for, which takes as long to start as all
-else that it imports.
+They are all that a diagnosis would need `scipy.signal` for, which is slow to start and large.
 """
 
 from __future__ import annotations

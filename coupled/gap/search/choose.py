@@ -160,7 +160,10 @@ def _law_again(
     dry = [effect for effect in library if effect.dry]
     ranked = fitted_candidates(case, without, dry, set(law.shows_in))
     best = _simplest(case, settled, ranked) if ranked else None
-    if best is None or best.gain < LEAST_GAIN or (best.effect.alike is None) is (law.alike is None):
+    if best is None or best.gain < LEAST_GAIN:
+        return steps, current
+    plainer = law.alike is not None and best.effect.name == law.alike.plainer
+    if not plainer and (law.alike is not None or best.effect.alike is None):
         return steps, current
     found = found_by(best, ranked)
     steps = [found if one.effect is law else one for one in steps]
