@@ -126,6 +126,32 @@ def test_a_stage_that_nothing_explains_counts_by_its_gap(
     assert verdict_of(choice, stages, found, [budget]) == said
 
 
+@pytest.mark.parametrize(
+    ("rest", "probability", "said"),
+    [(1.3, 0.97, "mostly"), (1.3, 0.4, "unexplained"), (3.0, 0.97, "unexplained")],
+    ids=["all certain", "one in doubt", "by their logarithms"],
+)
+def test_two_stages_are_explained_beside_one_that_is_not(
+    rest: float, probability: float, said: str
+) -> None:
+    """Two unexplained gaps of 3 beside one of 8 are 51 % by logarithm, 22 % by power."""
+    names = {"linkage": 8.0, "loader": 1.3 if rest < 2.0 else 3.0, "surface": rest}
+    explained = ("linkage", "loader") if rest < 2.0 else ("linkage",)
+    effects = [cast(Any, SimpleNamespace(name=f"of {at}", stage=at)) for at in explained]
+    choice: Any = SimpleNamespace(steps=[SimpleNamespace(effect=e, rivals=()) for e in effects])
+    stages = [
+        StageResult(at, gap, gap, BOUND, 1.0 if at in explained else gap, guilty=True)
+        for at, gap in names.items()
+    ]
+    budget: list[Any] = [
+        SimpleNamespace(stage=at, of=lambda name, at=at: float(name == f"of {at}"))
+        for at in explained
+    ]
+    sizes = {"of linkage": 0.97, "of loader": probability}
+    found = [EffectResult(e.name, e.stage, sizes[e.name], ()) for e in effects]
+    assert verdict_of(choice, stages, found, budget) == said
+
+
 @pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])
 def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -> None:
     """It moves as much at any rate: a lag for it is larger where the pressure goes slowly."""
