@@ -154,6 +154,7 @@ def test_hints_tell_names_with_commas_apart_and_know_a_name_without_its_unit(fol
     assert "did you mean pitch_rate_rad_per_s?" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_figure_is_the_same_bytes_again(tmp_path: Path, folder: Path) -> None:
     assert coupled(folder, "fly", "short.toml", "-o", "r.csv").returncode == 0
     record = read_record(folder / "r.csv")

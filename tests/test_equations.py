@@ -10,6 +10,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -88,13 +89,17 @@ def cited(text: str) -> Iterator[str]:
     yield from APPENDIX.findall(text)
 
 
-def functions(folder: str) -> Iterator[tuple[Path, ast.FunctionDef]]:
-    for path in sorted((ROOT / folder).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef):
-                yield path.relative_to(ROOT), node
+@cache
+def functions(folder: str) -> tuple[tuple[Path, ast.FunctionDef], ...]:
+    return tuple(
+        (path.relative_to(ROOT), node)
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    )
 
 
+@cache
 def implemented() -> dict[str, list[str]]:
     """Return links to the functions that hold each equation, the closed forms first."""
     found = defaultdict(list)
@@ -106,6 +111,7 @@ def implemented() -> dict[str, list[str]]:
     return {key: [link for _, link in sorted(links)] for key, links in found.items()}
 
 
+@cache
 def held_by() -> dict[str, list[str]]:
     """Return links to the tests that hold each equation."""
     found = defaultdict(list)

@@ -76,6 +76,7 @@ def test_ctrl_c_ends_every_command_within_a_second(
         assert process.returncode in (1, 130)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_sweep_and_its_workers_and_keeps_what_is_flown(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(SHORT)
     (tmp_path / "s.toml").write_text(SWEEP)

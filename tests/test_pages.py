@@ -85,6 +85,7 @@ def test_a_command_prints_what_the_page_says(
     assert run(command, folders[page]) == trimmed(output)
 
 
+@pytest.mark.slow
 def test_the_python_example_prints_what_it_says(folders: dict[Path, Path]) -> None:
     [(code, output)] = PYTHON.findall(README.read_text(encoding="utf-8"))
     assert run_python(code, folders[README]) == trimmed(output)

@@ -121,6 +121,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(folder: Path) ->
     assert len(done.stderr) < 4000
 
 
+@pytest.mark.slow
 def test_sigterm_keeps_a_flight_so_far_as_ctrl_c_does(folder: Path) -> None:
     (folder / "long.toml").write_text(SHORT.replace("duration_s = 2.0", "duration_s = 7200.0"))
     kept = {}
@@ -149,6 +150,7 @@ def test_sigterm_keeps_a_flight_so_far_as_ctrl_c_does(folder: Path) -> None:
     assert not [name for name in files(folder) if ".coupled-" in name]
 
 
+@pytest.mark.slow
 def test_sigterm_keeps_the_flights_of_a_sweep(folder: Path) -> None:
     (folder / "sweep.toml").write_text(
         'name = "s"\nrun = "short.toml"\nconfigurations = ["rigid"]\nkeep = ["loss"]\n'

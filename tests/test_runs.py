@@ -194,6 +194,7 @@ def test_the_wheels_loss_that_is_expected_is_its_closed_form(configuration: str)
     assert expect.equal == pytest.approx(closed_form(configuration), abs=2e-4)
 
 
+@pytest.mark.slow
 def test_every_number_of_the_recoverys_card_is_what_is_flown() -> None:
     """The words of the card are made from the flights; each outcome has its margin."""
     manoeuvres = read_run("recovery")

@@ -54,6 +54,7 @@ def test_a_bench_has_no_stick_force_per_g(tmp_path: Path) -> None:
     assert envelope([], "column").shape == (2, 0)
 
 
+@pytest.mark.slow
 def test_the_command_writes_figures_and_tables(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

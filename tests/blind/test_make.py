@@ -70,6 +70,7 @@ def drawn(version: int, seed: int, records: int, rigs: int) -> tuple[list[Plan],
     return planned, [rig_text(rig) for rig in pool.values()]
 
 
+@pytest.mark.slow
 def test_a_set_is_whole_and_gives_nothing_away(made: Path) -> None:
     listed = load_toml(made / "records.toml")
     key = read_key(made.with_name("set.key.json"))
@@ -90,6 +91,7 @@ def test_a_set_is_whole_and_gives_nothing_away(made: Path) -> None:
     assert not made.with_name("set.key.json.parts").exists()
 
 
+@pytest.mark.slow
 def test_a_key_reads_back_as_it_was_written(made: Path) -> None:
     path = made.with_name("set.key.json")
     key = read_key(path)
@@ -99,6 +101,7 @@ def test_a_key_reads_back_as_it_was_written(made: Path) -> None:
         assert truth_from(json.loads(json.dumps(truth.as_dict()))) == truth
 
 
+@pytest.mark.slow
 def test_the_seal_knows_its_key(made: Path, tmp_path: Path) -> None:
     key = made.with_name("set.key.json")
     check_seal(key, made / "seal.toml")
@@ -159,6 +162,7 @@ def test_the_newest_deck_has_every_effect_of_the_library() -> None:
     assert set(BY_NAME) <= {kind.name for kind in read_deck(max(KNOWN)).effects}
 
 
+@pytest.mark.slow
 def test_a_finished_make_may_be_called_again(made: Path) -> None:
     key = made.with_name("set.key.json")
     before = {name: (made / name).read_bytes() for name in files(made)}
@@ -234,6 +238,7 @@ def test_plans_keep_the_shares() -> None:
     assert all(len(set(plan.names)) == 2 for plan in planned if plan.category == "pair")
 
 
+@pytest.mark.slow
 def test_a_folder_or_key_that_is_there_is_refused(made: Path, tmp_path: Path) -> None:
     key = made.with_name("set.key.json")
     before = key.read_bytes()
@@ -250,6 +255,7 @@ def test_a_folder_or_key_that_is_there_is_refused(made: Path, tmp_path: Path) ->
     assert files(tmp_path) == {"full/mine.txt"}
 
 
+@pytest.mark.slow
 def test_a_key_that_is_none_is_refused(made: Path, tmp_path: Path) -> None:
     for text, word in (
         ("{", "not JSON"),

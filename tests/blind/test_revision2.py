@@ -269,6 +269,7 @@ def test_coloured_noise_keeps_its_strength() -> None:
     assert np.mean(found[2:] * found[:-2]) == pytest.approx(a**2, abs=0.01)
 
 
+@pytest.mark.slow
 def test_rigs_of_the_second_version_are_drawn_with_friction_that_yields() -> None:
     deck = read_deck(2)
     drawn = [

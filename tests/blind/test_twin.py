@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,6 @@ from coupled.flight.pilot import ForceTable
 from coupled.gap.effects.library import BY_NAME
 from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
-from coupled.rig.rig import Rig
 from tests.support.twin import POOL, STEP_N, alone, nodes, plain, stepped
 
 ALL_EFFECTS = (*EFFECTS, *REVISION_2)
@@ -156,6 +156,7 @@ def test_the_library_flies_the_same(tmp_path: Path, name: str) -> None:
             assert left < 0.1 * level, channel
 
 
+@pytest.mark.slow
 def test_clean_records_stand_at_their_floors() -> None:
     for name, seed in itertools.product(
         ("bench-compensated", "c172p-rigid", "t37-compensated"), (1, 2)
@@ -199,9 +200,7 @@ FITTED_TOO = {"stribeck_m_per_s", "elastic_share", "phase_rad", "damping_ratio"}
 @pytest.mark.parametrize("kind", [*ALL_EFFECTS, *OUTSIDERS], ids=lambda kind: kind.name)
 def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     name = "c172p-compensated" if kind.flown else "bench-compensated"
-    rig = POOL[name]
-    setting = _short(rig)
-    begun = fly_clean(with_other(np.random.default_rng(3), setting) if kind.other else setting)
+    begun = _clean(name, kind.other)
     assert begun is not None
     setting, clean = begun
     size = (kind.least * kind.most) ** 0.5 if kind.least < kind.most else kind.most
@@ -216,12 +215,12 @@ def test_a_kind_acts_and_says_what_it_put_in(kind: Kind) -> None:
     assert np.all(np.isfinite(record.data))
 
 
-def _short(rig: Rig) -> Setting:
-    for seed in itertools.count():
-        setting = draw_setting(np.random.default_rng(seed), rig)
-        if setting.frames < 2800:
-            return setting
-    raise AssertionError
+@cache
+def _clean(name: str, other: bool) -> tuple[Setting, Clean] | None:
+    """Return a short clean flight of a rig: all kinds that it may show are put into one."""
+    settings = (draw_setting(np.random.default_rng(seed), POOL[name]) for seed in itertools.count())
+    setting = next(each for each in settings if each.frames < 2800)
+    return fly_clean(with_other(np.random.default_rng(3), setting) if other else setting)
 
 
 def test_a_clean_record_tells_its_own_measures() -> None:

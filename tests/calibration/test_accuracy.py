@@ -40,6 +40,7 @@ def test_closed_forms_are_the_rigs_statics() -> None:
     assert line.estimate[0] / line.deflection[0] - 1.0 == pytest.approx(off, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_is_promised_is_the_scatter_that_comes() -> None:
     rng, tools, control = np.random.default_rng(17), usual_instruments("column"), column()
     true, offs, felts, errors = Scales(S1, S2, S3), [], [], []

@@ -167,6 +167,7 @@ def test_a_bad_file_is_refused_in_one_line(
         read_aircraft_data(written(tmp_path, lines, heads), "column", data)
 
 
+@pytest.mark.slow
 def test_the_command_judges_by_the_file_and_draws_it(tmp_path: Path) -> None:
     """The Cessna's column against forces 30 % above its own, at one q̄."""
     rig = read_rig(shipped_rigs()["c172p"])

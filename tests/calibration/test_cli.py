@@ -180,6 +180,7 @@ def test_many_benches_are_counted(folder: Path) -> None:
     assert files(folder) == {"r.csv"}
 
 
+@pytest.mark.slow
 def test_a_document_has_its_pages_and_checks(folder: Path) -> None:
     done = coupled(folder, "document", "-o", "doc", "--readings", "r.csv", "--json", "d.json")
     assert done.returncode == 1  # let go, the bent structure fails Part 60, and the table says why

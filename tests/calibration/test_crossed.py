@@ -111,6 +111,7 @@ def test_forces_on_others_that_tell_nothing_are_refused(
         fitted(read_readings(path, "column"))
 
 
+@pytest.mark.slow
 def test_intervals_of_the_terms_hold_what_they_should() -> None:
     """40 benches: a share of 0.95 leaves under 32 in 3 of 10 000; 200 are in the docs."""
     coverage = measure_coverage(bench(), 40)
@@ -128,6 +129,7 @@ def test_a_calibration_gives_the_host_its_terms() -> None:
     assert real.structure.column_by_wheel == found.fit.others["wheel"].value
 
 
+@pytest.mark.slow
 def test_a_plan_says_how_well_the_terms_get_known() -> None:
     """Against the scatter of 40 benches, and the closed form of its docstring within a third."""
     made = bench()

@@ -165,6 +165,7 @@ def test_a_table_that_cannot_be_is_refused(changes: dict[str, list[float]], says
         bench({f"{HOST}.{key}": value for key, value in changes.items()})
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_rig_whose_releases_pass(tmp_path: Path) -> None:
     more = ["--control", "column", "--write", "new.toml", "--json", "-", "-o", "doc"]
     checks = json.loads(coupled(tmp_path, "document", "report-column", *more).stdout)["column"]

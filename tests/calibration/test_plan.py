@@ -49,6 +49,7 @@ def test_stations_keep_within_travel_and_force(name: str) -> None:
         assert 0.0 < station.deflection <= 0.95 * rig.controls["column"].travel
 
 
+@pytest.mark.slow
 def test_the_promised_error_is_the_one_that_comes() -> None:
     grid = stations(report_rig(), "column", 4, 5)
     promised = precision(report_rig(), "column", grid, USUAL, looks=1)

@@ -284,6 +284,7 @@ def test_every_figure_of_a_comparison_may_be_expected() -> None:
     assert list(typing.get_args(Figure)) == numbers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped_runs()))
 def test_what_a_shipped_run_expects_holds(name: str) -> None:
     verdicts = check_run(read_expecting(name))

@@ -79,6 +79,7 @@ def test_the_same_seed_gives_the_same_points_and_another_others(folder: Path) ->
     assert len({job.seed for job in reseeded}) == 12
 
 
+@pytest.mark.slow
 def test_one_worker_and_two_make_the_same_bytes(folder: Path) -> None:
     done = coupled(folder, "sweep", "s.toml", "--folder", "two", "-j", "2")
     assert done.returncode == 0, done.stderr
@@ -100,6 +101,7 @@ def begun_sweep(folder: Path, workers: int) -> subprocess.Popen[bytes]:
     return begun(folder, *words, until=lambda: rows_in(folder / "o" / JOURNAL) >= 5)
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_goes_on_and_repeats_no_flight(folder: Path) -> None:
     kill(begun_sweep(folder, workers=2))
     kept = rows_in(folder / "o" / JOURNAL)
@@ -184,6 +186,7 @@ def test_a_sweep_in_as_few_words(folder: Path) -> None:
     assert sweep(table, folder / "o", workers=1).found == 2
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_says_that_it_goes_on(folder: Path) -> None:
     process = begun_sweep(folder, workers=1)
     os.killpg(process.pid, signal.SIGINT)

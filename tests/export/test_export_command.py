@@ -11,6 +11,7 @@ from coupled.resources import shipped_rigs
 from tests.support.commands import coupled, files
 
 
+@pytest.mark.slow
 def test_a_folder_stands_for_itself(tmp_path: Path) -> None:
     done = coupled(tmp_path, "export", "737", "--jsbsim", "out/737", "--run", "from-table")
     assert done.returncode == 0, done.stderr

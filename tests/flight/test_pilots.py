@@ -94,21 +94,26 @@ def sines(crossover: float) -> list[float]:
     return [round(crossover * f / base) * base for f in (0.5, 0.8, 1.0, 1.25, 2.0)]
 
 
+LOOPS = [
+    ("report-column", "column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
+    ("report-column", "column", "flight_path", 0.7, 0.9, _PATH),
+    ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002"),
+    ("t37", "pedals", "sideslip", 0.5, 1.0, _SLIP),
+]
+MORE_LOOPS = [
+    ("report-column", "column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
+    ("awjsra", "column", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
+    ("report-column", "column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),
+    ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002\narm_mass_kg = 0.36"),
+    ("737", "wheel", "heading", 0.3, 0.9, "sine_rad = 0.001"),
+    ("737", "pedals", "heading", 0.3, 0.7, "sine_rad = 0.0002"),
+    ("737", "pedals", "sideslip", 0.3, 1.0, _SLIP),
+]
+
+
 @pytest.mark.parametrize(
     ("rig", "control", "what", "crossover", "margin", "size"),
-    [
-        ("report-column", "column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
-        ("report-column", "column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
-        ("awjsra", "column", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
-        ("report-column", "column", "flight_path", 0.7, 0.9, _PATH),
-        ("report-column", "column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),
-        ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002"),
-        ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002\narm_mass_kg = 0.36"),
-        ("737", "wheel", "heading", 0.3, 0.9, "sine_rad = 0.001"),
-        ("737", "pedals", "heading", 0.3, 0.7, "sine_rad = 0.0002"),
-        ("737", "pedals", "sideslip", 0.3, 1.0, _SLIP),
-        ("t37", "pedals", "sideslip", 0.5, 1.0, _SLIP),
-    ],
+    [*LOOPS, *(pytest.param(*loop, marks=pytest.mark.slow) for loop in MORE_LOOPS)],
 )
 def test_the_loop_crosses_over_as_set(
     tmp_path: Path,

@@ -38,6 +38,7 @@ def effect(found: dict[str, Any], name: str) -> dict[str, Any]:
     return factor
 
 
+@pytest.mark.slow
 def test_a_cessna_damped_by_half_is_diagnosed_as_that(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

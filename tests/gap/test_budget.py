@@ -66,6 +66,7 @@ def test_what_is_nearly_right_explains_most_and_says_what_remains(
     json.dumps(table, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_two_effects_of_a_stage_share_its_gap_as_they_act_in_it(tmp_path: Path) -> None:
     """In the linkage a bend and a play add up: their shares are those of their own signatures."""
     nominal = nominal_rig(False)

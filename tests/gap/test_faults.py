@@ -57,6 +57,7 @@ def test_a_wrong_modifying_force_is_a_gap_of_the_loader(
     assert "loader" in found.guilty
 
 
+@pytest.mark.slow
 def test_a_deflection_of_64_levels_is_diagnosed_and_written(clean: Record) -> None:
     def coarse(x: Floats) -> Floats:
         step = np.ptp(x) / 64.0

@@ -47,6 +47,7 @@ def plainly(case: Case) -> Fit:
     return case.fit((PLAIN,), "fitted", wide.values, PLAIN, Descent("own"), wide)
 
 
+@pytest.mark.slow
 def test_a_richer_law_is_not_fitted_where_the_plain_one_leaves_noise(tmp_path: Path) -> None:
     """Neither a breakaway nor another friction to one side is foretold to gain anything."""
     case = judged(tmp_path, "plain")
@@ -64,6 +65,7 @@ def test_a_richer_law_is_not_fitted_where_the_plain_one_leaves_noise(tmp_path: P
     assert "fitting load_friction" in said and "fitting stribeck_friction" not in said
 
 
+@pytest.mark.slow
 def test_a_breakaway_that_shows_is_foretold_as_its_fit_finds_it(tmp_path: Path) -> None:
     case = judged(tmp_path, "breaks away a little")
     plain = plainly(case)

@@ -151,6 +151,7 @@ def stands_alone(label: str) -> bool:
     return label.startswith("screened out")
 
 
+@pytest.mark.slow
 def test_a_residual_that_nothing_explains_is_held_against_everything(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {}, 5).between(0.0, 12.0)
@@ -192,6 +193,7 @@ def test_channels_have_labels_and_units() -> None:
     assert unit_shown("load_factor") == (1.0, "g")
 
 
+@pytest.mark.slow
 def test_plots_on_the_command_line(tmp_path: Path) -> None:
     nominal = nominal_rig(True)
     write_record(made(tmp_path, nominal, {}, 8).between(0.0, 12.0), tmp_path / "r.csv")

@@ -182,6 +182,7 @@ def test_a_faint_gap_names_the_law_of_dry_friction_that_it_shows(
     assert [effect.name for effect in found.effects] == [named]
 
 
+@pytest.mark.slow
 def test_what_remains_is_told_in_numbers_and_words(tmp_path: Path) -> None:
     record = made(tmp_path, RIG, {}, 5)
     at = record.channels.index("column_deflection_m")

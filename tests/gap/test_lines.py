@@ -68,6 +68,7 @@ def test_a_smoother_leaves_a_tone_and_takes_the_noise() -> None:
     assert white(swing(7) + tone) == pytest.approx(NOISE_m, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_hum_is_a_finding_of_sensing_with_its_line(tmp_path: Path) -> None:
     """0.3 mm at 50 Hz on a deflection sampled at 120 Hz was once taken for noise."""
     nominal = nominal_rig(False)

@@ -43,6 +43,7 @@ def test_three_records_of_one_rig_tell_more_than_one(tmp_path: Path) -> None:
     assert widths[1] < 0.85 * widths[0]
 
 
+@pytest.mark.slow
 def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     record = made(tmp_path, nominal, {"bend": {"bend_{d}_per_N": 1.6e-4}}, 4)
@@ -63,6 +64,7 @@ def test_where_tells_what_a_gap_follows_and_since_when(tmp_path: Path) -> None:
     assert again.begins.low_s <= 20.0 <= again.begins.high_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flown", [False, True])
 def test_the_improved_rig_flown_again_comes_back_to_the_record(tmp_path: Path, flown: bool) -> None:
     nominal = nominal_rig(flown)
@@ -75,6 +77,7 @@ def test_the_improved_rig_flown_again_comes_back_to_the_record(tmp_path: Path, f
     assert whole.next_test == ""
 
 
+@pytest.mark.slow
 def test_a_gust_is_told_by_kinematics(tmp_path: Path) -> None:
     nominal = nominal_rig(True)
     record = made(tmp_path, nominal, {"vertical_gust": {"rms_m_per_s": 1.0}}, 9)
@@ -135,6 +138,7 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     assert "% of the gap on held-out data" in said
 
 
+@pytest.mark.slow
 def test_a_folder_is_diagnosed_by_one_command(tmp_path: Path) -> None:
     nominal = nominal_rig(False)
     (tmp_path / "rigs").mkdir()

@@ -73,6 +73,7 @@ def test_adaptation_is_slow_bounded_and_needs_to_be_sure() -> None:
     assert stiff.assumed == pytest.approx(1.6 * K)
 
 
+@pytest.mark.slow
 def test_adapted_compensation_keeps_the_authority_that_a_fixed_one_loses() -> None:
     fixed, adapted = softened(adapt=False), softened(adapt=True)
     softer = (TIMES - 1.0) * K * 2189.1  # of G_T·δ that the host does not know of

@@ -188,6 +188,7 @@ def test_a_minute_with_a_loader_names_what_it_has(
     assert found.verdict == ("no_gap" if effect is None else "effect")
 
 
+@pytest.mark.slow
 def test_a_loader_that_dies_leaves_a_whole_record_and_a_held_surface(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

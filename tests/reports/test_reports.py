@@ -32,6 +32,7 @@ def test_a_comparison_is_reported_with_its_numbers_and_hashes(tmp_path: Path) ->
     assert "coupled compare appendix-c --no-figure" in text
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
     made = []
     for name in ("a", "b"):

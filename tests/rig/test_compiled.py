@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import coupled
 
 REPLAY = """
@@ -49,6 +51,7 @@ def copy_of_the_package(to: Path) -> Path:
     return package
 
 
+@pytest.mark.slow
 def test_without_a_place_for_the_cache_it_flies_from_memory(tmp_path: Path) -> None:
     package = copy_of_the_package(tmp_path)
     (package / "nowhere.txt").touch()
@@ -87,6 +90,7 @@ def start(cache: Path) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_a_second_start_loads_no_compiler_and_no_linear_algebra(tmp_path: Path) -> None:
     assert start(tmp_path)[:2] == ["False", "True"]
     assert start(tmp_path) == ["True", "True", "False", "False"]

@@ -134,6 +134,7 @@ _PILOTS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     kind=st.sampled_from(sorted(_PILOTS)),

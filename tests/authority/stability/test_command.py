@@ -44,6 +44,7 @@ def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
         assert growth(rig, hand) == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_command_writes_figure_table_and_json(
     coarse: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

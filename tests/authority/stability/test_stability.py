@@ -237,6 +237,7 @@ def test_every_shipped_control_has_its_limits_where_theory_has_them(name: str) -
         assert limits["frame"].stable in ("below", "everywhere")
 
 
+@pytest.mark.slow
 def test_a_bob_weights_loop_through_the_aircraft_oscillates_where_nyquist_says() -> None:
     for name, within in (("c172p", 0.01), ("t37", 0.01)):
         file = shipped_rigs()[name]

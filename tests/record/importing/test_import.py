@@ -94,6 +94,7 @@ def test_scale_and_offset_are_in_the_logs_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose(record["column_computed_m"], expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_every_format_gives_the_same_record(tmp_path: Path) -> None:
     first, _ = imported(tmp_path)
     frame = pl.read_csv(io.BytesIO(GOOD.encode()))
