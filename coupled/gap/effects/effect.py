@@ -104,9 +104,12 @@ class Parameter:
             return -float(self.nominal(rig, control)), self.high
         return self.low, self.high
 
-    def size(self, value: float) -> float:
-        """Return how far a value is from where it does nothing."""
-        return abs(value - 1.0) if self.mode == "factor" else abs(value)
+    def size(self, value: float, rig: Rig, control: ControlName) -> float:
+        """Return how far a value is from where it does nothing; a limit's own size.
+
+        Of a bend that is what it differs by from the one filed, whose own action is exact.
+        """
+        return abs(value) if self.inverse else abs(value - self.neutral(rig, control))
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
         """Return the value at which the rig's number stays as it is."""

@@ -89,7 +89,7 @@ LINKAGE: tuple[Effect, ...] = (
     one(
         "linkage",
         "servo_rate_limit",
-        limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-3, 10, 0.1, 0.18),
+        limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-4, 10, 0.1, 0.18),
         *("speed", "servo_speed", "law", 1.5),
     ),
     # A servo that was fitted without its dead time is too slow: its frequency is found again.

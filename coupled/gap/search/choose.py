@@ -16,7 +16,7 @@ from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
-from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
 from coupled.gap.search.intwo import in_two
 from coupled.gap.search.onelaw import same_in_a_limit
 from coupled.gap.search.rivals import Found, found_by, separated, tried_again
@@ -200,7 +200,8 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
     Where the one with fewer closes a gap of the loader, the other must beat it by more than the
     physics of a right effect may leave: no law of dry friction is exact. And the richer of two laws
     must say by its own interval that it is not the plainer one: its other numbers, and the contact
-    beside it, also take up what noise has moved of a contact that yields.
+    beside it, also take up what noise has moved of a contact that yields. So does a loop or a mode
+    of the bend with the noise of the force, which it filters.
     """
     best = ranked[0]
     first, limits = stage_gaps(case.outputs, settled.rig), stage_limits(case.outputs)
@@ -219,6 +220,8 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
             continue
         share = SIMPLER_SHARE * ranked[0].gain
         margin = max(SIMPLER_GAIN, share) if doubtful else RIVAL_GAIN
+        if closes and shape_is_open(case, best.effect, best.fit, other.effect):
+            margin = max(margin, LEAST_GAIN + RIVAL_GAIN)
         if other.gain > ranked[0].gain - margin:
             best = other
     return plain_reading(best, ranked)

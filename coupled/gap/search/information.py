@@ -130,6 +130,24 @@ def _limits(effect: Effect, fitted: Fit) -> list[bool]:
     return [p.low < fitted.low[key] and fitted.high[key] < p.high for p, key in limits]
 
 
+def shape_is_open(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
+    """Tell whether nothing surely sets the richer of two effects apart from the plainer one.
+
+    The richer one frees the plainer one's number and others, of which one may, by its interval, be
+    what it is filed as, or a limit that is none.
+    """
+    shared = {p.key for p in plainer.free}
+    if not shared or not shared < {p.key for p in richer.free}:
+        return False
+    more = [p for p in richer.free if p.key not in shared and not (p.above or p.may_end)]
+    sure = _limits(richer, fitted)
+    for p in more:
+        key, nothing = richer.value_key(p), p.neutral(case.nominal, case.control)
+        if not p.inverse:
+            sure.append(not fitted.low[key] <= nothing <= fitted.high[key])
+    return not all(sure)
+
+
 def may_be_plainer(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> bool:
     """Tell whether the interval of the richer of two laws holds the plainer one.
 

@@ -15,6 +15,7 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.limits import is_limit, limits
 from coupled.gap.thresholds import (
     RACE_BEHIND,
     SCREEN_FACTORS,
@@ -75,6 +76,17 @@ def screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict
     return best, starts
 
 
+def _shows(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> bool:
+    """Tell whether an effect of these values changes the residual."""
+    go_on()
+    rig = _with(case, current, effect, values)
+    if rig is None:
+        return False
+    ours = touched(case.outputs, [effect])
+    turn = [o.residual(current.rig, wide=True) - o.residual(rig, wide=True) for o in ours]
+    return sum(float(t @ t) for t in turn) > SCREEN_SHOWN * sum(len(t) for t in turn)
+
+
 def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) -> Rig | None:
     """Return the current rig with one more effect, None where the physics cannot give it."""
     chosen = (*current.effects, effect)
@@ -85,6 +97,10 @@ def _with(case: Case, current: Fit, effect: Effect, values: dict[str, float]) ->
 
 def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, float]]]:
     """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
+    if is_limit(effect) and not STAGE_OF[effect.stage].flown:
+        key = effect.value_key(effect.free[0])
+        met = limits(effect, lambda value: _shows(case, current, effect, {key: value}))
+        return [[{key: value} for value in met]]
     if effect.seen is None:
         shapes = max([len(p.starts) for p in effect.free], default=1)
         return [_sizes(case, current, effect, shape) for shape in range(shapes)]

@@ -1,0 +1,36 @@
+"""Where the fit of a limit starts: at shares of the largest one that a record meets.
+
+A limit that only the peaks of a record meet is a tenth below them: sizes that are a factor of three
+apart are either never met, or cut so much off that the effect looks like none of the residual.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from coupled.gap.effects.effect import Effect
+
+BISECTIONS = 10  # of the logarithm between the bounds: to 1 % of three decades, and more
+SHARES = (0.98, 0.95, 0.9, 0.84, 0.76, 0.65, 0.5, 0.35, 0.2, 0.1, 0.04)  # chosen
+
+
+def is_limit(effect: Effect) -> bool:
+    """Tell whether an effect is a limit and nothing else."""
+    return len(effect.free) == 1 and effect.free[0].inverse
+
+
+def limits(effect: Effect, shows: Callable[[float], bool]) -> list[float]:
+    """Return limits to try, from the largest one that shows on, in the limit's own unit.
+
+    `shows` tells of a limit whether it changes what is predicted. None where not even the lowest
+    does.
+    """
+    number = effect.free[0]
+    low, high = math.log(number.low), math.log(number.high)
+    if not shows(number.low):
+        return []
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
+    return [max(share * math.exp(low), number.low) for share in SHARES]

@@ -1,0 +1,61 @@
+"""A limit is sought from the largest one on that a record meets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.limits import is_limit, limits
+from tests.support.gaps import made, nominal_rig
+
+FORCE, SERVO = BY_NAME["force_limit"], BY_NAME["servo_rate_limit"]
+
+
+@given(st.floats(0.06, 1900.0))
+def test_the_first_limit_tried_cuts_a_fiftieth_off_the_peak(peak: float) -> None:
+    tried = limits(FORCE, lambda value: value < peak)
+    assert 0.96 * peak < tried[0] < 0.99 * peak
+    assert tried == sorted(tried, reverse=True)
+    assert tried[-1] >= FORCE.free[0].low
+
+
+def test_none_is_tried_where_the_lowest_is_never_met() -> None:
+    assert limits(SERVO, lambda value: False) == []
+
+
+def test_limits_are_those_that_are_nothing_else() -> None:
+    """What also bends or yields has a size beside its limit, and is screened by that."""
+    names = {effect.name for effect in EFFECTS if is_limit(effect)}
+    assert names == {"force_limit", "servo_rate_limit", "surface_rate_limit"}
+
+
+@pytest.mark.slow
+def test_a_limit_that_only_the_peaks_meet_is_found(tmp_path: Path) -> None:
+    """Of peaks of 56 N, a limit of 49.5 N cut 55 frames off: 3.9 floors that nothing explained."""
+    rig = nominal_rig(False)
+    whole = made(tmp_path, rig, {}, 5)["column_modifying_force_N"]
+    peak = float(np.max(np.abs(whole)))
+    limit = 0.88 * peak
+    record = made(tmp_path, rig, {"force_limit": {"limit_N": limit}}, 5)
+    assert np.mean(np.abs(record["column_modifying_force_N"]) > limit) < 0.05
+    found = diagnose(rig, {"r": record})
+    assert [effect.name for effect in found.effects] == ["force_limit"], found.summary
+    [number] = found.effects[0].parameters
+    assert number.value == pytest.approx(limit, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_servo_that_creeps_is_found(tmp_path: Path) -> None:
+    """A rate of 0.6 mm/s was below all that was tried."""
+    rig = nominal_rig(False)
+    true = {"servo_rate_limit": {"rate_{d}_per_s": 6e-4}}
+    found = diagnose(rig, {"r": made(tmp_path, rig, true, 5)})
+    assert [effect.name for effect in found.effects] == ["servo_rate_limit"], found.summary
+    [number] = found.effects[0].parameters
+    assert number.value == pytest.approx(6e-4, rel=0.02)
