@@ -57,7 +57,16 @@ def test_every_public_name_is_there_and_on_the_map() -> None:
     assert kinds <= set(coupled.__all__)
 
 
-@pytest.mark.parametrize("name", coupled.__all__)
+LONG = {"calibrate", "diagnose"}  # to work an example
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+        for name in coupled.__all__
+    ],
+)
 def test_every_public_name_has_an_example_that_runs(name: str) -> None:
     thing = getattr(coupled, name)
     assert inspect.getdoc(thing)

@@ -29,7 +29,16 @@ def flown(name: str) -> Comparison:
     return compare(read_run(name))
 
 
-@pytest.mark.parametrize("name", sorted(set(shipped_runs()) - WORST - OWN))
+LONG = {"roll-tracking", "tracking"}  # these take several seconds
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+        for name in sorted(set(shipped_runs()) - WORST - OWN)
+    ],
+)
 def test_every_run_flies_to_its_end(name: str) -> None:
     flights = flown(name)
     scenario = flights[0].manoeuvre
@@ -168,6 +177,7 @@ def test_the_bounds_of_the_release_are_the_rules_about_the_rigid_stick() -> None
     assert crossed["compensated, by the gradient"] == pytest.approx(rigid, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_table_of_the_release_is_what_the_remedy_finds() -> None:
     filed = read_run("release")[2].rig.controls["column"].compensation
     found = scheduled(load_rig("t37"), "column").controls["column"].compensation

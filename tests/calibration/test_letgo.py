@@ -45,6 +45,7 @@ def factors(mass: float, damping: float, lead_s: float = 0.0) -> Rig:
     )
 
 
+@pytest.mark.slow
 def test_factors_at_one_over_the_rest_keep_frequency_and_damping_ratio_as_specified() -> None:
     factor = 1.0 / (1.0 - K_REPORT * G_STIFF)
     table = {f"{HOST}.{of}_factor": [1.0, factor] for of in ("mass", "damping")}

@@ -96,11 +96,11 @@ def sines(crossover: float) -> list[float]:
 
 LOOPS = [
     ("report-column", "column", "pitch", 2.0, 0.7, "sine_rad = 0.0002"),
-    ("report-column", "column", "flight_path", 0.7, 0.9, _PATH),
     ("737", "wheel", "roll", 1.5, 0.7, "sine_rad = 0.002"),
-    ("t37", "pedals", "sideslip", 0.5, 1.0, _SLIP),
 ]
 MORE_LOOPS = [
+    ("report-column", "column", "flight_path", 0.7, 0.9, _PATH),
+    ("t37", "pedals", "sideslip", 0.5, 1.0, _SLIP),
     ("report-column", "column", "pitch", 3.0, 0.5, "sine_rad = 0.0002"),
     ("awjsra", "column", "pitch", 1.5, 0.7, "sine_rad = 0.001"),
     ("report-column", "column", "airspeed", 0.25, 0.8, "sine_m_per_s = 0.1"),

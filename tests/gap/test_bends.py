@@ -90,14 +90,13 @@ def test_an_open_law_has_to_gain_far_more_than_a_bend_that_closes_the_gap(
 
 
 def test_a_bend_is_known_by_how_far_it_is_from_the_one_filed() -> None:
-    """Of a factor and of what the rig has none of, that is the effect's size; a limit has its own.
+    """So is a factor, and what the rig has none of; a limit by its own size.
 
     A bend 0.7 % above the filed one had an interval of 1.5 % of all of it, and said nothing.
     """
-    [number] = BEND.free
-    assert number.size(9.2e-5, rigged(), "column") == pytest.approx(2e-6)
-    [factor] = BY_NAME["servo_lag"].free
-    assert factor.size(0.8, rigged(), "column") == pytest.approx(0.2)
-    [limit] = BY_NAME["force_limit"].free
-    assert limit.size(49.5, rigged(), "column") == 49.5
-    assert LOOP.free[2].size(12.0, rigged(), "column") == 12.0
+    [bend], [factor] = BEND.free, BY_NAME["servo_lag"].free
+    [limit], [_, _, width] = BY_NAME["force_limit"].free, LOOP.free
+    assert bend.error(9.2e-5, rigged(), "column") == pytest.approx(0.015 * 2e-6)
+    assert factor.error(0.8, rigged(), "column") == pytest.approx(0.015 * 0.2)
+    assert limit.error(49.5, rigged(), "column") == pytest.approx(0.015 * 49.5)
+    assert width.error(12.0, rigged(), "column") == pytest.approx(0.015 * 12.0)

@@ -84,7 +84,7 @@ LONG |= {"soft_backlash", "bend_hysteresis", "structural_mode", "force_limit"}
 LONG |= {"elevator_effectiveness", "vertical_gust", "coulomb_friction"}
 LONG |= {"pitch_stiffness", "lift_slope", "mass", "inertia", "modifying_lag", "presliding_friction"}
 LONG |= {"stiffening_bend", "cable_stretch", "surface_freeplay", "rigging_offset"}
-LONG |= {"surface_rate_limit", "servo_rate_limit"}
+LONG |= {"surface_rate_limit", "servo_rate_limit", "pitch_damping"}
 
 # Forty seconds meet few gusts. The noise of F walks a contact that yields, smoothed as it is.
 ROUGHLY = {

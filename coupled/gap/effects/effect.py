@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from math import hypot
 from typing import Any, Literal
 
 from coupled.errors import InputError
@@ -104,12 +105,10 @@ class Parameter:
             return -float(self.nominal(rig, control)), self.high
         return self.low, self.high
 
-    def size(self, value: float, rig: Rig, control: ControlName) -> float:
-        """Return how far a value is from where it does nothing; a limit's own size.
-
-        Of a bend that is what it differs by from the one filed, whose own action is exact.
-        """
-        return abs(value) if self.inverse else abs(value - self.neutral(rig, control))
+    def error(self, value: float, rig: Rig, control: ControlName) -> float:
+        """Return how well a value is known at best: by its way from none, or by a limit."""
+        size = abs(value) if self.inverse else abs(value - self.neutral(rig, control))
+        return hypot(self.model_error * size, self.unsure)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:
         """Return the value at which the rig's number stays as it is."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,8 +204,7 @@ def _fit(
     # Where all that is filed is taken off, nothing is left of it: that is an answer.
     gone = np.isclose(best.x, low, atol=1e-4) & (ends[0] < [p.low for p in frees])
     values = np.where(gone, ends[0], best.x * scale)
-    sized = [(p, p.size(v, nominal, control)) for p, v in zip(frees, values, strict=True)]
-    sizes = [hypot(p.model_error * size, p.unsure) for p, size in sized]
+    sizes = [p.error(v, nominal, control) for p, v in zip(frees, values, strict=True)]
     half = np.hypot(half, sizes)
     # A small cubic is near its bound on the scale of a large one, but known not to be there.
     small = np.isclose(best.x, low, atol=1e-4) & ((best.x - low) * scale <= half)
