@@ -178,6 +178,8 @@ SCREEN_NEAR = 0.15  # chosen: share of what the best takes, from which others ar
 SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
 SCREEN_FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
 SCREEN_LESS = (0.2, 0.6, 0.99)  # chosen: shares of what is filed, taken off
+LIMIT_BISECTIONS = 10  # of the logarithm between its bounds: five decades to 1 %
+LIMIT_SHARES = (0.98, 0.95, 0.9, 0.84, 0.76, 0.65, 0.5, 0.35, 0.2, 0.1, 0.04)  # chosen
 SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which a size does something
 
 # Where a fit of a ripple starts (`ripples`).

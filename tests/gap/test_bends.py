@@ -59,6 +59,15 @@ def test_a_law_of_the_bend_is_open_where_its_own_numbers_may_be_none(
     assert not shape_is_open(case, BEND, fitted(BEND, TOTAL), effect)
 
 
+def test_how_fast_friction_fades_does_not_leave_its_breakaway_open() -> None:
+    """The rate as it is filed is no sign that there is none: the breakaway says that."""
+    stribeck = BY_NAME["stribeck_friction"]
+    fading = rigged().controls["column"].loader.stribeck_rate
+    found = fitted(stribeck, (3.9, 4.1), (6.0, 6.4), (0.5 * fading, 2.0 * fading))
+    case = Case(rigged(), "column", [])
+    assert not shape_is_open(case, stribeck, found, BY_NAME["coulomb_friction"])
+
+
 @pytest.mark.parametrize(
     ("law", "more", "left", "named"),
     [

@@ -139,12 +139,13 @@ def shape_is_open(case: Case, richer: Effect, fitted: Fit, plainer: Effect) -> b
     shared = {p.key for p in plainer.free}
     if not shared or not shared < {p.key for p in richer.free}:
         return False
-    more = [p for p in richer.free if p.key not in shared and not (p.above or p.may_end)]
     sure = _limits(richer, fitted)
-    for p in more:
+    for p in richer.free:
+        # What only shapes a law, as how fast friction fades, has no size at which there is none.
+        if p.key in shared or p.above or p.may_end or p.shape or p.inverse:
+            continue
         key, nothing = richer.value_key(p), p.neutral(case.nominal, case.control)
-        if not p.inverse:
-            sure.append(not fitted.low[key] <= nothing <= fitted.high[key])
+        sure.append(not fitted.low[key] <= nothing <= fitted.high[key])
     return not all(sure)
 
 

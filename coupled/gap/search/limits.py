@@ -10,9 +10,7 @@ import math
 from collections.abc import Callable
 
 from coupled.gap.effects.effect import Effect
-
-BISECTIONS = 10  # of the logarithm between the bounds: to 1 % of three decades, and more
-SHARES = (0.98, 0.95, 0.9, 0.84, 0.76, 0.65, 0.5, 0.35, 0.2, 0.1, 0.04)  # chosen
+from coupled.gap.thresholds import LIMIT_BISECTIONS, LIMIT_SHARES
 
 
 def is_limit(effect: Effect) -> bool:
@@ -30,7 +28,7 @@ def limits(effect: Effect, shows: Callable[[float], bool]) -> list[float]:
     low, high = math.log(number.low), math.log(number.high)
     if not shows(number.low):
         return []
-    for _ in range(BISECTIONS):
+    for _ in range(LIMIT_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
-    return [max(share * math.exp(low), number.low) for share in SHARES]
+    return [max(share * math.exp(low), number.low) for share in LIMIT_SHARES]
