@@ -30,6 +30,7 @@ from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
 from coupled.gap.stages.imposed import under_motion
+from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.parallel import in_threads, threads
@@ -92,6 +93,8 @@ def _diagnose(
         raise InputError(file, "", problem)
     library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()), control)]
     library = under_motion(library) if readers[0].moved else library
+    if readers[0].set_points:
+        library = under_set_points(library, list(records.values()), control)
 
     known: list[tuple[Rig, Sequence[Output]]] = []  # the last one asked for: it takes as long again
 

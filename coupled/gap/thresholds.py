@@ -79,6 +79,10 @@ HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is
 HELD_JUMPS = 20  # chosen: fewer changes do not show that a signal comes in set points
 HELD_AT_MOST = 10  # chosen: frames between two changes, beyond which the machine paused
 HELD_SHARE = 0.98  # chosen: of the changes with a pause before the next
+HELD_FINER = 0.01  # chosen: of the noise of the grip's transducer, what a set point has at most
+HELD_WINDOW = 8  # frames of a stretch in which a motion may be straight; chosen
+REACHED_BEYOND = 6.0  # chosen: times a transducer's noise, by which a way is surely a motion
+REACHED_OVER = (2, 3, 4, 6, 8, 12)  # chosen: frames over which a speed is taken
 HELD_STEPS = 3.0  # chosen: least steps that the usual change has; of a slow sensor it is one
 
 # Inputs of the stages (`stages`, `airframe`, `surfaces`).

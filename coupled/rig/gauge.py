@@ -155,6 +155,9 @@ def move_gauge(
     s.acceleration = (
         p.servo_stiffness * (computed - linkage.position) - p.servo_damping * linkage.rate
     )
+    most = linkage_p.acceleration_limit
+    if most > 0.0:
+        s.acceleration = min(max(s.acceleration, -most), most)
     limit = linkage_p.rate_limit
     if limit > 0.0 and abs(linkage.rate) >= limit and s.acceleration * linkage.rate > 0.0:
         s.acceleration = 0.0

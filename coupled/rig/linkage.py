@@ -1,7 +1,8 @@
 """Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
 
-    servo      x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit;  u is δc as `command`
-               gives it, late or in set points. p = 0: a servo on position, of second order,
+    servo      x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit, |x''| ≤ acceleration
+               limit, of a motor's torque or a profile;  u is δc as `command` gives it, late or
+               in set points. p = 0: a servo on position, of second order,
                and with ζ far above 1 a proportional one, of first; p = 1: a PI controller of the
                error e, x' = 2ζω·e + ω²·∫e
     backlash   the grip's side follows x once it has taken up the play; with a contact that yields
@@ -44,6 +45,7 @@ class LinkageParameters(CommandParameters, Protocol):
     position: NDArray[np.float64]  # weights of (x, x', δc before, δc after) in the next x
     speed: NDArray[np.float64]  # and in the next x'
     rate_limit: float  # d/s; 0 for none
+    acceleration_limit: float  # d/s²; 0 for none
     play: float  # full width of the backlash, d
     bend: float  # K of the structure, d/N, for a pull
     push: float  # and for a push
@@ -128,6 +130,7 @@ LINKAGE = Declaration(
         "position": lambda g: _servo(g)[0],
         "speed": lambda g: _servo(g)[1],
         "rate_limit": lambda g: g.control.loader.servo_rate_limit,
+        "acceleration_limit": lambda g: g.control.loader.servo_acceleration_limit,
         "push": _push,
         "share": lambda g: g.control.loader.bend_hysteresis_share,
         "width": lambda g: g.control.loader.bend_hysteresis_width,
@@ -158,6 +161,9 @@ def move_linkage(
     x, v = s.position, s.rate
     s.position = a[0] * x + a[1] * v + a[2] * before + a[3] * after
     s.rate = b[0] * x + b[1] * v + b[2] * before + b[3] * after
+    if p.acceleration_limit > 0.0 and abs(s.rate - v) > p.acceleration_limit * h:
+        s.rate = v + math.copysign(p.acceleration_limit * h, s.rate - v)
+        s.position = x + 0.5 * (v + s.rate) * h
     if p.rate_limit > 0.0:
         s.rate = min(max(s.rate, -p.rate_limit), p.rate_limit)
         step = p.rate_limit * h

@@ -54,6 +54,7 @@ class Loader(Section):
     servo_delay: float = quantity("s", 0.0, ge=0, le=0.5)
     servo_rate_share: float = quantity("", 0.0, ge=0, le=1)
     servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)
+    servo_acceleration_limit: float = quantity("{d}_per_s2", 0.0, ge=0)
     bend: float = quantity("{d}_per_N", 0.0, ge=0)
     bend_push: float | None = quantity("{d}_per_N", None, ge=0)
     bend_limit: float = quantity("{d}", 0.0, ge=0)

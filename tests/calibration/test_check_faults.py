@@ -46,6 +46,8 @@ FAULTS: dict[str, dict[str, float]] = {
     },
     "servo_lag": {"factor": 0.15},
     "servo_rate_limit": {"rate_{d}_per_s": 0.1},
+    "servo_acceleration_limit": {"acceleration_{d}_per_s2": 0.5},
+    "servo_tuning": {"delay_s": 0.05, "factor": 0.15, "damping_factor": 0.3},
     "pressure_scale": {"factor": 1.4},
     "schedule_slope": {"factor": 0.5},
     "cable_stretch": {"loss_per_Pa": 1e-4},

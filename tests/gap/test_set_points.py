@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.library import EFFECTS
 from coupled.gap.nominal import fit_nominal
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven, in_set_points
+from coupled.gap.stages.setpoints import under_set_points
 from coupled.record.record import Record
 from tests.support.machines import servo, servo_rig, set_points
 
@@ -37,6 +39,54 @@ def test_set_points_slower_than_the_log_are_seen_as_such() -> None:
     assert not in_set_points(1e-3 * np.round(POINTS / 1e-3))  # a sensor's counts
     steps = np.repeat([0.0, 0.1, -0.2, 0.3, 0.0], 400)
     assert not in_set_points(steps)  # a few holds are a test's own
+
+
+def test_a_number_without_noise_is_a_set_point_however_fast_they_come() -> None:
+    record = servo(POINTS)
+    rig = servo_rig(drive="force")
+    assert as_driven(rig, [record], "column") == servo_rig()
+    rng = np.random.default_rng(2)
+    hiss = rng.normal(0.0, 1e-4, len(POINTS))
+    for measured in (POINTS + hiss, 1.5e-3 * np.round(POINTS / 1.5e-3)):
+        data = record.data.copy()
+        data[:, record.channels.index("column_computed_m")] = measured
+        assert as_driven(rig, [Record(record.channels, data)], "column") == rig
+    hosted = np.column_stack((record.data, np.full(len(POINTS), 1000.0)))
+    host = Record((*record.channels, "column_gradient_N_per_m"), hosted)
+    assert as_driven(rig, [host], "column") == rig
+
+
+def test_a_set_point_has_no_scale_and_no_limit_below_the_speed_that_was_reached() -> None:
+    swift = servo(POINTS)
+    library = under_set_points(EFFECTS, [swift], "column")
+    left = {effect.name for effect in EFFECTS} - {effect.name for effect in library}
+    assert left == {"deflection_scale", "scale_drift", "mains_hum"}
+    [limit] = next(one for one in library if one.name == "servo_rate_limit").parameters
+    speed = np.max(np.abs(np.gradient(swift["column_deflection_m"], 1 / 50)))
+    assert 0.5 * speed < limit.low < 1.02 * speed
+    slow = servo(np.clip(5e-4 * np.arange(1000), 0.0, 0.2))  # a ramp of 25 mm/s
+    library = under_set_points(EFFECTS, [slow], "column")
+    [limit] = next(one for one in library if one.name == "servo_rate_limit").parameters
+    assert 0.0 < limit.low < 0.025
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("filed_Hz", [6.0, 3.0])
+def test_a_motor_that_accelerates_by_no_more_than_it_can_is_told_from_a_slow_servo(
+    filed_Hz: float,
+) -> None:
+    record = servo(2.0 * POINTS, most_m_per_s2=6.0)
+    found = diagnose(servo_rig(frequency_Hz=filed_Hz), {"r": record})
+    assert found.verdict == "effect", found.summary
+    names = {effect.name for effect in found.effects}
+    # A servo filed at half its frequency may be found with its damping ratio, which is as filed.
+    assert names - {"servo_delay", "servo_tuning"} == {"servo_acceleration_limit", "backlash"}
+    loader = found.improved.controls["column"].loader
+    # A servo's frequency, its dead time and what it accelerates by pass for one another.
+    assert loader.servo_acceleration_limit == pytest.approx(6.0, rel=0.06)
+    assert loader.play == pytest.approx(0.02, abs=5e-4)
+    assert loader.servo_delay == pytest.approx(0.06, abs=3e-3)
+    assert loader.servo_frequency == pytest.approx(6.0, rel=0.06)
 
 
 @pytest.mark.slow

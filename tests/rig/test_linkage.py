@@ -65,6 +65,27 @@ def test_a_servo_off_its_rate_limit_arrives_with_the_limits_speed() -> None:
     assert x[t > start] == pytest.approx(u + swing, abs=5e-6)
 
 
+def test_an_acceleration_limit_is_the_slope_of_the_speed() -> None:
+    """Far from its command a servo gathers speed at the limit, x = a·t²/2, and brakes at it."""
+    t, a = np.arange(8000) / 2000.0, 0.4
+    x = servo({"servo_acceleration_limit_m_per_s2": a}, np.where(t < 0.1, 0.0, 0.08))
+    since = t - 0.1
+    gathers = (since > 0.01) & (since < 0.25)
+    began = 0.1 - 1.0 / 2000.0  # the command runs straight over the step before
+    assert x[gathers] == pytest.approx(0.5 * a * (t[gathers] - began) ** 2, rel=1e-9)
+    bends = np.diff(x, 2) * 2000.0**2
+    assert np.max(np.abs(bends)) < 1.25 * a  # within the step in which it lets go
+    assert np.quantile(np.abs(bends), 0.99) < a * (1.0 + 1e-6)
+    assert np.mean(np.isclose(bends, -a, rtol=1e-6)) > 0.05  # it brakes at the limit, too
+
+
+@pytest.mark.parametrize("limit", ["acceleration_limit_m_per_s2", "rate_limit_m_per_s"])
+def test_a_limit_that_is_never_met_changes_no_bit(limit: str) -> None:
+    t = np.arange(4000) / 2000.0
+    u = 0.02 * np.sin(9.0 * t)
+    assert np.array_equal(servo({f"servo_{limit}": 100.0}, u), servo({}, u))
+
+
 def test_backlash_lets_the_grip_lag_by_half_the_play_each_way() -> None:
     t = np.arange(40000) / 2000.0
     x = 0.04 * np.sin(2 * np.pi * t / 10.0)

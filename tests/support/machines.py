@@ -6,6 +6,7 @@ finer than it is recorded. Records are in the channels of a column; forces in N,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -105,8 +106,11 @@ def servo(
     delay_s: float = 0.06,
     play_m: float = 0.02,
     count_m: float = 1.5e-3,
+    most_m_per_s2: float = math.inf,
 ) -> Record:
     """Return a record of a servo that holds set points, with dead time, play and an encoder.
+
+    Its motor accelerates by no more than `most_m_per_s2`.
 
     Runge and Kutta's fourth order at 4 kHz; the play is a dead zone that the output sits in.
     """
@@ -117,7 +121,8 @@ def servo(
     read, h = np.empty(len(commands)), 1.0 / fine
 
     def pull(x: float, v: float, u: float) -> float:
-        return float(omega * omega * (u - x) - 2.0 * damping_ratio * omega * v)
+        wanted = float(omega * omega * (u - x) - 2.0 * damping_ratio * omega * v)
+        return min(max(wanted, -most_m_per_s2), most_m_per_s2)
 
     for k, u in enumerate(wanted[: len(commands) * steps].tolist()):
         if k % steps == 0:

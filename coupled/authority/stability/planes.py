@@ -129,6 +129,7 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
         f"loader.play_{d}": 0.0,
         "loader.offset_N": 0.0,
         f"loader.servo_rate_limit_{d}_per_s": 0.0,
+        f"loader.servo_acceleration_limit_{d}_per_s2": 0.0,
         f"loader.bend_limit_{d}": 0.0,
         "loader.bend_hysteresis_share": 0.0,
         "loader.bob_weight_N_per_g": 0.0,

@@ -148,6 +148,7 @@ class Effect:
     `events`       when the events were that it consists of, in s from the record's start
     `seen`         values by parameter where a fit may start, as a rig's residuals show them
     `mark`         the output that shows it by what it repeats, be it within its limit
+    `of_sensor`    it is one of the sensor of δc, which a set point has none of
     `reserve`      it passes for others: only tried in a second search (`search`)
     """
 
@@ -169,6 +170,7 @@ class Effect:
     events: Callable[[Record], Floats] | None = None
     seen: Callable[[Sequence[Output], Rig, ControlName], list[dict[str, float]]] | None = None
     mark: str = ""
+    of_sensor: bool = False
     reserve: bool = False
 
     @property
@@ -289,10 +291,7 @@ def _level(rig: Rig, control: ControlName, changes: Mapping[str, Any]) -> float:
 def _no_less_than_running(
     rig: Rig, control: ControlName, changes: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return the breakaway raised to the running friction, where there is one below it.
-
-    That is what friction does with it; in a rig file it would be refused.
-    """
+    """Return the breakaway raised to the running friction where below it: a file is refused so."""
     if FRICTION not in changes and BREAKAWAY not in changes:
         return {}
     running = float(changes.get(FRICTION, value_of(rig, control, FRICTION)))

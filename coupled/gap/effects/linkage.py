@@ -17,6 +17,9 @@ from coupled.gap.effects.entries import (
     value,
 )
 
+DAMPING_RATIO = replace(
+    factor("loader.servo_damping_ratio", 1.0), name="damping_factor", scanned=False, may_end=True
+)
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
     Effect(
@@ -92,21 +95,40 @@ LINKAGE: tuple[Effect, ...] = (
         limit("rate_{d}_per_s", "loader.servo_rate_limit_{d}_per_s", 1e-4, 10, 0.1, 0.18),
         *("speed", "servo_speed", "law", 1.5),
     ),
-    # A servo that was fitted without its dead time is too slow: its frequency is found again.
-    Effect(
-        "servo_delay",
-        "linkage",
-        (
-            added("delay_s", "loader.servo_delay_s", 0, 0.45, 0.02, 0.05, 0.1),
-            replace(
-                factor("loader.servo_frequency_Hz", 1.0),
-                starts=(1.0, 3.0, 8.0),
-                scanned=False,
-                may_end=True,
+    # A motor's torque, or the ramp of a servo's own profile: what asks for less is answered
+    # as quickly as ever.
+    replace(
+        one(
+            "linkage",
+            "servo_acceleration_limit",
+            limit(
+                *("acceleration_{d}_per_s2", "loader.servo_acceleration_limit_{d}_per_s2"),
+                *(1e-2, 1e4, 30.0, 10.0),
             ),
+            *("speed", "servo_speed", "law", 1.5),
         ),
-        Signature("speed", "deflection_left", "law", 0.8),
         reserve=True,
+    ),
+    # A servo that was fitted without its dead time is too slow: its frequency is found again, and
+    # its damping ratio where that is worth one more number.
+    *(
+        Effect(
+            name,
+            "linkage",
+            (
+                added("delay_s", "loader.servo_delay_s", 0, 0.45, 0.02, 0.05, 0.1),
+                replace(
+                    factor("loader.servo_frequency_Hz", 1.0),
+                    starts=(1.0, 3.0, 8.0),
+                    scanned=False,
+                    may_end=True,
+                ),
+                *more,
+            ),
+            Signature("speed", "deflection_left", "law", 0.8),
+            reserve=True,
+        )
+        for name, more in (("servo_delay", ()), ("servo_tuning", (DAMPING_RATIO,)))
     ),
     one(
         "linkage",

@@ -31,11 +31,14 @@ COMPENSATION: tuple[Effect, ...] = (
     ),
 )
 SENSING: tuple[Effect, ...] = (
-    one(
-        "sensing",
-        "deflection_scale",
-        factor("sensing.deflection_scale", 1.03),
-        *("computed", "computed_left"),
+    replace(
+        one(
+            "sensing",
+            "deflection_scale",
+            factor("sensing.deflection_scale", 1.03),
+            *("computed", "computed_left"),
+        ),
+        of_sensor=True,
     ),
     _force(
         "force_scale",
@@ -64,6 +67,7 @@ SENSING: tuple[Effect, ...] = (
             *("computed", "computed_left", "loop", 1e4),
         ),
         gradual=True,
+        of_sensor=True,
     ),
     Effect(
         "mains_hum",
@@ -78,6 +82,7 @@ SENSING: tuple[Effect, ...] = (
         ),
         Signature("", "computed_left", "time", 0.2),
         seen=hums,
+        of_sensor=True,
     ),
     replace(
         _force(

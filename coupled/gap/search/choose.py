@@ -70,6 +70,10 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
         current = case.fit((*current.effects, best.effect), start=found.values, near=found)
         current = _with_contact_anew(case, current)
         idle -= set(best.effect.shows_in)
+        held = [step for step in steps if _holds(best.effect, step.effect)]
+        if held:
+            steps = [step for step in steps if step not in held]
+            current = case.fit([step.effect for step in steps], start=current.values)
         even = read_even(case, current)
         if even is not None:
             read = even[0][len(current.effects) - 1 :]
@@ -177,6 +181,11 @@ def _is_open_law(case: Case, library: Sequence[Effect], effect: Effect, current:
         return bool(effect.yielding)
     plainer = (one for one in library if one.name == effect.alike.plainer)
     return any(may_be_plainer(case, effect, current, one) for one in plainer)
+
+
+def _holds(effect: Effect, other: Effect) -> bool:
+    """Tell whether an effect in reserve frees all numbers of another, and more."""
+    return effect.reserve and {p.key for p in other.free} < {p.key for p in effect.free}
 
 
 def _needless(case: Case, current: Fit) -> Effect | None:

@@ -2,7 +2,8 @@
 
 A digital servo is given set points. In a record of them that is faster than they come, each stands
 for several frames, and they differ by more than one step of a converter: a motion that was measured
-repeats itself so only by its rounding.
+repeats itself so only by its rounding. Where they come as fast as the record's frames, it is their
+noise that tells: a number that a computer made has none beside what the grip's transducer reads.
 
 Where the grip's motion and force are all there is, nothing says what a loader did with the force:
 the motion is taken as imposed, and the force as its answer.
@@ -13,9 +14,17 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from coupled.gap.signals.output import Floats
-from coupled.gap.thresholds import HELD_AT_MOST, HELD_JUMPS, HELD_SHARE, HELD_STEPS
+from coupled.gap.signals.output import Floats, heard
+from coupled.gap.thresholds import (
+    HELD_AT_MOST,
+    HELD_FINER,
+    HELD_JUMPS,
+    HELD_SHARE,
+    HELD_STEPS,
+    HELD_WINDOW,
+)
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -28,9 +37,41 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
         return rig
     if all(name in record and in_set_points(record[name]) for record in records):
         return rig.changed({f"controls.{control}.drive": "setpoint"})
+    if any(_made(record, control) for record in records):
+        return rig.changed({f"controls.{control}.drive": "setpoint"})
     if all(name not in one and grip in one and force in one for one in records):
         return rig.changed({f"controls.{control}.drive": "displacement"})
     return rig
+
+
+def _made(record: Record, control: ControlName) -> bool:
+    """Tell whether δc is a number that was made, not a motion that was measured.
+
+    Only where nothing else of a loader or its host is recorded: a simulation without noise has δc
+    without noise, too.
+    """
+    others = (channel(control, q) for q in ("gradient", "modifying_force", "estimate"))
+    given, grip = channel(control, "computed"), channel(control, "deflection")
+    if any(name in record for name in others) or not (given in record and grip in record):
+        return False
+    return _finest(record[given]) < HELD_FINER * heard(record[grip]).rms
+
+
+def _finest(signal: Floats) -> float:
+    """Return the noise of the quietest stretches in which a signal moves; infinite without any.
+
+    By fourth differences, over stretches of so many frames that a motion is none in the quietest.
+    Moving is by two steps of a converter a frame or more: a slower one repeats its own.
+    """
+    steps = np.abs(np.diff(signal))
+    if not np.any(steps) or len(steps) < HELD_WINDOW + 4:
+        return np.inf
+    least = float(np.diff(np.unique(signal)).min())
+    slowest = sliding_window_view(steps, HELD_WINDOW + 3).min(axis=1)
+    rough = sliding_window_view(np.diff(signal, 4), HELD_WINDOW)
+    moving = slowest > 1.5 * least
+    noise = np.sqrt(np.mean(rough[moving] ** 2, axis=1) / 70.0)
+    return float(np.quantile(noise, 0.1)) if noise.size else np.inf
 
 
 def in_set_points(signal: Floats) -> bool:
