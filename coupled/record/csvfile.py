@@ -88,10 +88,11 @@ def numbers(
     import polars as pl
 
     check_numeric(path, name, column)
-    if column.dtype == pl.String:
+    doubles = column.cast(pl.Float64, strict=False)
+    if column.dtype == pl.String and doubles.null_count() > 0:
         column = column.str.strip_chars()
         column = column.set(column == "", None)
-    doubles = column.cast(pl.Float64, strict=False)
+        doubles = column.cast(pl.Float64, strict=False)
     text = np.flatnonzero(doubles.is_null().to_numpy() & column.is_not_null().to_numpy())
     if text.size:
         row = int(text[0])

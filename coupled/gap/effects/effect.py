@@ -7,7 +7,7 @@ stages then fly.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from math import hypot
 from typing import Any, Literal
@@ -193,14 +193,6 @@ class Effect:
             return False
         others = [channel(name, "force") for name in leaking(control)]
         return not self.other or all(any(n in record for n in others) for record in records)
-
-
-def setting_of(effect: Effect, low: float, high: float, neutral: float = 1.0) -> Effect:
-    """Return the number that an effect frees as a setting, free between two values."""
-    (number,) = effect.parameters
-    within = replace(number, low=low, high=high, starts=(neutral,))
-    name, shown = f"setting of {effect.name}", effect.shows_in[:1]
-    return replace(effect, name=name, parameters=(within,), outputs=shown, tolerance=0.0)
 
 
 @cache

@@ -64,3 +64,16 @@ def one(
 ) -> Effect:
     """Return an effect of one parameter; y against x is how it is drawn."""
     return Effect(name, stage, (parameter,), Signature(x, y, drawing, zoom_s))
+
+
+def setting_of(
+    effect: Effect, low: float, high: float, neutral: float = 1.0, wide: bool = False
+) -> Effect:
+    """Return the number that an effect frees as a setting, free between two values.
+
+    A `wide` one is fitted to all outputs in which it shows, which are then fitted together.
+    """
+    (number,) = effect.parameters
+    within = replace(number, low=low, high=high, starts=(neutral,))
+    name, shown = f"setting of {effect.name}", effect.shows_in[: None if wide else 1]
+    return replace(effect, name=name, parameters=(within,), outputs=shown, tolerance=0.0)

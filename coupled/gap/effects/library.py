@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, setting_of
-from coupled.gap.effects.entries import added, factor, limit, one, value
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.entries import added, factor, limit, one, setting_of, value
 from coupled.gap.effects.linkage import LINKAGE
 from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING

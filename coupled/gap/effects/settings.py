@@ -6,7 +6,8 @@ the machine (`nominal`), its file holds how well each number is known, and that 
 
 from __future__ import annotations
 
-from coupled.gap.effects.effect import Effect, Parameter, Signature, setting_of
+from coupled.gap.effects.effect import Effect, Parameter, Signature
+from coupled.gap.effects.entries import setting_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
@@ -19,7 +20,17 @@ MOST_ELASTIC = 0.95
 def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
     """Return {the effect that frees the same number: the setting, free within its tolerance}."""
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
-    return {effect.name: setting_of(effect, *ends) for effect, ends in known if ends is not None}
+    return {
+        effect.name: setting_of(effect, *ends, wide=_given(effect, rig, control))
+        for effect, ends in known
+        if ends is not None
+    }
+
+
+def _given(effect: Effect, rig: Rig, control: ControlName) -> bool:
+    """Tell whether the rig's own tolerance is one of what is read, which shows in more stages."""
+    given = rig.controls[control].tolerance
+    return effect.stage == "sensing" and effect.free[0].key_on(control) in given
 
 
 def contact(rig: Rig, control: ControlName) -> tuple[Effect, ...]:
