@@ -60,6 +60,8 @@ UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten i
 
 # Halves of a record: fitted and held out (`output`).
 STRETCH_s = 2.5  # chosen: longer than a residual's memory, with enough stretches in 20 s
+STRETCHES_A_NUMBER = 2.0  # chosen: for fewer, an interval cuts the stretches of a short record
+LEAST_MEMORIES = 20.0  # chosen: of the residual, that such a part holds
 SHORTEST_STRETCH_s = 0.25  # chosen: the shortest to which one is cut
 STRETCH_POWER = 0.125  # of the residual's power, from which a stretch is cut; blind trials 6 to 8
 

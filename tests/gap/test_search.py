@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
 
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect
@@ -19,8 +18,7 @@ from coupled.gap.search import choose, information
 from coupled.gap.search.candidates import fitted_candidates, may_be_causes
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice, _is_open, searched
-from coupled.gap.search.descent import End
-from coupled.gap.search.fit import Fit, _half_width, fit
+from coupled.gap.search.fit import Fit, fit
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.screen import screen
@@ -59,21 +57,6 @@ def test_each_guilty_output_has_candidates_of_its_own(monkeypatch: pytest.Monkey
     # The widest first; what has nothing is not asked for again, what changed is.
     assert asked == [{"loader"}, {"linkage"}, {"linkage"}]
     assert [len(gains) for gains in choice.rounds] == [1, 0]
-
-
-@pytest.mark.parametrize("spread", [0.05, 0.3])
-def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
-    """Two numbers that do the same: one is known as well as the other was beforehand."""
-    rng = np.random.default_rng(2)
-    left = rng.normal(size=FRAMES)
-    same = np.ones((FRAMES, 2))
-    found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
-    groups = np.arange(FRAMES) // 300
-    half = _half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]))
-    wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
-    assert half[0] == pytest.approx(wanted, rel=0.15)
-    alone = _half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1))
-    assert alone[0] < half[0]
 
 
 @pytest.mark.parametrize(("size", "strained"), [(0.3, False), (300.0, True)])

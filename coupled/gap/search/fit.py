@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from coupled.gap.effects.effect import Effect, Parameter, possible
-from coupled.gap.search.descent import WHOLE, Descent, End
+from coupled.gap.search.descent import WHOLE, Descent
+from coupled.gap.search.intervals import beyond, half_width
 from coupled.gap.search.slopes import Slope
-from coupled.gap.signals.output import Output, Part, memory
+from coupled.gap.signals.output import Output, Part
 from coupled.gap.thresholds import LEAST_GAIN
 from coupled.parallel import go_on
 from coupled.record.channels import ControlName
@@ -200,7 +200,7 @@ def _fit(
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     within = {one.value_key(p) for one in nuisances for p in one.free}
     known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
-    half = _half_width(best, len(ours), np.concatenate(number), known) * scale
+    half = half_width(best, len(ours), np.concatenate(number), known) * scale
     # Where all that is filed is taken off, nothing is left of it: that is an answer.
     gone = np.isclose(best.x, low, atol=1e-4) & (ends[0] < [p.low for p in frees])
     values = np.where(gone, ends[0], best.x * scale)
@@ -211,7 +211,7 @@ def _fit(
     stuck = small | np.isclose(best.x, high, rtol=1e-4)
     stuck &= ~np.array([p.may_end for p in frees]) & ~gone
     # A setting may well stand at its end where little would be gained beyond.
-    stuck &= (known == 0.0) | (_beyond(best, len(ours)) >= LEAST_GAIN)
+    stuck &= (known == 0.0) | (beyond(best, len(ours)) >= LEAST_GAIN)
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
         dict(zip(keys, (values - half).tolist(), strict=True)),
@@ -226,48 +226,6 @@ def _fit(
 def _scale(p: Parameter) -> float:
     """Return a size of a parameter for which a step of a hundredth is small."""
     return max(abs(start) for start in p.starts) or 0.5 * (p.high - p.low)
-
-
-def _half_width(found: End, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:
-    """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
-
-    The larger of two: white residuals widened by their memory, and the scatter of the score from
-    stretch to stretch (the sandwich), which counts misfit wherever it sits. `known` is what is
-    known beforehand, 1/variance: of a setting, that it is anywhere within its tolerance.
-    """
-    jacobian, left = found.jac, found.fun
-    variance, widen = _counted(left, outputs)
-    before = np.diag(known)
-    plain = np.linalg.pinv(jacobian.T @ jacobian / (variance * widen) + before)
-    bread = np.linalg.pinv(jacobian.T @ jacobian / variance + before)
-    names, number = np.unique(groups, return_inverse=True)
-    scores = np.zeros((len(names), jacobian.shape[1]))
-    np.add.at(scores, number, jacobian * left[:, None])
-    freedom = max(1, len(names) - jacobian.shape[1])
-    scatter = scores.T @ scores * (len(names) / freedom) / variance**2
-    filled = bread @ (scatter + before) @ bread
-    square = np.maximum(np.maximum(np.diag(plain), np.diag(filled)), 0.0)
-    half = stdtrit(freedom, 0.975) * np.sqrt(square)
-    half[(np.linalg.norm(jacobian, axis=0) < 1e-9) & (known == 0.0)] = np.inf
-    return np.asarray(half)
-
-
-def _beyond(found: End, outputs: int) -> Floats:
-    """Return the log-likelihood that each scaled number would gain beyond, by its slopes.
-
-    All the others go along, and the residual counts by its memory.
-    """
-    square, memories = _counted(found.fun, outputs)
-    downhill = found.jac.T @ found.fun
-    loose = np.diag(np.linalg.pinv(found.jac.T @ found.jac))
-    return np.asarray(0.5 * downhill**2 * loose / (square * memories))
-
-
-def _counted(left: Floats, outputs: int) -> tuple[float, float]:
-    """Return a residual's mean square, and the most frames that count as one."""
-    rows = len(left) // outputs
-    memories = max(memory(left[i * rows : (i + 1) * rows]) for i in range(outputs))
-    return max(float(np.mean(left**2)), 1e-12), memories
 
 
 def _free(effects: Sequence[Effect]) -> tuple[list[str], list[Parameter]]:

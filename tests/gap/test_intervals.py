@@ -1,0 +1,74 @@
+"""How well a fit's numbers are known, by draws whose numbers are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import t as student
+
+from coupled.gap.search.descent import End
+from coupled.gap.search.intervals import cut, half_width
+from coupled.gap.thresholds import LEAST_MEMORIES
+
+FRAMES = 2400
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.3])
+def test_an_interval_counts_what_is_known_of_a_setting(spread: float) -> None:
+    """Two numbers that do the same: one is known as well as the other was beforehand."""
+    rng = np.random.default_rng(2)
+    left = rng.normal(size=FRAMES)
+    same = np.ones((FRAMES, 2))
+    found = End(np.zeros(2), 0.0, left - left.mean(), same, None)
+    groups = np.arange(FRAMES) // 300
+    half = half_width(found, 1, groups, np.array([0.0, 1.0 / spread**2]))
+    wanted = student.ppf(0.975, 6) * np.hypot(spread, 1.0 / np.sqrt(FRAMES))
+    assert half[0] == pytest.approx(wanted, rel=0.15)
+    alone = half_width(replace(found, fun=left, jac=same[:, :1]), 1, groups, np.zeros(1))
+    assert alone[0] < half[0]
+
+
+@given(
+    stretches=st.integers(3, 20),
+    frames=st.integers(30, 300),
+    numbers=st.integers(1, 12),
+    memories=st.floats(1.0, 40.0),
+    outputs=st.integers(1, 3),
+)
+def test_stretches_are_cut_alike_in_every_output_and_no_shorter_than_the_memory_lets_them(
+    stretches: int, frames: int, numbers: int, memories: float, outputs: int
+) -> None:
+    one = np.repeat(2 * np.arange(stretches), frames)
+    parts = cut(np.tile(one, outputs), numbers, memories).reshape(outputs, -1)
+    assert (parts == parts[0]).all()
+    names, counts = np.unique(parts[0], return_counts=True)
+    if len(names) == stretches:
+        assert np.array_equal(np.unique(parts[0], return_inverse=True)[1] * 2, one)
+        enough = stretches >= 2 * numbers
+        assert enough or frames < 2 * LEAST_MEMORIES * memories
+    else:
+        assert counts.min() >= np.floor(LEAST_MEMORIES * memories)
+        within = np.repeat(one, 1)[np.flatnonzero(np.diff(parts[0], prepend=-1))]
+        assert set(within) == set(one)  # every stretch, and none across two
+
+
+@pytest.mark.parametrize("numbers", [2, 8])
+def test_intervals_of_a_short_record_hold_and_say_something(numbers: int) -> None:
+    """Five stretches for eight numbers left one degree of freedom: 12.7 for 2 deviations."""
+    rng = np.random.default_rng(numbers)
+    groups = 2 * np.repeat(np.arange(5), 300)
+    held, widths = 0, []
+    for _ in range(200):
+        shapes = rng.normal(size=(len(groups), numbers))
+        noise = rng.normal(size=len(groups))
+        found = np.asarray(np.linalg.lstsq(shapes, noise, rcond=None)[0], np.float64)
+        end = End(found, 0.0, noise - shapes @ found, shapes, None)
+        half = half_width(end, 1, groups, np.zeros(numbers))
+        held += abs(found[0]) < half[0]
+        widths.append(half[0] * np.sqrt(len(groups)))
+    assert held >= 184  # of 190 on the mean
+    assert np.median(widths) < 3.5
