@@ -23,7 +23,7 @@ from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 VERSIONS = Path(__file__).parent / "versions"
-KNOWN = (1, 2)
+KNOWN = (1, 2, 3)
 DEFAULT = 1  # the version that scores are of
 
 

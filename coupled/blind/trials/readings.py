@@ -39,6 +39,7 @@ PLAINER = (
     ("soft_backlash", "backlash"),
     ("stribeck_friction", PLAIN),
     ("servo_delay", "servo_lag"),
+    ("servo_tuning", "servo_delay"),
 )
 
 

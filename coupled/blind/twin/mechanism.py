@@ -187,7 +187,10 @@ def heard(p: TwinParameters, s: TwinState, h: float) -> float:
 def _servo_slope(p: TwinParameters, wanted: float, x: float, v: float) -> tuple[float, float]:
     limit = p.servo_limit
     speed = min(max(v, -limit), limit) if limit > 0.0 else v
-    return speed, p.servo_rate * (p.servo_rate * (wanted - x) - 2.0 * p.servo_ratio * speed)
+    push = p.servo_rate * (p.servo_rate * (wanted - x) - 2.0 * p.servo_ratio * speed)
+    if p.servo_push > 0.0:
+        push = min(max(push, -p.servo_push), p.servo_push)
+    return speed, push
 
 
 @stage

@@ -85,6 +85,7 @@ class TwinParameters(Protocol):
     servo_ratio: float
     servo_limit: float
     servo_delay: float  # dead time, s
+    servo_push: float  # the most that it accelerates by, m/s²; 0 for no limit
     play: float
     bend: float
     bend_limit: float

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from coupled.blind.twin.effects import in_air
 from coupled.blind.twin.kernel import STEPS
 from coupled.blind.twin.kinds import Clean, Draw, Kind
@@ -74,6 +76,24 @@ def _servo_delay(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     assert size < (KEPT - 2) / STEPS * twin.get("frame_s")
     twin.set(servo_delay=size)
     return {"delay_s": size, "factor": 1.0}
+
+
+def _servo_push(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Let the servo accelerate by no more than the fastest motions ask for, and by less."""
+    step, rate_Hz = 6, clean.rig.frame_rate
+    way = clean.record["column_computed_m"][::step]
+    asked = np.abs(np.diff(way, 2)) * (rate_Hz / step) ** 2
+    limit = max(float(np.percentile(asked, 99.0)), 1e-2) * math.exp(0.3 - size)
+    twin.set(servo_push=limit)
+    return {"acceleration_m_per_s2": limit}
+
+
+def _servo_tuning(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Let δc reach a servo late that is tuned otherwise."""
+    factor, damping = math.exp(draw.side * size), math.exp((draw.u[0] - 0.5) * size)
+    twin.set(servo_delay=0.1 * size, servo_rate=twin.get("servo_rate") * factor)
+    twin.set(servo_ratio=twin.get("servo_ratio") * damping)
+    return {"delay_s": 0.1 * size, "factor": factor, "damping_factor": damping}
 
 
 def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -167,5 +187,7 @@ REVISION_2 = (
     Kind("pitch_stiffness", "airframe", 0.005, 0.7, in_air("stiffness"), flown=True),
     Kind("lift_slope", "airframe", 0.002, 0.4, in_air("lift"), flown=True),
     Kind("mass", "airframe", 0.001, 0.3, in_air("mass"), flown=True),
+    Kind("servo_acceleration_limit", "linkage", 0.05, 2.5, _servo_push),
+    Kind("servo_tuning", "linkage", 0.2, 0.7, _servo_tuning),
     Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped, shows="schedule"),
 )

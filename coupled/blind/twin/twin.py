@@ -145,6 +145,7 @@ def nominal_twin(rig: Rig, bristles: Bristles = STIFF) -> Twin:
     twin.set(modifying_lag=loader.modifying_lag)
     twin.set(servo_rate=2.0 * math.pi * loader.servo_frequency, play=loader.play)
     twin.set(servo_ratio=loader.servo_damping_ratio, servo_limit=loader.servo_rate_limit)
+    twin.set(servo_push=loader.servo_acceleration_limit)
     twin.set(bend=loader.bend, bend_limit=loader.bend_limit)
     twin.set(arc=column.length if loader.arc_geometry else 0.0)
     rigging = column.rigging
