@@ -33,6 +33,7 @@ from coupled.flight.pilot import ForceTable
 from coupled.gap.effects.library import BY_NAME
 from coupled.record.channels import ALPHA, SPEED
 from coupled.record.record import Record
+from coupled.rig.replay import replay_linkage
 from tests.support.twin import POOL, STEP_N, alone, nodes, plain, stepped
 
 ALL_EFFECTS = (*EFFECTS, *REVISION_2)
@@ -231,3 +232,32 @@ def test_a_clean_record_tells_its_own_measures() -> None:
     assert clean.seconds == pytest.approx(10.0)
     assert clean.speed("column_computed_m") == pytest.approx(3.0)
     assert clean.spread("column_computed_m") == pytest.approx(0.96 * 30.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("twins", "rigs"),
+    [
+        ({"servo_push": 0.4}, {"servo_acceleration_limit_m_per_s2": 0.4}),
+        (
+            {"servo_delay": 0.03, "servo_rate": 2.0 * np.pi * 9.0, "servo_ratio": 0.9},
+            {"servo_delay_s": 0.03, "servo_frequency_Hz": 9.0, "servo_damping_ratio": 0.9},
+        ),
+    ],
+    ids=["acceleration limit", "tuning"],
+)
+def test_the_twins_servo_is_the_rigs_by_another_integrator(
+    twins: dict[str, float], rigs: dict[str, float]
+) -> None:
+    """Driven by the twin's δc, the rig's servo goes where the twin's does."""
+    rig, twin = plain()
+    twin.set(**twins)
+    t = nodes(8.0)
+    record = alone(rig, twin, STEP_N * np.sin(2.0 * np.pi * (0.2 + 0.15 * t) * t))
+    real = rig.changed({f"controls.column.loader.{key}": value for key, value in rigs.items()})
+    moved, force = record["column_computed_m"], record["column_force_N"]
+    off = [
+        float(np.std(replay_linkage(one, "column", moved, force) - record["column_deflection_m"]))
+        for one in (rig, real)
+    ]
+    assert off[0] > 1e-5
+    assert off[1] < 0.02 * off[0]
