@@ -130,3 +130,27 @@ def test_what_a_setting_at_its_end_frees_is_tried_whatever_its_signature_takes(
     assert isinstance(always, dict)
     assert outputs == set(damping.shows_in)
     assert list(always) == [damping.name]
+
+
+@pytest.mark.parametrize(("damping", "claimed"), [(0.0, True), (0.3, False)])
+def test_a_mark_that_drives_a_setting_to_its_end_is_not_claimed(
+    damping: float, claimed: bool
+) -> None:
+    """F_mod repeats a little of the noise of δc, but with the product held the loader is off."""
+    digital = BY_NAME["digital_multiplier"]
+    nominal = bench().controls["column"].loader.damping
+
+    def held(rig: Rig) -> float:
+        return float(rig.controls["column"].loader.multiplier == "digital")
+
+    def balance(rig: Rig) -> Floats:
+        more = rig.controls["column"].loader.damping / nominal - 1.0
+        return np.asarray(100.0 * (more - damping * held(rig)) * SECOND)
+
+    product = Output(
+        digital.mark, "f", 0.3 * FIRST + NOISE, lambda rig: 0.3 * held(rig) * FIRST, 1.0, 120.0
+    )
+    loader = Output("loader", "x", SECOND + NOISE, balance, 1.0, 120.0)  # a damping of 1.01
+    case = Case(bench(), "column", [product, loader])
+    found = small.shown_by_mark(case, case.fit(()), [digital])
+    assert [one.effect.name for one in found] == (["digital_multiplier"] if claimed else [])

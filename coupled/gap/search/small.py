@@ -53,7 +53,8 @@ def strained(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candid
 def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
     """Return the candidate that an output shows by its mark, though it is within its limit.
 
-    Its gain is what that output says alone: there the mark is known, and has no number to fit.
+    Its gain is what that output says alone: there the mark is known, and has no number to fit. None
+    that needs a setting at the end of its tolerance which did not stand there before.
     """
     for effect in library:
         ours = [output for output in case.outputs if output.stage == effect.mark]
@@ -64,8 +65,10 @@ def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[C
         rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
         shown = [] if rig is None else [(effect, replace(current, rig=rig))]
         if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
-            fitted = [(effect, case.fit(effects, "fitted", current.values, effect))]
-            return ranked_by_gain(ours, current, fitted)
+            fitted = case.fit(effects, "fitted", current.values, effect)
+            # A mark that the other outputs contradict, by settings that it drives to their ends.
+            if set(fitted.at_bound) <= set(current.at_bound):
+                return ranked_by_gain(ours, current, [(effect, fitted)])
     return []
 
 
