@@ -59,6 +59,26 @@ def test_each_guilty_output_has_candidates_of_its_own(monkeypatch: pytest.Monkey
     assert [len(gains) for gains in choice.rounds] == [1, 0]
 
 
+def test_an_effect_in_reserve_takes_the_place_of_one_whose_numbers_it_holds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside a servo's tuning, a servo lag has no number of its own: both were named."""
+    wide = output("linkage", 40.0)
+    queue = [BY_NAME["servo_lag"], BY_NAME["servo_tuning"]]
+
+    def candidates(case: Case, current: Fit, library: object, at: set[str]) -> list[Candidate]:
+        effect = queue.pop(0) if queue else None
+        beside = () if effect is None else (*current.effects, effect)
+        return [Candidate(50.0, effect, case.fit(beside))] if effect else []
+
+    monkeypatch.setattr(choose, "fitted_candidates", candidates)
+    monkeypatch.setattr(choose, "_needless", lambda case, current: None)
+    monkeypatch.setattr(choose, "_is_open", lambda case, effect, current: False)
+    choice = searched(Case(bench(), "column", [wide]), [])
+    assert [step.effect.name for step in choice.steps] == ["servo_tuning"]
+    assert [effect.name for effect in choice.fit.effects] == ["servo_tuning"]
+
+
 @pytest.mark.parametrize(("size", "strained"), [(0.3, False), (300.0, True)])
 def test_a_setting_strains_its_end_only_where_going_on_would_gain(
     size: float, strained: bool

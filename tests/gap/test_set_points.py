@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
-from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven, in_set_points
@@ -54,6 +54,24 @@ def test_a_number_without_noise_is_a_set_point_however_fast_they_come() -> None:
     hosted = np.column_stack((record.data, np.full(len(POINTS), 1000.0)))
     host = Record((*record.channels, "column_gradient_N_per_m"), hosted)
     assert as_driven(rig, [host], "column") == rig
+
+
+def test_one_record_that_shows_set_points_is_enough_for_the_machine() -> None:
+    """Another may be too slow to show them: it moves by one count a frame, which says nothing."""
+    slow = servo(1.5e-3 * np.minimum(np.arange(600), 100.0))
+    rig = servo_rig(drive="force")
+    assert as_driven(rig, [slow], "column") == rig
+    assert as_driven(rig, [slow, servo(POINTS)], "column") == servo_rig()
+
+
+def test_set_points_whose_grip_nobody_recorded_have_a_limit_at_any_rate() -> None:
+    """As where a flight is judged by its surface alone."""
+    record = servo(POINTS)
+    at = [i for i, name in enumerate(record.channels) if name != "column_deflection_m"]
+    blind = Record(tuple(record.channels[i] for i in at), record.data[:, at])
+    [limit] = BY_NAME["servo_rate_limit"].parameters
+    library = under_set_points(EFFECTS, [blind], "column")
+    assert next(one for one in library if one.name == "servo_rate_limit").parameters == (limit,)
 
 
 def test_a_set_point_has_no_scale_and_no_limit_below_the_speed_that_was_reached() -> None:

@@ -69,3 +69,11 @@ def test_a_record_and_its_manifest_are_written_together(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         write_record(RECORD, tmp_path / "r.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["r.manifest.json"]
+
+
+def test_cells_may_have_spaces_about_their_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,a,b\n0.0, 1.5,2\n0.1,-2.5 ,3\n0.2,\t3.5\t,4\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_record(path)["a"], [1.5, -2.5, 3.5])
+    path.write_text("time_s,a,b\n0.0,1.5,2\n0.1,  ,3\n0.2,3.5,4\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_record(path)["a"], [1.5, np.nan, 3.5])  # a gap

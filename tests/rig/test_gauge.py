@@ -213,3 +213,15 @@ def test_a_servo_at_its_rate_limit_does_not_accelerate_the_mass_on_either_side(s
     w = 2.0 * math.pi * 18.0
     wanted = side * (-0.1 * w * w - 2.0 * 0.7 * w * 0.2)
     assert s["gauge"]["acceleration"] == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_mass_is_accelerated_by_no_more_than_the_servos_limit(side: float) -> None:
+    limit = "servo_acceleration_limit_m_per_s2"
+    packed = pack(bench({limit: 3.0, "controls.column.sensing.gauge_mass_kg": 1.0}))
+    p, s = packed["parameters"][0], packed["state"][0]
+    move_gauge(p["gauge"], s["gauge"], p["linkage"], s["linkage"], side * 0.1)
+    assert s["gauge"]["acceleration"] == side * 3.0
+    move_gauge(p["gauge"], s["gauge"], p["linkage"], s["linkage"], side * 1e-5)
+    wanted = side * 1e-5 * (2.0 * math.pi * 18.0) ** 2
+    assert s["gauge"]["acceleration"] == pytest.approx(wanted, rel=1e-12)

@@ -25,7 +25,8 @@ def under_set_points(
 ) -> list[Effect]:
     """Return a library for set points, with the limit of the servo's rate above what it reached."""
     grip = channel(control, "deflection")
-    reached = max(_reached(record[grip], record) for record in records if grip in record)
+    seen = [_reached(record[grip], record) for record in records if grip in record]
+    reached = max(seen, default=0.0)
 
     def left(parameter: Parameter) -> Parameter:
         lowest = reached if parameter.key == RATE_LIMIT else 0.0

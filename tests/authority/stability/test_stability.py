@@ -64,6 +64,14 @@ def test_a_free_hand_feels_a_spring_that_turns_over_at_one(share: float) -> None
     assert (expected > 0.0) == (share > 1.0)
 
 
+@pytest.mark.parametrize(
+    "limit", [{"servo_rate_limit_m_per_s": 1e-6}, {"servo_acceleration_limit_m_per_s2": 1e-6}]
+)
+def test_a_linear_rigs_servo_has_no_limit(limit: dict[str, float]) -> None:
+    rig = column(1.3 / K_REPORT, **limit)
+    assert rig.controls["column"].loader == column(1.3 / K_REPORT).controls["column"].loader
+
+
 def test_without_the_correction_no_gradient_is_too_stiff() -> None:
     rig = bench({"controls.column.compensation.gradient": False})
     stiff = linear_rig(rig, "column", 3.0 / K_REPORT)
