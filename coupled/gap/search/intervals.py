@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 
-def half_width(found: End, outputs: int, groups: NDArray[np.intp], known: Floats) -> Floats:
+def half_width(found: End, outputs: int, groups: Numbers, known: Floats) -> Floats:
     """Return half of each scaled parameter's 95 % interval; infinite where nothing determines it.
 
     The larger of two: white residuals widened by their memory, and the scatter of the score from

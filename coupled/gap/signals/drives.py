@@ -35,9 +35,8 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
     name, grip, force = (channel(control, q) for q in ("computed", "deflection", "force"))
     if rig.controls[control].drive != "force":
         return rig
-    if all(name in record and in_set_points(record[name]) for record in records):
-        return rig.changed({f"controls.{control}.drive": "setpoint"})
-    if any(_made(record, control) for record in records):
+    held = all(name in record and in_set_points(record[name]) for record in records)
+    if held or any(_made(record, control) for record in records):
         return rig.changed({f"controls.{control}.drive": "setpoint"})
     if all(name not in one and grip in one and force in one for one in records):
         return rig.changed({f"controls.{control}.drive": "displacement"})
