@@ -51,6 +51,20 @@ def test_friction_that_yields_is_friction() -> None:
     assert other.names == ("bend", "presliding_friction")
     assert other.stages == ("linkage", "loader")
     assert not list(same_law(["bend", "inertia"]))
+    assert not list(same_law(["digital_multiplier", "inertia"]))  # the one has no number
+
+
+@pytest.mark.parametrize(
+    ("pair", "whole"),
+    [
+        (["bend", "structural_mode"], "structural_mode"),
+        (["servo_tuning", "servo_delay"], "servo_tuning"),
+        (["backlash", "soft_backlash"], "soft_backlash"),
+    ],
+)
+def test_an_effect_that_sets_the_other_s_number_too_is_both(pair: list[str], whole: str) -> None:
+    """One trial held a bend of 44 μm/N and a mode with 41: the twin has one bend, the last."""
+    assert [(one.names, one.sure) for one in same_law(pair)] == [((whole,), True)]
 
 
 @pytest.mark.slow

@@ -10,8 +10,9 @@ import pytest
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import searched
+from coupled.gap.search.contest import overtaken
 from coupled.gap.search.gain import Candidate
-from coupled.gap.search.rivals import Found, separated
+from coupled.gap.search.rivals import Found, found_by, separated
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.rig.rig import Rig
@@ -68,3 +69,35 @@ def test_a_rival_that_all_of_the_record_is_surely_for_takes_the_place() -> None:
     assert kept.effect is WEIGHT
     assert same is last
     assert not kept.rivals
+
+
+@pytest.mark.parametrize("close", ["force_offset", "bob_weight"])
+def test_an_effect_that_came_close_is_asked_again_on_all_of_the_record(close: str) -> None:
+    """A gradient of 1.069 stood 10 behind a spring that relaxes, by a fit that ended in a hollow.
+
+    On all of the record it was likelier by 43.
+    """
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + SECOND * 0.2))
+
+    measured = FIRST + SECOND * 0.2 + NOISE
+    case = Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
+    other = BY_NAME[close]
+    first = OFFSET if other is WEIGHT else WEIGHT
+    found = found_by(
+        best := Candidate(50.0, first, case.fit((first,), "fitted")),
+        [best, Candidate(40.0, other, case.fit((other,), "fitted"))],
+    )
+    assert [one.effect for one in found.behind] == [other]
+    assert found.rivals == ()
+    step, last = overtaken(case, case.fit((first,)), found)
+    assert (step.effect, last.effects) == (WEIGHT, (WEIGHT,))
+    assert step.probability > 0.98
+
+
+def test_what_is_far_behind_is_not_asked_again() -> None:
+    case = Case(bench(), "column", [])
+    best, far = (Candidate(gain, one, case.fit(())) for gain, one in ((50.0, OFFSET), (20, WEIGHT)))
+    assert found_by(best, [best, far]).behind == ()

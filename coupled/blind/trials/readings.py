@@ -50,6 +50,17 @@ def same_law(effects: Sequence[str]) -> Iterator[Reading]:
             rest = set(effects) - set(names)
             for other in others:
                 yield reading(rest | set(other), sure=True)
+    # The twin has one bend, one servo and one contact: an effect that sets another's numbers, too,
+    # is what the record holds of both.
+    for name in effects:
+        own = _numbers(name)
+        if own and any(own < _numbers(other) for other in effects):
+            yield reading(set(effects) - {name}, sure=True)
+
+
+def _numbers(name: str) -> set[str]:
+    """Return the numbers of the rig that an effect of the library sets."""
+    return {number.key for number in BY_NAME[name].free} if name in BY_NAME else set()
 
 
 def not_distinguished(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator[Reading]:

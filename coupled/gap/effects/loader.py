@@ -107,7 +107,7 @@ LOADER: tuple[Effect, ...] = (
     one(
         "loader",
         "force_limit",
-        limit("limit_N", "loader.force_limit_N", 0.05, 2000, 10.0, 60.0),
+        limit("limit_N", "loader.force_limit_N", 0.001, 2000, 10.0, 60.0),
         *("computed", "missing"),
     ),
     replace(

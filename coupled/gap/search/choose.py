@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
+from coupled.gap.search.contest import overtaken
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
@@ -117,7 +118,8 @@ def _looked_over(
         steps = [tried_again(case, current, step) for step in steps]
     last = []
     for step in steps:
-        one, current = separated(case, current, step)
+        one, current = overtaken(case, current, step)
+        one, current = separated(case, current, one)
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current

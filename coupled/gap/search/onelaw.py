@@ -12,11 +12,10 @@ from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import ONE_LAW
-from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
+from coupled.gap.search.contest import contested
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, likelier_by
-from coupled.gap.search.information import says_nothing
 from coupled.gap.search.rivals import Found, weight
 from coupled.gap.search.screen import screened
 from coupled.gap.thresholds import RIVAL_GAIN
@@ -34,15 +33,10 @@ def same_in_a_limit(
     other = _other(case, library, step.effect, current)
     if other is None:
         return step, current
-    effects = [other if one is step.effect else one for one in current.effects]
-    there = min(
-        (case.fit(effects, start=start) for start in _starts(case, current, step, other)),
-        key=lambda one: one.cost,
-    )
-    if not may_be_causes(case, [(other, there)]) or says_nothing(case, other, there):
+    fits = contested(case, current, step.effect, other, _starts(case, current, step, other))
+    if fits is None:
         return step, current
-    back = case.fit(current.effects, start={**there.values, **_own(step.effect, current)})
-    here = min(current, back, key=lambda one: one.cost)
+    here, there = fits
     less = likelier_by(case.outputs, here, there)
     others = tuple(rival for rival in step.rivals if rival.effect is not other)
     odds = 1.0 / step.probability - 1.0
@@ -72,8 +66,3 @@ def _starts(case: Case, current: Fit, step: Found, other: Effect) -> list[dict[s
     begun = {**current.values, **(sizes[0] if sizes else {})}
     anew = case.but_for_contact(begun)
     return [begun, anew] if anew != begun else [begun]
-
-
-def _own(effect: Effect, fitted: Fit) -> dict[str, float]:
-    """Return the values of an effect's own numbers."""
-    return {effect.value_key(p): fitted.values[effect.value_key(p)] for p in effect.free}

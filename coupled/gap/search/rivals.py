@@ -8,24 +8,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, likelier_by, ranked_by_gain
-from coupled.gap.thresholds import RIVAL_GAIN
+from coupled.gap.thresholds import BEHIND_GAIN, RIVAL_GAIN
 
 
 @dataclass(frozen=True)
 class Found:
-    """One effect found: its gain, and the others that the record does not distinguish from it."""
+    """One effect found: its gain, and the others that the record does not distinguish from it.
+
+    Those `behind` it were beaten, but by so little that all of the record is to be asked.
+    """
 
     effect: Effect
     gain: float
     probability: float
     rivals: tuple[Candidate, ...]
+    behind: tuple[Candidate, ...] = ()
 
 
 def found_by(best: Candidate, ranked: Sequence[Candidate]) -> Found:
@@ -36,8 +40,10 @@ def found_by(best: Candidate, ranked: Sequence[Candidate]) -> Found:
         if other is not best and len(other.effect.free) <= len(best.effect.free)
     ]
     rivals = tuple(other for other in others if other.gain > best.gain - RIVAL_GAIN)
+    close = (other for other in others if other.gain > best.gain - BEHIND_GAIN)
+    behind = tuple(other for other in close if other not in rivals)
     weights = sum(weight(best.gain - other.gain) for other in others)
-    return Found(best.effect, best.gain, 1.0 / (1.0 + weights), rivals)
+    return Found(best.effect, best.gain, 1.0 / (1.0 + weights), rivals, behind)
 
 
 def tried_again(case: Case, current: Fit, step: Found) -> Found:
@@ -54,7 +60,7 @@ def tried_again(case: Case, current: Fit, step: Found) -> Found:
     ]
     ranked = ranked_by_gain(case.outputs, without, found)
     own = next(candidate for candidate in ranked if candidate.effect is step.effect)
-    return found_by(own, ranked)
+    return replace(found_by(own, ranked), behind=step.behind)
 
 
 def separated(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:

@@ -15,8 +15,8 @@ from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
-from coupled.gap.signals.output import stage_limits
-from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN, STRAINED_GAIN
+from coupled.gap.signals.output import stage_gaps, stage_limits
+from coupled.gap.thresholds import JUST_WITHIN, LEAST_GAIN, RIVAL_GAIN, STRAINED_GAIN
 
 
 def beside_a_larger(
@@ -38,13 +38,14 @@ def beside_a_larger(
 
 
 def strained(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
-    """Return the candidates for the stages of which a setting stands at the end of its tolerance.
+    """Return the candidates for the stages that settings may keep within their limits.
 
-    It may then keep a stage within its limit that is off by more. None but where the best is surely
-    beyond its setting, or gains far more than any setting there and needs none at its end.
+    One stands at the end of its tolerance there, and the stage is off by more; or a stage that was
+    over its limit is only just within. None but where the best is surely beyond its setting, or
+    gains far more than any setting there and needs none at its end.
     """
     at_end = _at_end(case, current)
-    shown = {s for one in at_end.values() for s in one.shows_in}
+    shown = {s for one in at_end.values() for s in one.shows_in} | _just_within(case, current)
     ranked = fitted_candidates(case, current, library, shown, at_end)
     relieved = _relieves(ranked, list(at_end.values()))
     return ranked if _surely_beyond(case, ranked) or relieved else []
@@ -82,6 +83,22 @@ def _at_end(case: Case, current: Fit) -> dict[str, Effect]:
     return {
         name: one for name, one in known.items() if any(one.value_key(p) in at for p in one.free)
     }
+
+
+def _just_within(case: Case, current: Fit) -> set[str]:
+    """Return the stages over their limits as filed that settings alone bring just within them.
+
+    Not the loader where there is dry friction, of which no law is exact.
+    """
+    limits, filed = stage_limits(case.outputs), stage_gaps(case.outputs, case.nominal)
+    rubs = is_dry(case.nominal, case.control) or any(effect.dry for effect in current.effects)
+    explained = {at for effect in current.effects for at in effect.shows_in}
+    asked = set(limits) - explained - ({"loader"} if rubs else set())
+    if case.only_wide or not any(filed[at] > limits[at] for at in asked):
+        return set()
+    now = case.gaps(current.rig)
+    least = {at: 1.0 + JUST_WITHIN * (limits[at] - 1.0) for at in asked}
+    return {at for at in asked if filed[at] > limits[at] >= now[at] > least[at]}
 
 
 def _surely_beyond(case: Case, ranked: Sequence[Candidate]) -> bool:

@@ -1,0 +1,62 @@
+"""A contest of two effects on all of the record: the one found, and another in its place.
+
+Every other stretch was fitted when it was found, from a hollow maybe, or beside less than is known
+now. One that came close behind it then is asked again at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.search.candidates import may_be_causes
+from coupled.gap.search.case import Case
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.information import says_nothing
+from coupled.gap.search.rivals import Found, weight
+from coupled.gap.thresholds import RIVAL_GAIN
+
+
+def contested(
+    case: Case, current: Fit, effect: Effect, other: Effect, starts: Sequence[Mapping[str, float]]
+) -> tuple[Fit, Fit] | None:
+    """Return the fits of all of the record with an effect found and with another in its place.
+
+    The other is begun from each of the starts. Beside dry friction either may stand in a hollow, so
+    the one found is fitted again from where the other ended. None where the other is no cause.
+    """
+    effects = [other if one is effect else one for one in current.effects]
+    there = min((case.fit(effects, start=one) for one in starts), key=lambda one: one.cost)
+    if not may_be_causes(case, [(other, there)]) or says_nothing(case, other, there):
+        return None
+    back = case.fit(current.effects, start={**there.values, **own_values(effect, current)})
+    return min(current, back, key=lambda one: one.cost), there
+
+
+def overtaken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
+    """Return a step and the fit, with the effect that came close behind if that is likelier.
+
+    By all of the record, and surely. One of more numbers is not asked: it can bend farther.
+    """
+    best, last = step, current
+    for close in step.behind:
+        if close.effect in current.effects:
+            continue
+        own = own_values(close.effect, close.fit)
+        starts = [{**current.values, **own}, {**current.values, **close.fit.values}]
+        fits = contested(case, current, step.effect, close.effect, starts)
+        if fits is None:
+            continue
+        less = likelier_by(case.outputs, *fits)
+        if less <= -RIVAL_GAIN and fits[1].cost < last.cost:
+            odds = weight(-less)
+            best = replace(step, effect=close.effect, probability=1 / (1 + odds), rivals=())
+            last = fits[1]
+    return best, last
+
+
+def own_values(effect: Effect, fitted: Fit) -> dict[str, float]:
+    """Return the values of an effect's own numbers."""
+    return {effect.value_key(p): fitted.values[effect.value_key(p)] for p in effect.free}
