@@ -35,7 +35,7 @@ def test_less_friction_than_filed_is_fitted_down_to_none(tmp_path: Path) -> None
     rig, record = filed_and_record(tmp_path, "friction_N", 3.0, 0.0)
     case, effect = Case(rig, "column", outputs(rig, record)), BY_NAME["coulomb_friction"]
     settled = case.fit(())
-    [(_, [start])] = screen(case, settled, [effect])
+    [(_, [start], _)] = screen(case, settled, [effect])
     assert start["coulomb_friction.friction_N"] < 0.0
     found = case.fit((effect,), start=start)
     assert found.rig.controls["column"].loader.friction == pytest.approx(0.0, abs=0.03)

@@ -302,7 +302,7 @@ def test_a_play_with_a_stiff_contact_has_a_start_near_it(tmp_path: Path) -> None
     true = {"play_{d}": 1.45e-4, "stiffness_N_per_{d}": 3.6e5}
     outputs = Reader(rig, made(tmp_path, rig, {soft.name: true}, 3), "column", surface_points)
     case = Case(rig, "column", [one for one in outputs.outputs() if one.stage == "linkage"])
-    [(_, starts)] = screen(case, case.fit(()), [soft])
+    [(_, starts, _)] = screen(case, case.fit(()), [soft])
     off = [
         max(abs(np.log2(s[soft.value_key(p)] / true[p.name])) for p in soft.free) for s in starts
     ]
@@ -316,10 +316,10 @@ def test_what_a_setting_at_its_end_frees_is_tried_however_little_it_takes(tmp_pa
     outputs = Reader(rig, record, "column", surface_points).outputs()
     case = Case(rig, "column", [one for one in outputs if one.stage == "loader"])
     loader = [effect for effect in EFFECTS if effect.stage == "loader" and not effect.other]
-    kept = [effect.name for effect, _ in screen(case, case.fit(()), loader)]
+    kept = [effect.name for effect, *_ in screen(case, case.fit(()), loader)]
     always = {"inertia", "viscous_damping"} - set(kept)
     assert always
-    more = [effect.name for effect, _ in screen(case, case.fit(()), loader, always)]
+    more = [effect.name for effect, *_ in screen(case, case.fit(()), loader, always)]
     assert set(more) == {*kept, *always}
 
 
@@ -386,3 +386,31 @@ def test_a_bend_with_hysteresis_is_sought_at_widths_of_their_own(
     [found] = fitted_candidates(case, case.fit(()), [loop], {"linkage"})
     assert found.fit.values["bend_hysteresis.width_N"] == pytest.approx(width_N, rel=0.3)
     assert found.fit.values["bend_hysteresis.share"] == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize(("alike", "asked"), [(0.0, False), (0.995, True)])
+def test_a_flight_is_not_fitted_that_takes_far_too_little(alike: float, asked: bool) -> None:
+    """Beside two of which one leaves noise alone: each evaluation of such a fit is a flight.
+
+    One whose signature takes nearly as much may be as good with its settings, and is fitted.
+    """
+    acts = np.random.default_rng(3).normal(size=(4, FRAMES))
+    names = ("pitch_damping", "elevator_effectiveness", "pitch_stiffness")
+    turned = alike * acts[0] + math.sqrt(1.0 - alike**2) * acts[2]
+    shapes = dict(zip(names, (acts[0], 0.99 * acts[0] + 0.1 * acts[1], turned), strict=True))
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        assert rig.flight is not None
+        numbers = {name: getattr(rig.flight, name) for name in names}
+        return np.asarray(sum(100.0 * (numbers[name] - 1.0) * shapes[name] for name in names))
+
+    rig = nominal_rig(True)
+    assert rig.flight is not None
+    airframe = Output("airframe", "x", 40.0 * acts[0] + acts[3], predict, 1.0, 120.0)
+    told = list[str]()
+    case = Case(rig, "column", [airframe], lambda what, *_: told.append(what))
+    effects = [BY_NAME[name] for name in names]
+    ranked = fitted_candidates(case, case.fit(()), effects, {"airframe"})
+    assert ranked[0].effect.name == "pitch_damping"
+    assert ("fitting pitch_stiffness" in told) == asked
+    assert "fitting elevator_effectiveness" in told

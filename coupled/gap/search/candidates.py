@@ -12,15 +12,17 @@ from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import informative
-from coupled.gap.search.laws import Starts, law_starts, leaves_only_noise, may_gain
-from coupled.gap.search.screen import screen
+from coupled.gap.search.laws import law_starts, leaves_only_noise, may_gain
+from coupled.gap.search.screen import Screened, screen
 from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEHIND_GAIN,
     BEHIND_SHARE,
+    FLOWN_FIRST,
+    HOPELESS_BEHIND,
     RACE_BEHIND,
     RACE_EVALUATIONS,
     RACE_FLIGHTS,
@@ -50,10 +52,11 @@ def fitted_candidates(
         if effect.name not in chosen and effect.name not in same and outputs & set(effect.shows_in)
     ]
     screened = screen(case, current, candidates, always)
-    laws = [one for one in screened if one[0].dry and not one[0].yielding]
+    laws = [one for one in screened if one.effect.dry and not one.effect.yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
-    laws = [one for one in laws if may_gain(case, one[0], found)]
-    found += _fitted(case, current, [(law, law_starts(case, law, s, found)) for law, s in laws])
+    laws = [one for one in laws if may_gain(case, one.effect, found)]
+    laws = [one._replace(starts=law_starts(case, *one[:2], found)) for one in laws]
+    found += _fitted(case, current, laws)
     closing = [one for one in found if not _opens_a_gap(case, current, one[1])]
     return informative(case, current, closing or found)
 
@@ -62,14 +65,15 @@ BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
 FLOWN = Descent("wide", RACE_FLIGHTS)
 
 
-def _fitted(
-    case: Case, current: Fit, screened: Sequence[tuple[Effect, Starts]]
-) -> list[tuple[Effect, Fit]]:
+def _fitted(case: Case, current: Fit, screened: Sequence[Screened]) -> list[tuple[Effect, Fit]]:
     """Return the effects that fit beside the current ones, each with the best of its fits.
 
-    By the loader's wide steps, and by its own where that may decide.
+    By the loader's wide steps, and by its own where that may decide. Of effects that have to be
+    flown those that take most come first, and the others if they may do nearly as well.
     """
-    tries = [(effect, start) for effect, starts in screened for start in starts]
+    flown = [one for one in screened if STAGE_OF[one.effect.stage].flown]
+    later = flown[FLOWN_FIRST:]
+    tries = [(one.effect, start) for one in screened for start in one.starts]
     begun, many = count(), Counter(effect.name for effect, _ in tries)
 
     def first(effect: Effect) -> Descent:
@@ -94,7 +98,11 @@ def _fitted(
         effect, fitted = near
         return effect, _beside(case, current, effect, fitted.values, Descent("own"), fitted)
 
-    racing, given_up = _still_racing(case, in_threads(begin, tries))
+    late = {one.effect for one in later}
+    fits = in_threads(begin, [each for each in tries if each[0] not in late])
+    hopeful = {one.effect for one in later if not _hopeless(case, current, one, fits)}
+    fits += in_threads(begin, [each for each in tries if each[0] in hopeful])
+    racing, given_up = _still_racing(case, fits)
     fits = [*in_threads(go_on, racing), *given_up]
     found = may_be_causes(case, list(_least(fits).values()))
     near = _near_the_best(case, current, found)
@@ -112,6 +120,24 @@ def _beside(
 ) -> Fit:
     """Return an effect fitted on every other stretch beside the current ones, from these values."""
     return case.fit((*current.effects, effect), "fitted", values, effect, descent, near)
+
+
+def _hopeless(case: Case, current: Fit, flown: Screened, fits: Fits) -> bool:
+    """Tell whether an effect takes far too little beside one that leaves noise alone there.
+
+    What it takes is by its signature at one size, and a flight is nearly linear in its numbers; the
+    settings beside it may take more.
+    """
+    ours = touched(case.outputs, [flown.effect])
+    power = sum(float(np.sum(o.residual(current.rig) ** 2)) for o in ours)
+    share_left = 1.0 - flown.taken / power
+    cost = 0.5 * sum(float(np.sum(o.residual(current.rig, "fitted") ** 2)) for o in ours)
+    return any(
+        effect.shows_in == flown.effect.shows_in
+        and leaves_only_noise(case, effect, fitted)
+        and share_left * cost > HOPELESS_BEHIND * RACE_BEHIND * fitted.cost
+        for effect, fitted in fits
+    )
 
 
 def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:

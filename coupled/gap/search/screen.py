@@ -8,6 +8,7 @@ leaves least is where a fit starts.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,9 +32,17 @@ from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
 
 
+class Screened(NamedTuple):
+    """A candidate, where its fits start, and the power that its signature takes, floors²."""
+
+    effect: Effect
+    starts: list[dict[str, float]]
+    taken: float
+
+
 def screen(
     case: Case, current: Fit, candidates: Sequence[Effect], always: Collection[str] = ()
-) -> list[tuple[Effect, list[dict[str, float]]]]:
+) -> list[Screened]:
     """Return the candidates whose signature takes most of the residual, and where to start.
 
     There is a start for each shape that an effect of several parameters begins from. One without
@@ -49,7 +58,7 @@ def screen(
     most = min(many, max(SCREENED_LEAST, len(near)))
     others = (item for item in scores[most:] if not item[2].free or item[2].name in always)
     kept = [*scores[:most], *others]
-    return [(effect, starts) for _, starts, effect in kept]
+    return [Screened(effect, starts, taken) for taken, starts, effect in kept]
 
 
 def screened(case: Case, current: Fit, effect: Effect) -> tuple[float, list[dict[str, float]]]:

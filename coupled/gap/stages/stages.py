@@ -60,6 +60,7 @@ from coupled.gap.thresholds import (
     RESTART_s,
     SLOW_LOADER_s,
 )
+from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
 from coupled.rig.nodes import Nodes
 from coupled.rig.replay import (
@@ -93,8 +94,9 @@ class Reader(Reading):
             makers = {"schedule": self._schedule, "loader": self._answering}
         if self.set_points:
             del makers["loader"], makers["multiplier"]
-        found = [out for stage, make in makers.items() if stage not in lacking for out in make()]
-        return [out for out in found if np.isfinite(out.floor) and out.floor > 0.0]
+        wanted = [make for stage, make in makers.items() if stage not in lacking]
+        made = in_threads(lambda make: make(), wanted)
+        return [out for each in made for out in each if np.isfinite(out.floor) and out.floor > 0.0]
 
     def _made(
         self,
