@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
-from coupled.gap.search.contest import overtaken
+from coupled.gap.search.contest import overtaken, switched
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
@@ -118,7 +119,8 @@ def _looked_over(
         steps = [tried_again(case, current, step) for step in steps]
     last = []
     for step in steps:
-        one, current = overtaken(case, current, step)
+        one, current = switched(case, library, current, step)
+        one, current = overtaken(case, current, one)
         one, current = separated(case, current, one)
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
@@ -200,9 +202,22 @@ def _needless(case: Case, current: Fit) -> Effect | None:
         rest = tuple(other for other in current.effects if other is not effect)
         without = case.fit(rest, "fitted", current.values)
         missed = ranked_by_gain(case.outputs, without, [(effect, whole)])[0].gain
-        if missed < NEEDLESS_GAIN and (least is None or missed < least[0]):
+        needless = missed < NEEDLESS_GAIN or _leaves_friction(case, effect, without)
+        if needless and (least is None or missed < least[0]):
             least = (missed, effect)
     return None if least is None else least[1]
+
+
+def _leaves_friction(case: Case, effect: Effect, without: Fit) -> bool:
+    """Tell whether the loader is within its limit without an effect, and has dry friction.
+
+    No law of that is exact: what it leaves there is not enough to look for an effect by.
+    """
+    rubs = is_dry(case.nominal, case.control) or any(one.dry for one in without.effects)
+    if effect.stage != "loader" or effect.dry or not rubs:
+        return False
+    gaps, limits = case.gaps(without.rig), stage_limits(case.outputs)
+    return all(gaps[at] <= limits[at] for at in effect.shows_in if at in gaps)
 
 
 def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidate:

@@ -16,7 +16,8 @@ from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import likelier_by
 from coupled.gap.search.information import says_nothing
 from coupled.gap.search.rivals import Found, weight
-from coupled.gap.thresholds import RIVAL_GAIN
+from coupled.gap.signals.output import stage_gaps
+from coupled.gap.thresholds import RIVAL_GAIN, SWITCH_LEAVES
 
 
 def contested(
@@ -55,6 +56,29 @@ def overtaken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
             best = replace(step, effect=close.effect, probability=1 / (1 + odds), rivals=())
             last = fits[1]
     return best, last
+
+
+def switched(case: Case, library: Sequence[Effect], current: Fit, step: Found) -> tuple[Found, Fit]:
+    """Return a step and the fit, with an effect without a number where that does as much.
+
+    It was passed over where another number stood wrong without the step's effect: a switch has none
+    to make up for it. It is the simpler answer, so it need not be likelier.
+    """
+    rest = [one for one in current.effects if one is not step.effect]
+    without = stage_gaps(case.outputs, case.with_only(current, rest))
+    for switch in library:
+        shown = set(switch.shows_in) & set(step.effect.shows_in) & set(without)
+        if switch.free or switch in current.effects or not shown:
+            continue
+        left = stage_gaps(case.outputs, case.with_only(current, [*rest, switch]))
+        if max(left[at] for at in shown) > SWITCH_LEAVES * max(without[at] for at in shown):
+            continue
+        fits = contested(case, current, step.effect, switch, [current.values])
+        if fits is None or not set(fits[1].at_bound) <= set(fits[0].at_bound):
+            continue
+        if likelier_by(case.outputs, *fits) < RIVAL_GAIN:
+            return replace(step, effect=switch, rivals=(), behind=()), fits[1]
+    return step, current
 
 
 def own_values(effect: Effect, fitted: Fit) -> dict[str, float]:

@@ -2,6 +2,9 @@
 
 A limit that only the peaks of a record meet is a tenth below them: sizes that are a factor of three
 apart are either never met, or cut so much off that the effect looks like none of the residual.
+
+A servo that a limit of its acceleration makes swing answers so steeply that a fit from 3 % off ends
+in a hollow. Such an effect is in reserve, tried where nothing else explains: many are worth it.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ import math
 from collections.abc import Callable
 
 from coupled.gap.effects.effect import Effect
-from coupled.gap.thresholds import LIMIT_BISECTIONS, LIMIT_SHARES
+from coupled.gap.thresholds import LIMIT_BISECTIONS, LIMIT_SHARES, RESERVE_SHARES
 
 
 def is_limit(effect: Effect) -> bool:
@@ -31,4 +34,5 @@ def limits(effect: Effect, shows: Callable[[float], bool]) -> list[float]:
     for _ in range(LIMIT_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
-    return [max(share * math.exp(low), number.low) for share in LIMIT_SHARES]
+    shares = RESERVE_SHARES if effect.reserve else LIMIT_SHARES
+    return [max(share * math.exp(low), number.low) for share in shares]
