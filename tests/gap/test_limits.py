@@ -16,6 +16,7 @@ from coupled.gap.search.limits import is_limit, limits
 from coupled.gap.search.screen import screened
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import LIMIT_SHARES
 from tests.support.gaps import made, nominal_rig
 
 FORCE, SERVO = BY_NAME["force_limit"], BY_NAME["servo_rate_limit"]
@@ -23,7 +24,7 @@ FORCE, SERVO = BY_NAME["force_limit"], BY_NAME["servo_rate_limit"]
 
 @given(st.floats(0.002, 1900.0))
 def test_the_first_limit_tried_cuts_a_fiftieth_off_the_peak(peak: float) -> None:
-    tried = limits(FORCE, lambda value: value < peak)
+    [tried] = limits(FORCE, lambda value: value < peak)
     assert 0.96 * peak < tried[0] < 0.99 * peak
     assert tried == sorted(tried, reverse=True)
     assert tried[-1] >= FORCE.free[0].low
@@ -32,7 +33,9 @@ def test_the_first_limit_tried_cuts_a_fiftieth_off_the_peak(peak: float) -> None
 def test_limits_of_what_is_in_reserve_are_tried_two_per_cent_apart() -> None:
     """A servo made to swing by 2.54 m/s² left 10 floors at that, and 40 by 2.6."""
     servo = BY_NAME["servo_acceleration_limit"]
-    tried = np.asarray(limits(servo, lambda value: value < 4.9))
+    few, many = limits(servo, lambda value: value < 4.9)
+    assert few == pytest.approx([share * few[0] / LIMIT_SHARES[0] for share in LIMIT_SHARES])
+    tried = np.asarray(many)
     assert np.all(tried[:-1] / tried[1:] < 1.021)
     assert tried[-1] < 0.05 * tried[0]
 
@@ -63,7 +66,8 @@ def test_a_fit_starts_near_a_limit_that_only_the_peaks_meet(tmp_path: Path, shar
 
 def test_a_force_of_hundredths_of_a_newton_may_be_limited() -> None:
     """An F_mod of up to 0.28 N was held to 0.023 N, which was under all that might be tried."""
-    assert limits(FORCE, lambda value: value < 0.28)[-1] < 0.023
+    [tried] = limits(FORCE, lambda value: value < 0.28)
+    assert tried[-1] < 0.023
 
 
 @pytest.mark.slow

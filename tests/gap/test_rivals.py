@@ -101,3 +101,28 @@ def test_what_is_far_behind_is_not_asked_again() -> None:
     case = Case(bench(), "column", [])
     best, far = (Candidate(gain, one, case.fit(())) for gain, one in ((50.0, OFFSET), (20, WEIGHT)))
     assert found_by(best, [best, far]).behind == ()
+
+
+def test_what_shows_in_more_outputs_may_overtake() -> None:
+    """The squares of its fit are of more outputs, and say nothing beside the other's."""
+
+    def loader(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        ours = rig.controls["column"].loader
+        scale = 20.0 * (rig.controls["column"].sensing.force_scale - 1.0)
+        return np.asarray(ours.offset * FIRST + scale * (FIRST + SECOND * 0.2))
+
+    def linkage(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        return np.zeros(FRAMES)
+
+    scale = BY_NAME["force_scale"]
+    outputs = [
+        Output("loader", "x", FIRST + SECOND * 0.2 + NOISE, loader, 1.0, 120.0),
+        Output("linkage", "y", 0.9 * NOISE[::-1], linkage, 1.0, 120.0),
+    ]
+    case = Case(bench(), "column", outputs)
+    far = Candidate(40.0, scale, case.fit((scale,), "fitted"))
+    found = Found(OFFSET, 50.0, 0.97, (), (far,))
+    current = case.fit((OFFSET,))
+    step, last = overtaken(case, current, found)
+    assert last.cost > current.cost
+    assert step.effect is scale

@@ -386,31 +386,3 @@ def test_a_bend_with_hysteresis_is_sought_at_widths_of_their_own(
     [found] = fitted_candidates(case, case.fit(()), [loop], {"linkage"})
     assert found.fit.values["bend_hysteresis.width_N"] == pytest.approx(width_N, rel=0.3)
     assert found.fit.values["bend_hysteresis.share"] == pytest.approx(0.5, abs=0.1)
-
-
-@pytest.mark.parametrize(("alike", "asked"), [(0.0, False), (0.995, True)])
-def test_a_flight_is_not_fitted_that_takes_far_too_little(alike: float, asked: bool) -> None:
-    """Beside two of which one leaves noise alone: each evaluation of such a fit is a flight.
-
-    One whose signature takes nearly as much may be as good with its settings, and is fitted.
-    """
-    acts = np.random.default_rng(3).normal(size=(4, FRAMES))
-    names = ("pitch_damping", "elevator_effectiveness", "pitch_stiffness")
-    turned = alike * acts[0] + math.sqrt(1.0 - alike**2) * acts[2]
-    shapes = dict(zip(names, (acts[0], 0.99 * acts[0] + 0.1 * acts[1], turned), strict=True))
-
-    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        assert rig.flight is not None
-        numbers = {name: getattr(rig.flight, name) for name in names}
-        return np.asarray(sum(100.0 * (numbers[name] - 1.0) * shapes[name] for name in names))
-
-    rig = nominal_rig(True)
-    assert rig.flight is not None
-    airframe = Output("airframe", "x", 40.0 * acts[0] + acts[3], predict, 1.0, 120.0)
-    told = list[str]()
-    case = Case(rig, "column", [airframe], lambda what, *_: told.append(what))
-    effects = [BY_NAME[name] for name in names]
-    ranked = fitted_candidates(case, case.fit(()), effects, {"airframe"})
-    assert ranked[0].effect.name == "pitch_damping"
-    assert ("fitting pitch_stiffness" in told) == asked
-    assert "fitting elevator_effectiveness" in told

@@ -51,7 +51,7 @@ def overtaken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
         if fits is None:
             continue
         less = likelier_by(case.outputs, *fits)
-        if less <= -RIVAL_GAIN and fits[1].cost < last.cost:
+        if less <= -RIVAL_GAIN and likelier_by(case.outputs, last, fits[1]) < 0.0:
             odds = weight(-less)
             best = replace(step, effect=close.effect, probability=1 / (1 + odds), rivals=())
             last = fits[1]

@@ -21,9 +21,10 @@ def is_limit(effect: Effect) -> bool:
     return len(effect.free) == 1 and effect.free[0].inverse
 
 
-def limits(effect: Effect, shows: Callable[[float], bool]) -> list[float]:
-    """Return limits to try, from the largest one that shows on, in the limit's own unit.
+def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
+    """Return sets of limits to try, from the largest one that shows on, in the limit's own unit.
 
+    Of each set the best is a start; of an effect in reserve that of many stands beside that of few.
     `shows` tells of a limit whether it changes what is predicted. None where not even the lowest
     does.
     """
@@ -34,5 +35,6 @@ def limits(effect: Effect, shows: Callable[[float], bool]) -> list[float]:
     for _ in range(LIMIT_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
-    shares = RESERVE_SHARES if effect.reserve else LIMIT_SHARES
-    return [max(share * math.exp(low), number.low) for share in shares]
+    sets = (LIMIT_SHARES, RESERVE_SHARES) if effect.reserve else (LIMIT_SHARES,)
+    most = math.exp(low)
+    return [[max(share * most, number.low) for share in shares] for shares in sets]

@@ -18,7 +18,6 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.limits import is_limit, limits
 from coupled.gap.thresholds import (
-    LIMIT_SHARES,
     RACE_BEHIND,
     SCREEN_FACTORS,
     SCREEN_LESS,
@@ -110,9 +109,7 @@ def _tries(case: Case, current: Fit, effect: Effect) -> list[list[dict[str, floa
     if is_limit(effect) and not STAGE_OF[effect.stage].flown:
         key = effect.value_key(effect.free[0])
         met = limits(effect, lambda value: _shows(case, current, effect, {key: value}))
-        # Closely spaced ones beside the few: a fit may end in a hollow from either's best.
-        every = [met[:: max(len(met) // len(LIMIT_SHARES), 1)], met] if effect.reserve else [met]
-        return [[{key: value} for value in each] for each in every]
+        return [[{key: value} for value in each] for each in met]
     if effect.seen is None:
         shapes = max([len(p.starts) for p in effect.free], default=1)
         return [_sizes(case, current, effect, shape) for shape in range(shapes)]
