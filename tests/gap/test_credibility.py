@@ -75,6 +75,8 @@ def test_what_imitates_is_unexplained_though_nothing_remains() -> None:
     assert verdict(0.97, 1.0) == "effect"
     assert verdict(0.97, 1.5) == "mostly"
     assert verdict(0.4, 1.0) == verdict(0.4, 1.5) == "unexplained"
+    assert verdict(0.55, 1.0) == "unexplained"  # right in two of five
+    assert (verdict(0.65, 1.0), verdict(0.65, 1.5)) == ("effect", "mostly")  # in five of six
     assert verdict(0.49, 1.0, ("stiffening_bend",)) == "ambiguous"
 
 

@@ -58,6 +58,18 @@ def test_an_effect_beside_a_larger_one_is_claimed_where_it_leaves_noise_alone(
     assert choice.fit.values[OFFSET.value_key(OFFSET.free[0])] == pytest.approx(30.0, rel=0.01)
 
 
+def test_what_an_effect_leaves_within_the_limit_is_no_other_s() -> None:
+    """Play that yields left 1.17 of 5 floors, of which a bend that stiffens gained 64.
+
+    A stage that settings alone bring so far is asked.
+    """
+    case = answered(4.0 * FIRST + 0.6 * SECOND, offset_and_weight)
+    current = case.fit((OFFSET,))
+    assert 1.1 < case.gaps(current.rig)["loader"] < case.outputs[0].limit
+    assert small._just_within(case, current) == set()
+    assert small._just_within(case, replace(current, effects=())) == {"loader"}
+
+
 def test_beside_dry_friction_a_remainder_is_no_effect() -> None:
     """How a contact yields leaves as much, and other effects would take it up."""
     rubbing = bench({"friction_N": 2.0, "friction_stiffness_N_per_m": 1e4})
