@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.answer import verdict_of
@@ -15,7 +17,7 @@ from coupled.gap.findings.credibility import Credibility, Regime, credibility, r
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Output
-from coupled.gap.thresholds import REMAINDER
+from coupled.gap.thresholds import DRIFT_CHANCE, REMAINDER
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.rigs import bench
@@ -185,3 +187,30 @@ def test_what_remains_of_an_exact_stage_is_held_against_an_effect(
         value
     )
     assert Credibility("coulomb_friction", (), remainder=remains).value == 1.0
+
+
+def test_what_chance_parts_is_no_drift_of_an_effect_that_leaves_nothing() -> None:
+    """Of seven halves one is parted by three errors too often to doubt an effect that fits."""
+    alike = [Regime(name, 1.0, 1.0, 0.05, 0.05, 16) for name in "abcdef"]
+    error = math.hypot(0.05, 0.05)
+    by = 3.0 * error
+    apart = Regime("time_s", 1.0 - 0.5 * by, 1.0 + 0.5 * by, 0.05, 0.05, 16)
+    fits = Credibility("offset", (*alike, apart))
+    assert fits.p_value > 0.01
+    assert fits.drift == 0.0
+    assert fits.value == 1.0
+    leaves = Credibility("offset", (*alike, apart), 0.9, 2.0, 1.0)
+    assert leaves.drift > 0.1
+    assert leaves.value < 0.6
+
+
+def test_what_chance_does_not_part_is_drift() -> None:
+    """Beyond the multiple of chance, in squares, and by more the fewer halves are looked at."""
+    apart = Regime("time_s", 0.8, 1.2, 0.03, 0.04, 21)
+    multiple = float(stats.t.isf(0.5 * DRIFT_CHANCE / 2, 20))
+    alike = Regime("force_N", 1.0, 1.0, 0.03, 0.04, 21)
+    two = Credibility("offset", (alike, apart))
+    assert two.drift == pytest.approx(math.sqrt(0.4**2 - (multiple * 0.05) ** 2))
+    assert 0.4 > Credibility("offset", (apart,)).drift > two.drift > 0.3
+    assert Credibility("offset", ()).drift == 0.0
+    assert Credibility("offset", ()).value == 1.0

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import stdtr, stdtrit
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.flexible import free_share
@@ -39,6 +39,7 @@ from coupled.gap.search.fit import Fit, touched
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import (
     DRIFT,
+    DRIFT_CHANCE,
     FLEXIBLE_LEFT,
     HOST_DRIFT,
     LEAST_OF_A_HALF,
@@ -64,11 +65,14 @@ class Regime:
     high_error: float
     stretches: int
 
-    @property
-    def apart(self) -> float:
-        """By how much the sizes surely differ: twice their error taken off, in squares."""
+    def apart(self, chance: float) -> float:
+        """Return by how much the sizes differ beyond what chance does once in 1 / `chance`.
+
+        That is taken off in squares.
+        """
         error = math.hypot(self.low_error, self.high_error)
-        return math.sqrt(max((self.high - self.low) ** 2 - 4.0 * error**2, 0.0))
+        errors = float(stdtrit(max(self.stretches - 1, 1), 1.0 - min(chance, 1.0) / 2.0))
+        return math.sqrt(max((self.high - self.low) ** 2 - (errors * error) ** 2, 0.0))
 
     @property
     def p_value(self) -> float:
@@ -104,14 +108,15 @@ class Credibility:
     exact: bool = False
 
     @property
-    def worst(self) -> Regime | None:
-        """The halves whose sizes are the furthest apart; None where no half holds enough."""
-        return max(self.regimes, key=lambda one: one.apart, default=None)
-
-    @property
     def drift(self) -> float:
-        """How far the sizes surely are apart, over the size."""
-        return 0.0 if self.worst is None else self.worst.apart
+        """How far the sizes of any two halves surely are apart, over the size.
+
+        That is beyond what chance does to one of as many halves as were looked at in
+        `DRIFT_CHANCE` of all effects. An effect that leaves nothing is nearly always right: it
+        takes more to doubt it. One that leaves much is doubted by what chance might do, too.
+        """
+        chance = DRIFT_CHANCE ** (1.0 - self.remainder) / max(len(self.regimes), 1)
+        return max((one.apart(chance) for one in self.regimes), default=0.0)
 
     @property
     def p_value(self) -> float:
