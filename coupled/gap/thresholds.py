@@ -291,3 +291,4 @@ HOST_DRIFT = 0.04  # in the schedule, which is exact: of 15 right effects of see
 FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it,
 # or else leave no more than that model does alone: docs/diagnosis.md says of what it was tried on.
 LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size
+LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its size has no error

@@ -165,6 +165,6 @@ def test_a_models_own_error_may_be_alike_in_all_of_a_half() -> None:
     """Of an action of 4 floors rms, an error of 1 floor that lasts is a quarter of its size."""
     rng, number = np.random.default_rng(1), np.repeat(np.arange(20), 100)
     action, left = 4.0 * rng.choice([-1.0, 1.0], 2000), rng.normal(size=2000)
-    more, scatter = _size(action, left, number)
+    more, scatter, _ = _size(action, left, number)
     assert abs(more) < 3.0 * scatter < 0.05
     assert _size(action, left, number, 1.0)[1] == pytest.approx(0.25, rel=0.01)

@@ -13,7 +13,14 @@ from scipy import stats
 
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.answer import verdict_of
-from coupled.gap.findings.credibility import Credibility, Regime, credibility, remainder
+from coupled.gap.findings.credibility import (
+    Credibility,
+    Regime,
+    _Acts,
+    _regime,
+    credibility,
+    remainder,
+)
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Output
@@ -206,11 +213,45 @@ def test_what_chance_parts_is_no_drift_of_an_effect_that_leaves_nothing() -> Non
 
 def test_what_chance_does_not_part_is_drift() -> None:
     """Beyond the multiple of chance, in squares, and by more the fewer halves are looked at."""
-    apart = Regime("time_s", 0.8, 1.2, 0.03, 0.04, 21)
+    apart = Regime("time_s", 0.8, 1.2, 0.03, 0.04, 20)
     multiple = float(stats.t.isf(0.5 * DRIFT_CHANCE / 2, 20))
-    alike = Regime("force_N", 1.0, 1.0, 0.03, 0.04, 21)
+    alike = Regime("force_N", 1.0, 1.0, 0.03, 0.04, 20)
     two = Credibility("offset", (alike, apart))
     assert two.drift == pytest.approx(math.sqrt(0.4**2 - (multiple * 0.05) ** 2))
     assert 0.4 > Credibility("offset", (apart,)).drift > two.drift > 0.3
     assert Credibility("offset", ()).drift == 0.0
     assert Credibility("offset", ()).value == 1.0
+
+
+def parted(rng: np.random.Generator, acting: list[int], size: float = 1.0) -> Regime | None:
+    """Return early against late of an effect that acts in some of 20 stretches of a record.
+
+    What it leaves is alike within a stretch, a tenth of its action rms. Late it is `size` as large.
+    """
+    number, time_s = np.repeat(np.arange(20), 50), np.arange(1000) / 50.0
+    action = np.isin(number, acting) * np.sin(2.0 * np.pi * 2.0 * time_s)
+    left = 0.1 * rng.normal(size=20)[number] * action + 0.01 * rng.normal(size=1000)
+    left += (size - 1.0) * np.where(time_s > 10.0, action, 0.0)
+    output = SimpleNamespace(record=0, stretches=number)
+    acts = _Acts(cast(Output, output), cast(Record, {}), action, left)
+    return _regime("time_s", [(acts, time_s)], 0.0)
+
+
+def test_few_stretches_that_hold_the_action_seldom_part() -> None:
+    """A limit reached in three stretches early and three late has six stretches, not twenty."""
+    rng = np.random.default_rng(5)
+    found = [parted(rng, [1, 4, 8, 11, 13, 17]) for _ in range(400)]
+    assert all(one is not None and 1.0 < one.freedom < 5.0 for one in found)
+    often = np.mean([one is not None and one.p_value < 0.05 for one in found])
+    assert often < 0.08
+    held = parted(rng, [4, 13])
+    assert held is None  # one stretch each: nothing tells how sure its size is
+
+
+def test_many_stretches_part_what_drifts() -> None:
+    rng = np.random.default_rng(6)
+    found = [parted(rng, list(range(20)), size=0.7) for _ in range(50)]
+    assert all(one is not None and one.p_value < 0.01 for one in found)
+    assert all(one is not None and 10.0 < one.freedom < 19.0 for one in found)
+    known = [Credibility("offset", (one,)).drift for one in found if one is not None]
+    assert 0.2 < np.median(known) < 0.3

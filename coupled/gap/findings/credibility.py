@@ -42,6 +42,7 @@ from coupled.gap.thresholds import (
     DRIFT_CHANCE,
     FLEXIBLE_LEFT,
     HOST_DRIFT,
+    LEAST_HOLD,
     LEAST_OF_A_HALF,
     LEAST_REMAINDER,
     REMAINDER,
@@ -55,7 +56,8 @@ Floats = NDArray[np.float64]
 class Regime:
     """An effect's size in two halves of the records, over its size in all, and their errors.
 
-    `by` is the signal that divides them, `low` the half where it is the smaller.
+    `by` is the signal that divides them, `low` the half where it is the smaller; `freedom` are the
+    degrees of freedom of the errors.
     """
 
     by: str
@@ -63,7 +65,7 @@ class Regime:
     high: float
     low_error: float
     high_error: float
-    stretches: int
+    freedom: float
 
     def apart(self, chance: float) -> float:
         """Return by how much the sizes differ beyond what chance does once in 1 / `chance`.
@@ -71,7 +73,7 @@ class Regime:
         That is taken off in squares.
         """
         error = math.hypot(self.low_error, self.high_error)
-        errors = float(stdtrit(max(self.stretches - 1, 1), 1.0 - min(chance, 1.0) / 2.0))
+        errors = float(stdtrit(self.freedom, 1.0 - min(chance, 1.0) / 2.0))
         return math.sqrt(max((self.high - self.low) ** 2 - (errors * error) ** 2, 0.0))
 
     @property
@@ -81,7 +83,7 @@ class Regime:
         if error == 0.0:
             return 1.0
         away = abs(self.high - self.low) / error
-        return float(2.0 * stdtr(max(self.stretches - 1, 1), -away))
+        return float(2.0 * stdtr(self.freedom, -away))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
@@ -260,22 +262,33 @@ def _regime(by: str, parts: Sequence[tuple[_Acts, Floats]], lasting: float) -> R
     if min(float(power[low].sum()), float(power[high].sum())) < LEAST_OF_A_HALF * total:
         return None
     sizes = [_size(action[rows], left[rows], number[rows], lasting) for rows in (low, high)]
-    (a, a_error), (b, b_error) = sizes
-    return Regime(by, 1.0 + a, 1.0 + b, a_error, b_error, len(np.unique(number)))
+    (a, a_error, a_held), (b, b_error, b_held) = sizes
+    if min(a_held, b_held) < LEAST_HOLD:
+        return None
+    squares = (a_error**2, b_error**2)
+    apart = squares[0] ** 2 / (a_held - 1.0) + squares[1] ** 2 / (b_held - 1.0)
+    freedom = sum(squares) ** 2 / apart if apart > 0.0 else math.inf  # Welch
+    return Regime(by, 1.0 + a, 1.0 + b, a_error, b_error, freedom)
 
 
 def _size(
     action: Floats, left: Floats, number: NDArray[np.intp], lasting: float = 0.0
-) -> tuple[float, float]:
-    """Return how much more of an action a residual holds, and its error.
+) -> tuple[float, float, float]:
+    """Return how much more of an action a residual holds, its error, and how many hold the action.
 
-    That is from the stretches, and of a `lasting` part of the residual, rms, as large as its share.
+    The error is from the stretches, each held against the size that the others have (a jackknife:
+    what is fitted to one stretch leaves nothing there), and of a `lasting` part of the residual,
+    rms, as large as its share. A limit that is reached in two stretches is in no more than two,
+    however long the record: as many as would hold the action alike (Kish).
     """
     power = float(action @ action)
     more = float(left @ action) / power
     names, at = np.unique(number, return_inverse=True)
-    scores = np.zeros(len(names))
+    scores, held = np.zeros(len(names)), np.zeros(len(names))
     np.add.at(scores, at, (left - more * action) * action)
-    freedom = max(len(names) - 1, 1)
-    scatter = math.sqrt(float(scores @ scores) * len(names) / freedom) / power
-    return more, math.hypot(scatter, lasting / math.sqrt(power / len(action)))
+    np.add.at(held, at, action**2 / power)
+    scores /= np.maximum(1.0 - held, 1e-9)
+    freedom = len(names) / max(len(names) - 1, 1)
+    scatter = math.sqrt(float(scores @ scores) / freedom) / power
+    error = math.hypot(scatter, lasting / math.sqrt(power / len(action)))
+    return more, error, 1.0 / float(held @ held)
