@@ -229,7 +229,7 @@ def parted(rng: np.random.Generator, acting: list[int], size: float = 1.0) -> Re
     What it leaves is alike within a stretch, a tenth of its action rms. Late it is `size` as large.
     """
     number, time_s = np.repeat(np.arange(20), 50), np.arange(1000) / 50.0
-    action = np.isin(number, acting) * np.sin(2.0 * np.pi * 2.0 * time_s)
+    action = np.where(np.isin(number, acting), np.sin(2.0 * np.pi * 2.0 * time_s), 0.0)
     left = 0.1 * rng.normal(size=20)[number] * action + 0.01 * rng.normal(size=1000)
     left += (size - 1.0) * np.where(time_s > 10.0, action, 0.0)
     output = SimpleNamespace(record=0, stretches=number)

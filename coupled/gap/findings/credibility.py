@@ -113,11 +113,12 @@ class Credibility:
     def drift(self) -> float:
         """How far the sizes of any two halves surely are apart, over the size.
 
-        That is beyond what chance does to one of as many halves as were looked at in
-        `DRIFT_CHANCE` of all effects. An effect that leaves nothing is nearly always right: it
-        takes more to doubt it. One that leaves much is doubted by what chance might do, too.
+        That is beyond what chance does to any of the halves that were looked at (Bonferroni), in
+        `DRIFT_CHANCE` of all effects, where the effect leaves nothing: nearly all such are right,
+        and it takes more to doubt one. Of those that leave much few are right, and what chance
+        might do is enough.
         """
-        chance = DRIFT_CHANCE ** (1.0 - self.remainder) / max(len(self.regimes), 1)
+        chance = (DRIFT_CHANCE / max(len(self.regimes), 1)) ** (1.0 - self.remainder)
         return max((one.apart(chance) for one in self.regimes), default=0.0)
 
     @property
