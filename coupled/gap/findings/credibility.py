@@ -118,7 +118,7 @@ class Credibility:
         and it takes more to doubt one. Of those that leave much few are right, and what chance
         might do is enough.
         """
-        chance = (DRIFT_CHANCE / max(len(self.regimes), 1)) ** ((1.0 - self.remainder) ** 2)
+        chance = (DRIFT_CHANCE / max(len(self.regimes), 1)) ** (1.0 - self.remainder)
         return max((one.apart(chance) for one in self.regimes), default=0.0)
 
     @property
