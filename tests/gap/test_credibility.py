@@ -18,6 +18,7 @@ from coupled.gap.findings.credibility import (
     Regime,
     _Acts,
     _regime,
+    _size,
     credibility,
     remainder,
 )
@@ -255,3 +256,16 @@ def test_many_stretches_part_what_drifts() -> None:
     assert all(one is not None and 10.0 < one.freedom < 19.0 for one in found)
     known = [Credibility("offset", (one,)).drift for one in found if one is not None]
     assert 0.2 < np.median(known) < 0.3
+
+
+def test_the_error_of_a_size_is_the_jackknife_of_its_stretches() -> None:
+    """As fitted anew without each stretch in turn, of stretches that hold unlike shares."""
+    rng, number = np.random.default_rng(7), np.repeat(np.arange(6), 50)
+    action = np.array([8.0, 3.0, 2.0, 1.0, 1.0, 0.5])[number] * rng.normal(size=300)
+    left = 0.2 * rng.normal(size=6)[number] * action + rng.normal(size=300)
+    more, error, held = _size(action, left, number)
+    kept = [number != one for one in range(6)]
+    without = np.array([left[rows] @ action[rows] / (action[rows] @ action[rows]) for rows in kept])
+    assert error == pytest.approx(math.sqrt(5.0 / 6.0 * float(np.sum((without - more) ** 2))))
+    shares = np.array([np.sum(action[number == one] ** 2) for one in range(6)])
+    assert held == pytest.approx(float(np.sum(shares) ** 2 / np.sum(shares**2)))
