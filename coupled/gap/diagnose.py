@@ -14,7 +14,7 @@ from functools import partial
 
 from coupled.errors import InputError
 from coupled.gap.checks import check_record, check_trim
-from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.library import library_of
 from coupled.gap.findings.answer import doubted, effects_of, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -91,7 +91,8 @@ def _diagnose(
         file = next(iter(records))
         problem = f"holds too little to judge any stage by; it lacks {', '.join(lacking)}"
         raise InputError(file, "", problem)
-    library = [effect for effect in EFFECTS if effect.can_be_tried(list(records.values()), control)]
+    every = library_of(rig, control)
+    library = [effect for effect in every if effect.can_be_tried(list(records.values()), control)]
     library = under_motion(library) if readers[0].moved else library
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)

@@ -182,6 +182,8 @@ SHARES_IN = 0.3  # chosen: of the largest part, from which a number belongs to s
 SCREENED = 6  # chosen: candidates fitted in a round,
 SCREENED_BESIDE = 8  # chosen: and beside another effect, of which the size is not known yet,
 SCREENED_LEAST = 3  # chosen: and no fewer, however little they take beside the best
+SCREEN_ALIKE = 0.75  # chosen: share of what the best takes, from which all are kept,
+SCREENED_MOST = 10  # chosen: but no more than so many
 SCREEN_NEAR = 0.15  # chosen: share of what the best takes, from which others are fitted, too
 SCREEN_SIZES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # times where a parameter starts; chosen
 SCREEN_FACTORS = (-3.0, -1.0, 0.3, 1.0, 3.0, 10.0)  # the same for how far a factor is from 1
@@ -214,6 +216,7 @@ STRAINED_GAIN = 30.0  # chosen: by which an effect must beat settings at their e
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
 BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again
 SWITCH_LEAVES = 0.5  # chosen: of a gap, the most that what has no number may leave to be asked
+RICHER_GAIN = 10.0  # chosen: by which all of a record must speak for a richer law of dry friction
 NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen
 MOST_EFFECTS = 4  # chosen: effects in one answer
 

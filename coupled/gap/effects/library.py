@@ -16,7 +16,10 @@ from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING
 from coupled.gap.signals.air import NEEDS as AIR
 from coupled.gap.signals.air import spread_of_air
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
 
+MOTION = "motion_skew"
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
 
@@ -123,6 +126,20 @@ ONE_LAW = (
     ("viscous_damping", "modifying_lag"),
     ("mass", "lift_slope"),
 )
+
+
+def library_of(rig: Rig, control: ControlName) -> list[Effect]:
+    """Return the effects as a rig shows them.
+
+    Where a bob weight hangs, it pulls by the load factor: a motion that is stamped late shows in
+    the loader, too.
+    """
+    if rig.flight is None or not rig.controls[control].loader.bob_weight:
+        return list(EFFECTS)
+    return [
+        replace(one, outputs=(*one.shows_in, "loader")) if one.name == MOTION else one
+        for one in EFFECTS
+    ]
 
 
 def _ends(effect: Effect) -> tuple[float, float, float]:

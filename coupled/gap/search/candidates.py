@@ -30,6 +30,7 @@ from coupled.gap.thresholds import (
 from coupled.parallel import in_threads
 
 Fits = list[tuple[Effect, Fit]]
+Ends = Mapping[str, dict[str, float]]
 
 
 def fitted_candidates(
@@ -38,10 +39,13 @@ def fitted_candidates(
     library: Sequence[Effect],
     outputs: set[str],
     always: Collection[str] = (),
+    ends: Ends | None = None,
 ) -> list[Candidate]:
     """Return the effects that show in some outputs, fitted beside the current ones, best first.
 
-    Those named in `always` are fitted however little their signature takes.
+    Those named in `always` are fitted however little their signature takes. `ends` are the values at
+    which an earlier round's fits ended, by effect: a fit starts there, too. Another effect found
+    since may have made the signature less clear than it was.
     """
     # A law of friction with its contact's numbers as its own is one beside which they are settings.
     same = {effect.yielding for effect in library} if case.contact else set()
@@ -51,7 +55,7 @@ def fitted_candidates(
         for effect in library
         if effect.name not in chosen and effect.name not in same and outputs & set(effect.shows_in)
     ]
-    screened = screen(case, current, candidates, always)
+    screened = [_from_ends(one, ends or {}) for one in screen(case, current, candidates, always)]
     laws = [one for one in screened if one.effect.dry and not one.effect.yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
     laws = [one for one in laws if may_gain(case, one.effect, found)]
@@ -59,6 +63,14 @@ def fitted_candidates(
     found += _fitted(case, current, laws)
     closing = [one for one in found if not _opens_a_gap(case, current, one[1])]
     return informative(case, current, closing or found)
+
+
+def _from_ends(one: Screened, ends: Ends) -> Screened:
+    """Return a screened effect that starts where its last fit ended, too; not a law of friction."""
+    end = ends.get(one.effect.name)
+    if end is None or one.effect.dry or len(one.effect.free) < 2:
+        return one
+    return one._replace(starts=[*one.starts, end])
 
 
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")

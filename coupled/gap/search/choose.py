@@ -13,16 +13,17 @@ from dataclasses import dataclass, field, replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.settings import is_dry
-from coupled.gap.search.candidates import fitted_candidates
+from coupled.gap.search.candidates import Ends, fitted_candidates
 from coupled.gap.search.case import Case
-from coupled.gap.search.contest import overtaken, switched
+from coupled.gap.search.contest import overtaken, own_values, switched, told_apart
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
 from coupled.gap.search.intwo import in_two
 from coupled.gap.search.onelaw import same_in_a_limit
+from coupled.gap.search.richer import richer_on_all
 from coupled.gap.search.rivals import Found, found_by, separated, tried_again
-from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained
+from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained, taken_by_switch
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
@@ -59,11 +60,13 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
     idle: set[str] = set()  # guilty outputs for which nothing was found
+    ends: dict[str, dict[str, float]] = {}  # where each candidate's last fit ended
     stood = [settled]  # the fits that the search has stood at
     circled, halves = False, None
     while len(steps) < MOST_EFFECTS:
-        ranked = _round(case, settled, current, library, idle)
+        ranked = _round(case, settled, current, library, idle, ends)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
+        ends |= {one.effect.name: own_values(one.effect, one.fit) for one in ranked}
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
@@ -106,6 +109,7 @@ def _looked_over(
     """Return the steps and the fit, each effect looked at once more beside all the others."""
     if len(steps) > 1:
         steps, current = _law_again(case, stood[0], library, steps, current)
+    steps, current = richer_on_all(case, library, steps, current)
     yields = yielding_reading(case, current)
     if yields is not None:
         plain, law, start = yields
@@ -122,6 +126,7 @@ def _looked_over(
         one, current = switched(case, library, current, step)
         one, current = overtaken(case, current, one)
         one, current = separated(case, current, one)
+        one, current = told_apart(case, current, one)
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current
@@ -254,7 +259,12 @@ def _simplest(case: Case, settled: Fit, ranked: Sequence[Candidate]) -> Candidat
 
 
 def _round(
-    case: Case, settled: Fit, current: Fit, library: Sequence[Effect], idle: set[str]
+    case: Case,
+    settled: Fit,
+    current: Fit,
+    library: Sequence[Effect],
+    idle: set[str],
+    ends: Ends,
 ) -> list[Candidate]:
     """Return the candidates of one guilty output by their held-out gain, best first.
 
@@ -267,7 +277,7 @@ def _round(
     wide = {at for at, gap in now.items() if gap > explained_below(first[at], limits[at])}
     tried: list[Candidate] = []
     for output in sorted(wide - idle, key=lambda at: -now[at]):
-        ranked = fitted_candidates(case, current, library, {output})
+        ranked = fitted_candidates(case, current, library, {output}, ends=ends)
         tried = tried or ranked
         if ranked and ranked[0].gain < LEAST_GAIN:
             ranked = in_two(case, settled, library, output, ranked)
@@ -277,5 +287,7 @@ def _round(
     marked = shown_by_mark(case, current, library)
     if wide or marked:
         return marked or tried
+    if switch := taken_by_switch(case, current, library):
+        return switch
     beside = {at for at, gap in now.items() if gap > limits[at]}
     return beside_a_larger(case, current, library, beside) or strained(case, current, library)

@@ -10,10 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
-from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.gain import Candidate, likelier_by
 from coupled.gap.search.information import says_nothing
 from coupled.gap.search.rivals import Found, weight
 from coupled.gap.signals.output import stage_gaps
@@ -79,6 +80,36 @@ def switched(case: Case, library: Sequence[Effect], current: Fit, step: Found) -
         if likelier_by(case.outputs, *fits) < RIVAL_GAIN:
             return replace(step, effect=switch, rivals=(), behind=()), fits[1]
     return step, current
+
+
+def told_apart(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
+    """Return a step without the rivals that all of the record tells from it beside dry friction.
+
+    Either may stand in a hollow there, so that each is begun from where the other ended, and with
+    its contact sought anew. One of more numbers is not asked: it can bend farther.
+    """
+    if not is_dry(case.nominal, case.control) and not any(one.dry for one in current.effects):
+        return step, current
+    left = list[Candidate]()
+    odds = 1.0 / step.probability - 1.0
+    for rival in step.rivals:
+        fits = None
+        if len(rival.effect.free) <= len(step.effect.free) and rival.effect not in current.effects:
+            own = own_values(rival.effect, rival.fit)
+            starts = [{**current.values, **own}, {**current.values, **rival.fit.values}]
+            starts.append(case.but_for_contact(starts[0]))
+            fits = contested(case, current, step.effect, rival.effect, starts)
+        if fits is None:
+            left.append(rival)
+            continue
+        here, there = fits
+        less = min(likelier_by(case.outputs, *fits), -likelier_by(case.outputs, there, here))
+        if less < RIVAL_GAIN:
+            left.append(rival)
+            continue
+        current = here
+        odds += weight(less) - weight(step.gain - rival.gain)
+    return replace(step, probability=1.0 / (1.0 + max(odds, 0.0)), rivals=tuple(left)), current
 
 
 def own_values(effect: Effect, fitted: Fit) -> dict[str, float]:

@@ -25,7 +25,8 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     """
     open_ones = [one for one in found if says_nothing(case, *one)]
     clear = [one for one in found if one not in open_ones]
-    held = [_alone(case, *one) for one in open_ones if _goes_along(one[0])]
+    plainest = _plainest([effect for effect, _ in found])
+    held = [_alone(case, *one) for one in open_ones if one[0] in plainest]
     clear += [one for one in held if not says_nothing(case, *one)]
     ranked = ranked_by_gain(case.outputs, current, clear)
     asked = _clear_on_all(case, current, ranked, open_ones)
@@ -39,6 +40,15 @@ def informative(case: Case, current: Fit, found: Sequence[tuple[Effect, Fit]]) -
     others = ranked_by_gain(case.outputs, current, [*clear, *single])
     # Two that are one law differ by rounding alone: the library's order settles it.
     return sorted(others, key=lambda one: (-round(one.gain, 1), ORDER.index(one.effect.name)))
+
+
+def _plainest(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the effects that may be asked by their level alone: of those with one, the plainest.
+
+    The level alone is the same law by the name of either.
+    """
+    richest_first = sorted(filter(_goes_along, effects), key=lambda one: -len(one.free))
+    return list({one.free[0].key: one for one in richest_first}.values())
 
 
 def _goes_along(effect: Effect) -> bool:

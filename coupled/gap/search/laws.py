@@ -16,7 +16,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import leaves_noise
 from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.slopes import Slope
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Output, Part, memory
 from coupled.gap.thresholds import HARDLY, RICHER, SHAPES, SIMPLER_GAIN
 from coupled.parallel import go_on
 
@@ -44,8 +44,8 @@ def may_gain(case: Case, law: Effect, found: Fits) -> bool:
     """
     for plain, fitted in found:
         if plain.yielding and leaves_only_noise(case, plain, fitted):
-            foretold = _foretold(case, law, plain, fitted)
-            return foretold is None or foretold >= SIMPLER_GAIN
+            gain = foretold(case, law, plain, fitted)
+            return gain is None or gain >= SIMPLER_GAIN
     return True
 
 
@@ -99,7 +99,7 @@ def _above(case: Case, effect: Effect, fitted: Fit, times: float) -> dict[str, f
     }
 
 
-def _little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Starts:
+def little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Starts:
     """Return values by which a richer law is a little more than the plain one that was fitted.
 
     None where it does not hold that one.
@@ -120,17 +120,20 @@ def _little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Start
     return [{**fitted.values, **both, first: HARDLY * level}]
 
 
-def _foretold(case: Case, law: Effect, plain: Effect, fitted: Fit) -> float | None:
+def foretold(
+    case: Case, law: Effect, plain: Effect, fitted: Fit, part: Part = "fitted"
+) -> float | None:
     """Return the log-likelihood that a richer law is foretold to gain over a plain one.
 
-    All that was fitted goes along, by its slopes. None where that cannot be foretold.
+    On the part of the record that was fitted. All of that goes along, by its slopes. None where
+    that cannot be foretold.
     """
-    tries = _little_richer(case, law, plain, fitted)
+    tries = little_richer(case, law, plain, fitted)
     keys, slope = _slope_of(plain, fitted)
     if slope is None or not tries:
         return None
     ours = _of_a_slope(case, fitted, keys)
-    rows = np.concatenate([output.rows("fitted") for output in ours])
+    rows = np.concatenate([output.rows(part) for output in ours])
     now = np.concatenate([output.residual(fitted.rig, wide=True) for output in ours])
     if len(now) != len(slope.left):
         return None
@@ -150,7 +153,7 @@ def _foretold(case: Case, law: Effect, plain: Effect, fitted: Fit) -> float | No
         if law.even is None:  # no breakaway is under the running friction
             less = max(less, 0.0)
         most = max(most, 0.5 * less * less / power if power > 0.0 else 0.0)
-    memories = max(memory(output.residual(fitted.rig, "fitted", wide=True)) for output in ours)
+    memories = max(memory(output.residual(fitted.rig, part, wide=True)) for output in ours)
     return most / (float(np.mean(left**2)) * memories)
 
 

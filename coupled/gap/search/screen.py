@@ -19,6 +19,7 @@ from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.limits import is_limit, limits
 from coupled.gap.thresholds import (
     RACE_BEHIND,
+    SCREEN_ALIKE,
     SCREEN_FACTORS,
     SCREEN_LESS,
     SCREEN_NEAR,
@@ -27,6 +28,7 @@ from coupled.gap.thresholds import (
     SCREENED,
     SCREENED_BESIDE,
     SCREENED_LEAST,
+    SCREENED_MOST,
 )
 from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
@@ -48,14 +50,16 @@ def screen(
     There is a start for each shape that an effect of several parameters begins from. One without
     a parameter is always among them, unless it leaves far more than there was, and so are those
     named in `always`. Beside an effect more are kept: its size is not right until the other's is
-    known, and so neither is what is left.
+    known, and so neither is what is left. And those that take nearly as much as the best are all
+    kept: which of them is the cause, a signature at one size does not say.
     """
     found = in_threads(lambda effect: screened(case, current, effect), candidates)
     scores = [(*one, effect) for effect, one in zip(candidates, found, strict=True) if one[1]]
     scores.sort(key=lambda item: -item[0])
     near = [k for k, item in enumerate(scores) if item[0] >= SCREEN_NEAR * scores[0][0]]
     many = SCREENED_BESIDE if current.effects else SCREENED
-    most = min(many, max(SCREENED_LEAST, len(near)))
+    alike = sum(item[0] >= SCREEN_ALIKE * scores[0][0] for item in scores[:SCREENED_MOST])
+    most = max(alike, min(many, max(SCREENED_LEAST, len(near))))
     others = (item for item in scores[most:] if not item[2].free or item[2].name in always)
     kept = [*scores[:most], *others]
     return [Screened(effect, starts, taken) for taken, starts, effect in kept]

@@ -13,10 +13,16 @@ from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.candidates import fitted_candidates
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.signals.output import stage_gaps, stage_limits
-from coupled.gap.thresholds import JUST_WITHIN, LEAST_GAIN, RIVAL_GAIN, STRAINED_GAIN
+from coupled.gap.thresholds import (
+    JUST_WITHIN,
+    LEAST_GAIN,
+    RIVAL_GAIN,
+    STRAINED_GAIN,
+    SWITCH_LEAVES,
+)
 
 
 def beside_a_larger(
@@ -70,6 +76,25 @@ def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[C
             # A mark that the other outputs contradict, by settings that it drives to their ends.
             if set(fitted.at_bound) <= set(current.at_bound):
                 return ranked_by_gain(ours, current, [(effect, fitted)])
+    return []
+
+
+def taken_by_switch(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candidate]:
+    """Return the candidate without a number that halves what an output leaves within its limit.
+
+    A floor may be too high, and hide what is no noise. It must gain far more than chance.
+    """
+    for switch in library:
+        if switch.free or switch in current.effects:
+            continue
+        rig = case.with_only(current, (*current.effects, switch))
+        ours = touched(case.outputs, [switch])
+        if not any(one.gap(rig) <= SWITCH_LEAVES * one.gap(current.rig) for one in ours):
+            continue
+        fitted = case.fit((*current.effects, switch), "fitted", current.values, switch)
+        ranked = ranked_by_gain(case.outputs, current, [(switch, fitted)])
+        if ranked[0].gain >= STRAINED_GAIN and set(fitted.at_bound) <= set(current.at_bound):
+            return ranked
     return []
 
 

@@ -18,11 +18,12 @@ from coupled.gap.signals.served import left
 from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.crossing import leaking
+from coupled.rig.recorder import stamped
 from coupled.rig.replay import replay_schedule
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-PRESSURE = "dynamic_pressure_Pa"
+PRESSURE, LOAD = "dynamic_pressure_Pa", "load_factor"
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,20 @@ class Reading:
         """Return the force in N on the control whose force leaks into this one, if recorded."""
         names = [channel(name, "force") for name in leaking(self.control)]
         return [self.record[name] for name in names if name in self.record][:1]
+
+    def load(self) -> Callable[[Rig], Floats | None]:
+        """Return by the rig what load factor pulls at the bob weight; none where not recorded.
+
+        The machine feels it in time: a motion that is stamped late is moved back.
+        """
+        if LOAD not in self.record:
+            return lambda rig: None
+        read, rate_Hz = smoothed(self.record[LOAD]), self.rig.frame_rate
+
+        def felt(rig: Rig) -> Floats:
+            return stamped(read, -rig.flight.motion_stamp * rate_Hz if rig.flight else 0.0)
+
+        return felt
 
     def sensed(self, rig: Rig) -> Sensed:
         """Return what a rig's channels have to do with what they measure."""

@@ -36,8 +36,7 @@ class Imposed:
         self._motion = smoothed(reading.signal(reading.imposed))
         self._level: Noise = reading.heard(reading.imposed)
         self._gradient = reading.gradient()
-        record = reading.record
-        self._load = smoothed(record["load_factor"]) if "load_factor" in record else None
+        self._load = reading.load()
 
     def predict(self, motion: Floats | None = None) -> Predict:
         """Return the prediction for a motion in d at each frame, as read; the record's own."""
@@ -50,7 +49,7 @@ class Imposed:
             true = nodes / read_as.scale_on_nodes(len(nodes))
             if reading.imposed == "deflection":
                 true = nodes - read_as.zero
-            force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load)
+            force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
             read = data.sensing.force_scale * force + data.sensing.force_zero
             read = stamped(read, late_s * rig.frame_rate)

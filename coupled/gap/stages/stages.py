@@ -165,7 +165,7 @@ class Reader(Reading):
         noisy_force, gradient = self.signal("force"), self.gradient()
         force, level = smoothed(noisy_force), self.heard("force")
         computed, second = self.signal("computed"), self.second()
-        load = smoothed(self.record["load_factor"]) if "load_factor" in self.record else None
+        load_of = self.load()
         smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
@@ -189,7 +189,7 @@ class Reader(Reading):
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
                 host = Hosted(services(self), self.missed.under(rig, self.control))
-                driven_by = (pull, gradient, misread + hum, load, second, restart, host)
+                driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
             return at
