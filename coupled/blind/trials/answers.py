@@ -116,6 +116,18 @@ class Answer:
         known = [self.truth.stages, *(one.stages for one in self.truth.readings)]
         return self.guilty in [frozenset(stages) for stages in known]
 
+    def shares(self, stage: str) -> list[tuple[float, float]]:
+        """Return each true effect's share of a stage's power, as said and as it is.
+
+        Where one effect's name is that of two, as a bend that stiffens is of a bend beside it, the
+        two are one.
+        """
+        true = self.truth.budget[stage]
+        within = self.truth.names - self.found.keys()
+        if within and self.found and self.found.keys() <= self.truth.names:
+            return [(sum(self.share(stage, name) for name in true), sum(true.values()))]
+        return [(self.share(stage, name), share) for name, share in true.items()]
+
     def share(self, stage: str, effect: str) -> float:
         """Return the share of a stage's power that it gives an effect, by whatever name."""
         shares = self.budget.get(stage, {})

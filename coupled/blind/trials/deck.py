@@ -23,19 +23,23 @@ from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 VERSIONS = Path(__file__).parent / "versions"
-KNOWN = (1, 2, 3)
+KNOWN = (1, 2, 3, 4)
 DEFAULT = 1  # the version that scores are of
 
 
 @dataclass(frozen=True)
 class Deck:
-    """What the trials of a version are drawn from."""
+    """What the trials of a version are drawn from.
+
+    `built` says that budgets and readings are of the rig as it was built, with what it has besides.
+    """
 
     version: int
     effects: tuple[Kind, ...]
     outsiders: tuple[Kind, ...]
     rigs: Mapping[str, Rig]
     realism: Realism = PLAIN
+    built: bool = False
 
     def kinds(self, category: str) -> tuple[Kind, ...]:
         """Return what a trial of a category may have."""
@@ -54,6 +58,9 @@ def read_deck(version: int) -> Deck:
     folder = VERSIONS / f"v{version}"
     path = folder / "deck.toml"
     table = load_toml(path)
+    if "like" in table:
+        like = read_deck(int(str(table["like"]).removeprefix("v")))
+        return replace(like, version=version, built=table["truth"] == "built")
     homes = VERSIONS / str(table.get("rigs_of", folder.name)) / "rigs"
     rigs = {str(name): read_rig(homes / f"{name}.toml") for name in table["rigs"]}
     return Deck(

@@ -7,7 +7,7 @@ truth may only be named beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
@@ -63,11 +63,19 @@ def _numbers(name: str) -> set[str]:
     return {number.key for number in BY_NAME[name].free} if name in BY_NAME else set()
 
 
-def not_distinguished(rig: Rig, record: Record, effects: Sequence[str]) -> Iterator[Reading]:
+def not_distinguished(
+    rig: Rig,
+    record: Record,
+    effects: Sequence[str],
+    numbers: Mapping[str, Mapping[str, float]] | None = None,
+) -> Iterator[Reading]:
     """Yield the readings of a rig's effects that this record does not tell from them.
 
-    What is left with the other effect fitted is likelier by less than a diagnosis asks for.
+    What is left with the other effect fitted is likelier by less than a diagnosis asks for. The
+    true effect's fit begins at its true `numbers`, by effect, where they are given: one that begins
+    elsewhere may end where it does something else, better by chance.
     """
+    start = _start(numbers or {})
     both_ways = [(pair, False) for one in NEAR for pair in (one, one[::-1])]
     for (name, other), sure in (*both_ways, *((pair, True) for pair in PLAINER)):
         if name not in effects or other in effects:
@@ -76,10 +84,21 @@ def not_distinguished(rig: Rig, record: Record, effects: Sequence[str]) -> Itera
         here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
         outputs = outputs_of(rig, record, "airframe" in shown)
         case = Case(rig, "column", [o for o in outputs if o.stage in shown])
-        right = case.fit([BY_NAME[n] for n in here])
+        right = case.fit([BY_NAME[n] for n in here], start=start)
         wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
         if likelier_by(case.outputs, right, wrong) < RIVAL_GAIN:
             yield reading({other, *effects} - {name}, sure=sure)
+
+
+def _start(numbers: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """Return the values at which a fit begins by the true numbers of effects."""
+    return {
+        BY_NAME[name].value_key(p): min(max(float(given[p.named("column")]), p.low), p.high)
+        for name, given in numbers.items()
+        if name in BY_NAME
+        for p in BY_NAME[name].free
+        if p.named("column") in given
+    }
 
 
 def reading(names: Iterable[str], *, sure: bool) -> Reading:

@@ -122,10 +122,10 @@ def _intervals(right: Sequence[Answer]) -> Intervals:
 def _budget(right: Sequence[Answer]) -> Share:
     """Return how often an effect's share of its stage's power is as the twin's own."""
     off = [
-        abs(answer.share(stage, name) - true)
+        abs(said - true)
         for answer in right
-        for stage, shares in answer.truth.budget.items()
-        for name, true in shares.items()
+        for stage in answer.truth.budget
+        for said, true in answer.shares(stage)
         if abs(true) > NO_SHARE  # it acts there
     ]
     return share(sum(one <= SHARE_NEAR for one in off), len(off))

@@ -25,11 +25,13 @@ Subset = frozenset[str]
 
 
 def true_shares(
-    rig: Rig, records: Mapping[Subset, Record], stages: Sequence[str]
+    rig: Rig, records: Mapping[Subset, Record], stages: Sequence[str], *, apart: bool = False
 ) -> dict[str, dict[str, float]]:
     """Return {stage: {effect: its share of the residual's power}}.
 
-    `records` are the twin's, by the effects that it had: all subsets of all of them.
+    `rig` is what the residuals are of: the nominal one, or the one built. `records` are the twin's,
+    by the effects that it had: all subsets of all of them. With `apart`, a stage is shared
+    out to those of its effects that show there: another that only moves its input stays.
     """
     flown = "airframe" in stages
     outputs = {had: outputs_of(rig, record, flown) for had, record in records.items()}
@@ -39,7 +41,11 @@ def true_shares(
         judged = _judged(stage, outputs[every], rig, every)
         if judged:
             powers = {had: _power(judged, made, rig) for had, made in outputs.items()}
-            found[stage] = _shared(every, powers)
+            shown = _shown(judged, every) if apart else every
+            others = every - shown
+            found[stage] = _shared(
+                shown, {had - others: power for had, power in powers.items() if others <= had}
+            )
     return found
 
 
@@ -54,6 +60,13 @@ def _judged(stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset) ->
     own = [output for output in outputs if output.stage in names]
     wide = [output for output in own if output.gap(rig) > output.limit]
     return wide or sorted(own, key=lambda output: -output.gap(rig))[:1]
+
+
+def _shown(judged: Sequence[Output], effects: Subset) -> Subset:
+    """Return the effects that show in some outputs, all of them where none does."""
+    seen = {output.stage for output in judged}
+    shown = {name for name in effects if name in BY_NAME and seen & {*BY_NAME[name].shows_in}}
+    return frozenset(shown) or effects
 
 
 def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:

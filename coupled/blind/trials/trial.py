@@ -14,7 +14,6 @@ from coupled.blind.trials.readings import not_distinguished, same_law
 from coupled.blind.trials.rigs import DRAWN
 from coupled.blind.trials.shares import true_shares
 from coupled.blind.trials.truth import Sizes, TrueEffect, Truth
-from coupled.blind.twin.conditions import Realism
 from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.setting import (
     Installed,
@@ -111,7 +110,7 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
             known = deck.kinds(plan.category)
             kinds = [known[i] for i in rng.choice(len(known), len(kinds), replace=False)]
         rig = _choose_rig(rng, kinds, pool)
-        begun = fly_clean(_set(rng, rig, kinds, deck.realism)) if rig else None
+        begun = fly_clean(_set(rng, rig, kinds, deck)) if rig else None
         if begun is None:
             continue
         trial = _flown(rng, plan, kinds, *begun)
@@ -120,9 +119,10 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
     raise AssertionError(f"no rig of the pool can be flown with {plan}")
 
 
-def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], realism: Realism) -> Setting:
+def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], deck: Deck) -> Setting:
     """Return a setting; with a wheel where a kind needs one, and in a share of the others."""
-    setting = draw_setting(rng, rig, realism)
+    realism = deck.realism
+    setting = replace(draw_setting(rng, rig, realism), built=deck.built)
     if any(kind.other for kind in kinds) or (realism.wheels and rng.uniform() < realism.wheels):
         return with_other(rng, setting)
     return setting
@@ -190,10 +190,11 @@ def _read_otherwise(
     records = {frozenset[str](): clean.record, frozenset(names): record}
     if len(names) > 1:
         records |= {frozenset([part.put.kind.name]): part.record for part in parts}
+    numbers = {one.name: one.parameters for one in truth.effects} if setting.built else {}
     return replace(
         truth,
-        readings=(*same_law(names), *not_distinguished(setting.rig, record, names)),
-        budget=true_shares(setting.rig, records, truth.stages),
+        readings=(*same_law(names), *not_distinguished(setting.rig, record, names, numbers)),
+        budget=true_shares(setting.known, records, truth.stages, apart=setting.built),
     )
 
 

@@ -81,6 +81,7 @@ class Setting:
     pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
     noise      shape (frames, channels without time), SI
     other      the force on another control, where the record holds it
+    built      whether its truth is of the rig as it was built
     """
 
     rig: Rig
@@ -90,11 +91,37 @@ class Setting:
     noise: Floats
     conditions: Conditions
     other: Other | None = None
+    built: bool = False
 
     def gentler(self) -> Setting:
         """Return the setting with less force."""
         level_N = self.conditions.level_N * GENTLER
         return replace(self, conditions=replace(self.conditions, level_N=level_N))
+
+    @property
+    def known(self) -> Rig:
+        """The rig that a truth is held against: the nominal one, or the one that was built.
+
+        That one has what the nominal rig does not say, and no effect: how far its friction yields,
+        and how late its force and its motion are stamped.
+        """
+        if not self.built:
+            return self.rig
+        column, late = self.rig.controls["column"], self.conditions
+        level_N = max(column.loader.friction, column.loader.breakaway)
+        contact = late.bristles
+        changes: dict[str, float] = {
+            "controls.column.sensing.force_stamp_s": column.sensing.force_stamp + late.force_skew_s
+        }
+        if level_N > 0.0:
+            changes |= {
+                "controls.column.loader.friction_stiffness_N_per_m": contact.stiffness(level_N),
+                "controls.column.loader.friction_elastic_share": contact.elastic_share,
+            }
+        if self.rig.flight is not None:
+            stamp_s = self.rig.flight.motion_stamp + late.motion_skew_s
+            changes["flight.motion_stamp_s"] = stamp_s
+        return self.rig.changed(changes)
 
     def fly(
         self,

@@ -43,8 +43,8 @@ def fitted_candidates(
 ) -> list[Candidate]:
     """Return the effects that show in some outputs, fitted beside the current ones, best first.
 
-    Those named in `always` are fitted however little their signature takes. `ends` are the values at
-    which an earlier round's fits ended, by effect: a fit starts there, too. Another effect found
+    Those named in `always` are fitted however little their signature takes. `ends` are the values
+    at which an earlier round's fits ended, by effect: a fit starts there, too. Another effect found
     since may have made the signature less clear than it was.
     """
     # A law of friction with its contact's numbers as its own is one beside which they are settings.
