@@ -24,7 +24,13 @@ FACTOR = {
     "viscous_damping": {"factor": 1.2},
     "bend": {"bend_m_per_N": 9e-5},
 }
-STAGE = {"inertia": "loader", "viscous_damping": "loader", "bend": "linkage", "cogging": "loader"}
+STAGE = {
+    "stiffening_bend": "linkage",
+    "inertia": "loader",
+    "viscous_damping": "loader",
+    "bend": "linkage",
+    "cogging": "loader",
+}
 STAGE |= {"stribeck_friction": "loader"}
 
 
@@ -206,6 +212,25 @@ def test_a_budgets_shares_are_held_against_the_twins_own() -> None:
         )
         held = score([answer]).budget
         assert (held.right, held.of) == (right, 2)
+
+
+def test_two_effects_that_are_one_by_one_s_name_have_one_share() -> None:
+    """A bend beside one that stiffens: the twin has one bend, and one name is given."""
+    known = replace(
+        truth("pair", "bend", "stiffening_bend"),
+        budget={"linkage": {"bend": 0.42, "stiffening_bend": 0.55}},
+        readings=(Reading(("stiffening_bend",), ("linkage",), True),),
+    )
+    found = {"stiffening_bend": FoundEffect(0.9, {})}
+    stages = frozenset(known.stages)
+    for said, right in ((0.98, 1), (0.55, 0)):
+        shares = {"linkage": {"stiffening_bend": said, "noise": 1.0 - said}}
+        answer = Answer(
+            "r", known, "effect", found, frozenset(found), stages, frozenset(), 0.99, shares
+        )
+        assert answer.exact
+        held = score([answer]).budget
+        assert (held.right, held.of) == (right, 1)
 
 
 def test_brier_and_reliability_by_hand(tmp_path: Path) -> None:

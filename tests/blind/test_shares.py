@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from coupled.blind.trials.deck import read_deck
+from coupled.blind.trials.make import Numbers, make_one
 from coupled.blind.trials.readings import same_law
-from coupled.blind.trials.shares import _judged, _shared
-from coupled.blind.trials.trial import Plan, draw_trial
+from coupled.blind.trials.shares import _judged, _shared, _shown
+from coupled.blind.trials.trial import Plan, draw_trial, plans
+from coupled.blind.twin.setting import draw_setting
 from coupled.gap.signals.output import Output
 from tests.support.rigs import bench
 
@@ -41,6 +45,65 @@ def test_a_stage_without_an_output_is_judged_where_its_effects_show() -> None:
     assert [output.stage for output in seen] == ["linkage"]
     both = _judged("sensing", outputs, bench({}), frozenset(["force_scale"]))
     assert [output.stage for output in both] == ["loader", "linkage"]
+
+
+def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it() -> None:
+    still = np.zeros(2400)
+    surface = Output("surface", "elevator_rad", still, lambda rig: still, 1.0, 120.0)
+    both = frozenset(("surface_rate_limit", "viscous_damping"))
+    assert _shown([surface], both) == {"surface_rate_limit"}
+    assert _shown([surface], frozenset(["flutter"])) == {"flutter"}  # an outsider has no outputs
+
+
+def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
+    deck = read_deck(4)
+    assert (deck.effects, deck.outsiders, deck.realism) == (
+        read_deck(3).effects,
+        read_deck(3).outsiders,
+        read_deck(3).realism,
+    )
+    rig = deck.rigs["b747-rigid"].changed({"controls.column.loader.friction_N": 3.0})
+    drawn = draw_setting(np.random.default_rng(2), rig, deck.realism)
+    late = replace(drawn.conditions, force_skew_s=2e-4, motion_skew_s=3e-4)
+    drawn = replace(drawn, conditions=late)
+    assert drawn.known is rig  # as the first versions have it
+    known = replace(drawn, built=True).known
+    column, length_m = known.controls["column"], drawn.conditions.presliding_m
+    assert length_m is not None
+    assert column.loader.friction_stiffness == pytest.approx(3.0 / length_m)
+    assert column.loader.friction_elastic_share == drawn.conditions.elastic_share
+    assert column.sensing.force_stamp == 2e-4
+    assert known.flight is not None
+    assert known.flight.motion_stamp == 3e-4
+    smooth = replace(drawn, rig=rig.changed({"controls.column.loader.friction_N": 0.0}), built=True)
+    assert smooth.known.controls["column"].loader.friction_stiffness == 0.0
+
+
+@pytest.mark.slow
+def test_what_a_rig_has_besides_takes_no_share_of_an_effect() -> None:
+    """Of a gap of 4.1 floors a gradient holds 0.96. By the nominal rig it was 0.47: contact and
+    gradient make up for each other in part, and what the contact leaves alone was taken off whole.
+    """
+    for version, low, high in ((3, 0.45, 0.50), (4, 0.95, 0.97)):
+        numbers = Numbers(2035, 600, 24, version)
+        deck = read_deck(version)
+        plan = plans(np.random.default_rng([2035, 1]), 600, deck)[114]
+        _, truth, _ = make_one(numbers, 114, plan)
+        assert truth.names == {"gradient_error"}
+        assert low < truth.budget["loader"]["gradient_error"] < high
+
+
+@pytest.mark.slow
+def test_a_reading_begins_at_the_true_numbers() -> None:
+    """A mode of 54 Hz is a bend by 120 frames a second. Its fit from elsewhere ended at 3.5 Hz.
+
+    What it did there to the noise passed for what tells it from a bend.
+    """
+    numbers = Numbers(2035, 600, 24, 4)
+    plan = plans(np.random.default_rng([2035, 1]), 600, read_deck(4))[43]
+    _, truth, _ = make_one(numbers, 43, plan)
+    assert truth.names == {"structural_mode"}
+    assert [(one.names, one.sure) for one in truth.readings] == [(("bend",), True)]
 
 
 def test_friction_that_yields_is_friction() -> None:

@@ -54,7 +54,7 @@ def test_a_richer_law_is_not_fitted_where_the_plain_one_leaves_noise(tmp_path: P
     fitted = [(PLAIN, plainly(case))]
     assert laws.leaves_only_noise(case, *fitted[0])
     for law in (STRIBECK, UNEVEN):
-        foretold = laws._foretold(case, law, *fitted[0])
+        foretold = laws.foretold(case, law, *fitted[0])
         assert foretold is not None and 0.0 <= foretold < SIMPLER_GAIN
         assert not laws.may_gain(case, law, fitted)
     assert laws.may_gain(case, BY_NAME["load_friction"], fitted)  # it does not hold the plain one
@@ -69,7 +69,7 @@ def test_a_richer_law_is_not_fitted_where_the_plain_one_leaves_noise(tmp_path: P
 def test_a_breakaway_that_shows_is_foretold_as_its_fit_finds_it(tmp_path: Path) -> None:
     case = judged(tmp_path, "breaks away a little")
     plain = plainly(case)
-    foretold = laws._foretold(case, STRIBECK, PLAIN, plain)
+    foretold = laws.foretold(case, STRIBECK, PLAIN, plain)
     assert foretold is not None and foretold > 2.0 * SIMPLER_GAIN
     starts = laws.law_starts(case, STRIBECK, [], [(PLAIN, plain)])
     fits = [(STRIBECK, case.fit((STRIBECK,), "fitted", start, STRIBECK)) for start in starts]
@@ -80,7 +80,7 @@ def test_a_law_that_cannot_be_tried_is_fitted(tmp_path: Path) -> None:
     """Where the slopes of the plain one are not known, nothing is foretold."""
     case = judged(tmp_path, "plain")
     unknown = replace(plainly(case), slopes={})
-    assert laws._foretold(case, STRIBECK, PLAIN, unknown) is None
+    assert laws.foretold(case, STRIBECK, PLAIN, unknown) is None
     assert laws.may_gain(case, STRIBECK, [(PLAIN, unknown)])
 
 

@@ -70,6 +70,20 @@ def test_what_an_effect_leaves_within_the_limit_is_no_other_s() -> None:
     assert small._just_within(case, replace(current, effects=())) == {"loader"}
 
 
+@pytest.mark.parametrize(("measured", "named"), [("arc", ["arc_geometry"]), ("noise", [])])
+def test_a_switch_that_halves_what_a_floor_hides_is_an_effect(
+    measured: str, named: list[str]
+) -> None:
+    """A floor of 2.3 times the noise hid an arc that quadrupled the residual: 1.17 of 1.2."""
+
+    def predict(rig: Rig) -> Floats:
+        return np.asarray(1.1 * FIRST * rig.controls["column"].loader.arc_geometry)
+
+    case = answered(1.1 * FIRST * (measured == "arc") - 0.57 * NOISE, predict, "linkage")
+    assert case.gaps(case.nominal)["linkage"] < case.outputs[0].limit
+    assert [step.effect.name for step in searched(case, EFFECTS).steps] == named
+
+
 def test_beside_dry_friction_a_remainder_is_no_effect() -> None:
     """How a contact yields leaves as much, and other effects would take it up."""
     rubbing = bench({"friction_N": 2.0, "friction_stiffness_N_per_m": 1e4})

@@ -1,0 +1,141 @@
+"""What half of a record leaves open, or a hollow hides, is asked on all of it or begun again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search import information, richer, screen
+from coupled.gap.search.candidates import _from_ends
+from coupled.gap.search.case import Case
+from coupled.gap.search.contest import told_apart
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.richer import richer_on_all
+from coupled.gap.search.rivals import Found
+from coupled.gap.search.screen import Screened
+from coupled.gap.signals.output import Output
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import RICHER_GAIN, SCREENED_MOST
+from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
+from tests.support.rigs import bench
+
+PLAIN, STRIBECK = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
+OFFSET, WEIGHT = BY_NAME["force_offset"], BY_NAME["bob_weight"]
+FIRST, SECOND, NOISE = np.random.default_rng(8).normal(size=(3, 3000))
+
+
+def found_plain(folder: Path, breakaway_N: float) -> tuple[Case, Found]:
+    """Return the loader of a bench with friction of 2 N that breaks away, and plain friction."""
+    rig = nominal_rig(False)
+    values = {"friction_N": 2.0, "breakaway_N": breakaway_N, "stribeck_{d}_per_s": 4e-3}
+    record = made(folder, rig, {"stribeck_friction": values}, 31)
+    outputs = Reader(rig, record, "column", surface_points).outputs()
+    loader = [one.halved(rig) for one in outputs if one.stage == "loader"]
+    return Case(rig, "column", loader), Found(PLAIN, 300.0, 0.97, ())
+
+
+@pytest.mark.slow
+def test_a_richer_law_of_friction_takes_the_plain_one_s_place_by_all_of_the_record(
+    tmp_path: Path,
+) -> None:
+    """Three records of seed 2035 held breakaways, and plain friction was named with 0.97."""
+    case, step = found_plain(tmp_path, 2.5)
+    current = case.fit((PLAIN,))
+    [one], last = richer_on_all(case, EFFECTS, [step], current)
+    assert (one.effect, last.effects) == (STRIBECK, (STRIBECK,))
+    assert last.values["stribeck_friction.breakaway_N"] == pytest.approx(2.5, rel=0.1)
+    assert last.cost < current.cost
+    assert one.probability > 0.99
+
+
+def test_plain_friction_stays_plain_by_all_of_the_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Little is foretold, so nothing is fitted; where all is fitted, it gains too little."""
+    case, step = found_plain(tmp_path, 2.0)
+    current = case.fit((PLAIN,))
+    monkeypatch.setattr(richer, "little_richer", lambda *_: pytest.fail("fitted"))
+    assert richer_on_all(case, EFFECTS, [step], current) == ([step], current)
+    much = replace(current, cost=current.cost)
+    monkeypatch.setattr(richer, "_fitted", lambda *_: much)
+    assert RICHER_GAIN > 0.0
+    assert richer_on_all(case, EFFECTS, [step], current) == ([step], current)
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.2, True), (0.0, False)])
+def test_a_rival_beside_dry_friction_is_told_apart_by_all_of_the_record(
+    apart: float, told: bool
+) -> None:
+    """A scale of the force stood beside friction by load, which all of the record refutes by 10."""
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + SECOND * apart))
+
+    case = Case(bench(), "column", [Output("loader", "x", FIRST + NOISE, predict, 1.0, 120.0)])
+    case = replace(case, nominal=bench({"friction_N": 2.0}))
+    rival = Candidate(197.0, WEIGHT, case.fit((WEIGHT,), "fitted"))
+    step = Found(OFFSET, 200.0, 0.95, (rival,))
+    one, last = told_apart(case, case.fit((OFFSET,)), step)
+    assert (not one.rivals) == told
+    assert (one.probability > 0.96) == told
+    assert last.effects == (OFFSET,)
+
+
+def test_a_fit_starts_where_its_last_one_ended_too() -> None:
+    """A bend with hysteresis of 10 N ended at 61 beside a hum, where it said nothing, and was lost.
+
+    The round before had ended at 10. Laws of friction begin at the plain one's end.
+    """
+    first = [{"a": 1.0}]
+    ends = {"bend_hysteresis": {"a": 2.0}, "bend": {"a": 3.0}, "stribeck_friction": {"a": 4.0}}
+    for name, count in (("bend_hysteresis", 2), ("bend", 1), ("stribeck_friction", 1)):
+        one = _from_ends(Screened(BY_NAME[name], first, 1.0), ends)
+        assert one.starts == [*first, ends[name]][:count]
+    unknown = Screened(BY_NAME["bend_hysteresis"], first, 1.0)
+    assert _from_ends(unknown, {}) == unknown
+
+
+def test_all_whose_signature_takes_nearly_as_much_as_the_best_are_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A gradient that took 0.85 of what the best took was the seventh of six."""
+    case = Case(
+        bench(), "column", [Output("loader", "x", NOISE, lambda _: 0.0 * NOISE, 1.0, 120.0)]
+    )
+    loader = [e for e in EFFECTS if e.stage == "loader" and e.free and not e.reserve]
+    for near, kept in ((8, 8), (len(loader), SCREENED_MOST), (2, 6)):
+        takes = {e.name: 100.0 - k if k < near else 60.0 for k, e in enumerate(loader)}
+        monkeypatch.setattr(screen, "screened", lambda _, __, e, t=takes: (t[e.name], [{}]))
+        assert len(screen.screen(case, case.fit(()), loader)) == kept
+
+
+def test_of_servos_known_by_their_dead_time_alone_the_plainer_is_asked() -> None:
+    """A dead time of 20 ms was named as one of a servo with another damping, which it has not."""
+    delay, tuning = BY_NAME["servo_delay"], BY_NAME["servo_tuning"]
+    for found in ([delay, tuning], [tuning, delay]):
+        assert information._plainest(found) == [delay]
+    assert information._plainest([tuning]) == [tuning]
+    assert information._plainest([OFFSET]) == []
+
+
+@pytest.mark.slow
+def test_a_motion_that_is_stamped_late_opens_no_gap_of_the_loader(tmp_path: Path) -> None:
+    """The machine feels its bob weight in time; the record has the load factor late."""
+    weight = {"controls.column.loader.bob_weight_N_per_g": 15.0}
+    nominal = nominal_rig(True).changed(weight)
+    record = made(tmp_path, nominal, {"motion_skew": {"delay_s": 0.1}}, 5)
+    [loader] = [
+        one
+        for one in Reader(nominal, record, "column", surface_points).outputs()
+        if one.stage == "loader"
+    ]
+    late = nominal.changed({"flight.motion_stamp_s": 0.1})
+    assert loader.gap(nominal) > 2.0 * loader.limit
+    assert loader.gap(late) < loader.limit
