@@ -17,7 +17,8 @@ from coupled.gap.search.gain import Candidate
 from coupled.gap.search.richer import richer_on_all
 from coupled.gap.search.rivals import Found
 from coupled.gap.search.screen import Screened
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, stage_gaps, stage_limits
+from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import RICHER_GAIN, SCREENED_MOST
@@ -139,3 +140,16 @@ def test_a_motion_that_is_stamped_late_opens_no_gap_of_the_loader(tmp_path: Path
     late = nominal.changed({"flight.motion_stamp_s": 0.1})
     assert loader.gap(nominal) > 2.0 * loader.limit
     assert loader.gap(late) < loader.limit
+
+
+@pytest.mark.slow
+def test_air_that_is_known_by_a_late_motion_moved_before(tmp_path: Path) -> None:
+    """A gust beside a motion that is 83 ms late left 1.9 floors by the true numbers of both."""
+    nominal = nominal_rig(True)
+    gust = {"vertical_gust": {"rms_m_per_s": 0.5}, "motion_skew": {"delay_s": 0.08}}
+    record = made(tmp_path, nominal, gust, 5)
+    real = nominal.changed({"flight.gust_rms_m_per_s": 0.5, "flight.motion_stamp_s": 0.08})
+    outputs = airframe_outputs(real, record)
+    assert stage_gaps(outputs, real)["airframe"] < stage_limits(outputs)["airframe"]
+    in_time = real.changed({"flight.motion_stamp_s": 0.0})
+    assert stage_gaps(outputs, in_time)["airframe"] > 3.0 * stage_limits(outputs)["airframe"]

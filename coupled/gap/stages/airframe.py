@@ -90,8 +90,10 @@ class Model:
         """Return the compared channels and the trim as `rig` has them; None where it has none."""
         assert rig.flight is not None
         flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        asked = (flight, self.compared, _digest(self.moved))
-        return self.flights.of(asked, lambda: self.fly(flight, self.moved))
+        # The air is known by the motion as recorded, and as late.
+        late = rig.flight.motion_stamp * self.rig.frame_rate if flight.gust_rms > 0.0 else 0.0
+        asked = (flight, self.compared, _digest(self.moved), late)
+        return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
 
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
         """Return by how much errors of the surfaces' motion and of the air change the flight."""
@@ -102,15 +104,17 @@ class Model:
         assert flown is not None  # as without
         return flown.motion - plain.motion
 
-    def fly(self, flight: Flight, moved: Sequence[Moved], with_error: bool = False) -> Flown:
+    def fly(
+        self, flight: Flight, moved: Sequence[Moved], with_error: bool = False, late: float = 0.0
+    ) -> Flown:
         """Return the flight that the surfaces make.
 
-        `with_error` adds to the air a sample of its error.
+        `with_error` adds to the air a sample of its error; so many frames `late` is it known.
         """
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
             moves = self.air.speed * (flight.gust_rms / self.air.rms)
-            moves = moves + self.air.error if with_error else moves
+            moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
         controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
         return fly_open_loop(flight, rate_Hz, controls, moved, self.compared, air)
