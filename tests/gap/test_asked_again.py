@@ -12,7 +12,7 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import information, richer, screen
 from coupled.gap.search.candidates import _from_ends
 from coupled.gap.search.case import Case
-from coupled.gap.search.contest import told_apart
+from coupled.gap.search.contest import distinguished
 from coupled.gap.search.gain import Candidate
 from coupled.gap.search.richer import richer_on_all
 from coupled.gap.search.rivals import Found
@@ -70,7 +70,7 @@ def test_plain_friction_stays_plain_by_all_of_the_record(
 
 
 @pytest.mark.parametrize(("apart", "told"), [(0.2, True), (0.0, False)])
-def test_a_rival_beside_dry_friction_is_told_apart_by_all_of_the_record(
+def test_a_rival_beside_dry_friction_is_distinguished_by_all_of_the_record(
     apart: float, told: bool
 ) -> None:
     """A scale of the force stood beside friction by load, which all of the record refutes by 10."""
@@ -83,7 +83,7 @@ def test_a_rival_beside_dry_friction_is_told_apart_by_all_of_the_record(
     case = replace(case, nominal=bench({"friction_N": 2.0}))
     rival = Candidate(197.0, WEIGHT, case.fit((WEIGHT,), "fitted"))
     step = Found(OFFSET, 200.0, 0.95, (rival,))
-    one, last = told_apart(case, case.fit((OFFSET,)), step)
+    one, last = distinguished(case, case.fit((OFFSET,)), step)
     assert (not one.rivals) == told
     assert (one.probability > 0.96) == told
     assert last.effects == (OFFSET,)
@@ -95,10 +95,11 @@ def test_a_fit_starts_where_its_last_one_ended_too() -> None:
     The round before had ended at 10. Laws of friction begin at the plain one's end.
     """
     first = [{"a": 1.0}]
-    ends = {"bend_hysteresis": {"a": 2.0}, "bend": {"a": 3.0}, "stribeck_friction": {"a": 4.0}}
     for name, count in (("bend_hysteresis", 2), ("bend", 1), ("stribeck_friction", 1)):
-        one = _from_ends(Screened(BY_NAME[name], first, 1.0), ends)
-        assert one.starts == [*first, ends[name]][:count]
+        effect = BY_NAME[name]
+        end = {effect.value_key(p): 2.0 for p in effect.free}
+        one = _from_ends(Screened(effect, first, 1.0), {name: {**end, "another's": 3.0}})
+        assert one.starts == [*first, end][:count]
     unknown = Screened(BY_NAME["bend_hysteresis"], first, 1.0)
     assert _from_ends(unknown, {}) == unknown
 

@@ -44,7 +44,9 @@ def test_each_guilty_output_has_candidates_of_its_own(monkeypatch: pytest.Monkey
     asked: list[set[str]] = []
     bend = BY_NAME["bend"]
 
-    def candidates(case: Case, current: object, library: object, at: set[str]) -> list[Candidate]:
+    def candidates(
+        case: Case, current: object, library: object, at: set[str], **_: object
+    ) -> list[Candidate]:
         asked.append(at)
         first = at == {"linkage"} and {"linkage"} not in asked[:-1]
         found = fit(rig, "column", outputs, [bend])
@@ -66,7 +68,9 @@ def test_an_effect_in_reserve_takes_the_place_of_one_whose_numbers_it_holds(
     wide = output("linkage", 40.0)
     queue = [BY_NAME["servo_lag"], BY_NAME["servo_tuning"]]
 
-    def candidates(case: Case, current: Fit, library: object, at: set[str]) -> list[Candidate]:
+    def candidates(
+        case: Case, current: Fit, library: object, at: set[str], **_: object
+    ) -> list[Candidate]:
         effect = queue.pop(0) if queue else None
         beside = () if effect is None else (*current.effects, effect)
         return [Candidate(50.0, effect, case.fit(beside))] if effect else []

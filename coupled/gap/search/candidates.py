@@ -30,7 +30,7 @@ from coupled.gap.thresholds import (
 from coupled.parallel import in_threads
 
 Fits = list[tuple[Effect, Fit]]
-Ends = Mapping[str, dict[str, float]]
+Ends = Mapping[str, Mapping[str, float]]
 
 
 def fitted_candidates(
@@ -67,10 +67,10 @@ def fitted_candidates(
 
 def _from_ends(one: Screened, ends: Ends) -> Screened:
     """Return a screened effect that starts where its last fit ended, too; not a law of friction."""
-    end = ends.get(one.effect.name)
-    if end is None or one.effect.dry or len(one.effect.free) < 2:
+    if one.effect.name not in ends or one.effect.dry or len(one.effect.free) < 2:
         return one
-    return one._replace(starts=[*one.starts, end])
+    end, keys = ends[one.effect.name], [one.effect.value_key(p) for p in one.effect.free]
+    return one._replace(starts=[*one.starts, {key: end[key] for key in keys}])
 
 
 BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")

@@ -8,14 +8,14 @@ log-likelihood ratio by effective samples, the frames divided by the residual's 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.candidates import Ends, fitted_candidates
 from coupled.gap.search.case import Case
-from coupled.gap.search.contest import overtaken, own_values, switched, told_apart
+from coupled.gap.search.contest import distinguished, overtaken, switched
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
@@ -60,13 +60,13 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
     steps: list[Found] = []
     rounds: list[dict[str, float]] = []
     idle: set[str] = set()  # guilty outputs for which nothing was found
-    ends: dict[str, dict[str, float]] = {}  # where each candidate's last fit ended
+    ends: dict[str, Mapping[str, float]] = {}  # where each candidate's last fit ended
     stood = [settled]  # the fits that the search has stood at
     circled, halves = False, None
     while len(steps) < MOST_EFFECTS:
         ranked = _round(case, settled, current, library, idle, ends)
         rounds.append({candidate.effect.name: candidate.gain for candidate in ranked})
-        ends |= {one.effect.name: own_values(one.effect, one.fit) for one in ranked}
+        ends |= {one.effect.name: one.fit.values for one in ranked}
         if not ranked or ranked[0].gain < LEAST_GAIN:
             break
         best = _simplest(case, settled, ranked)
@@ -126,7 +126,7 @@ def _looked_over(
         one, current = switched(case, library, current, step)
         one, current = overtaken(case, current, one)
         one, current = separated(case, current, one)
-        one, current = told_apart(case, current, one)
+        one, current = distinguished(case, current, one)
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current

@@ -82,7 +82,7 @@ def switched(case: Case, library: Sequence[Effect], current: Fit, step: Found) -
     return step, current
 
 
-def told_apart(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
+def distinguished(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
     """Return a step without the rivals that all of the record tells from it beside dry friction.
 
     Either may stand in a hollow there, so that each is begun from where the other ended, and with
