@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from coupled.blind.trials import deck as decks
-from coupled.blind.trials.deck import KNOWN, VERSIONS, read_deck
+from coupled.blind.trials.deck import DEFAULT, KNOWN, VERSIONS, read_deck
 from coupled.blind.trials.key import Seal, check_seal, digest, read_key, read_seal
 from coupled.blind.trials.make import make
 from coupled.blind.trials.measure import stage_gaps
@@ -95,7 +95,7 @@ def test_a_set_is_whole_and_gives_nothing_away(made: Path) -> None:
 def test_a_key_reads_back_as_it_was_written(made: Path) -> None:
     path = made.with_name("set.key.json")
     key = read_key(path)
-    assert (key.version, key.seed) == (1, SEED)
+    assert (key.version, key.seed) == (DEFAULT, SEED)
     assert key.text() == path.read_text()
     for truth in key.records.values():
         assert truth_from(json.loads(json.dumps(truth.as_dict()))) == truth
@@ -134,13 +134,22 @@ def test_the_same_seed_gives_the_same_bytes_whatever_is_shipped_and_after_a_stop
         assert (again / name).read_bytes() == (made / name).read_bytes(), name
 
 
-def test_a_version_draws_what_it_drew(grown: None) -> None:
-    # Of the draws of seed 8 by the sources that the score in docs/blind-score.json is of.
-    planned, texts = drawn(1, 8, 400, 3)
-    told = repr([(plan.category, plan.names) for plan in planned])
-    assert hashlib.sha256(told.encode()).hexdigest() == (
-        "310f811c6c9ca4106aa41d0d99bb831d61abb29f17bd157e11afe68abc58eaaf"
-    )
+@pytest.mark.parametrize(
+    ("version", "plans_are"),
+    [
+        (1, "310f811c6c9ca4106aa41d0d99bb831d61abb29f17bd157e11afe68abc58eaaf"),
+        (3, "9344992930de43cd1d77cdde8b1c8daf00b14fca4f6ffdebcbea42ee37420d6b"),
+        (
+            4,
+            "9344992930de43cd1d77cdde8b1c8daf00b14fca4f6ffdebcbea42ee37420d6b",
+        ),  # record for record
+    ],
+)
+def test_a_version_draws_what_it_drew(grown: None, version: int, plans_are: str) -> None:
+    # Of the draws of seed 8 by the sources of which each version's first score is.
+    planned, texts = drawn(version, 8, 400, 3)
+    said = repr([(plan.category, plan.names) for plan in planned])
+    assert hashlib.sha256(said.encode()).hexdigest() == plans_are
     assert len(texts) == 24
     digest_of_rigs = hashlib.sha256("".join(texts).encode()).hexdigest()
     assert digest_of_rigs == "b0317ea8e786518566b1668128427498092f356912d0812fddc91123d174eb3a"
@@ -175,12 +184,13 @@ def test_a_finished_make_may_be_called_again(made: Path) -> None:
     assert "finished already" in done.stdout
     assert not parts.exists()
     for seed, records, rigs, version in (
-        (SEED + 1, RECORDS, 2, 1),
-        (SEED, RECORDS + 1, 2, 1),
-        (SEED, RECORDS, 1, 1),
-        *((SEED, RECORDS, 2, other) for other in KNOWN if other != 1),
+        (SEED + 1, RECORDS, 2, DEFAULT),
+        (SEED, RECORDS + 1, 2, DEFAULT),
+        (SEED, RECORDS, 1, DEFAULT),
+        *((SEED, RECORDS, 2, other) for other in KNOWN if other != DEFAULT),
     ):
-        with pytest.raises(InputError, match="a finished set of 3 records and 2 rigs of version 1"):
+        finished = f"a finished set of 3 records and 2 rigs of version {DEFAULT}"
+        with pytest.raises(InputError, match=finished):
             make(made, key, seed, records, rigs, quiet, version=version)
     with pytest.raises(InputError, match="whose key is not"):
         make(made, made / "another.json", SEED, RECORDS, 2, quiet)

@@ -24,7 +24,7 @@ from coupled.schema import load_toml
 
 VERSIONS = Path(__file__).parent / "versions"
 KNOWN = (1, 2, 3, 4)
-DEFAULT = 1  # the version that scores are of
+DEFAULT = 4  # the newest
 
 
 @dataclass(frozen=True)
