@@ -211,6 +211,9 @@ RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only a
 MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leave
 SIMPLER_GAIN = 6.0  # chosen: by which more numbers must win in the loader where fewer close the gap
 SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dry friction is exact
+FAR_BELOW_NOISE = (
+    0.7  # chosen: gap by the floors of what was found, under which no setting is at fault
+)
 JUST_WITHIN = 0.5  # chosen: of what a limit allows over noise, from which settings may hide a gap
 STRAINED_GAIN = 30.0  # chosen: by which an effect must beat settings at their ends within a limit
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades

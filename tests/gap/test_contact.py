@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from coupled.gap.search.anew import with_contact_anew
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import _with_contact_anew
 from coupled.gap.search.contact import allowing_for_contact, contact_start
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import GUILTY_FROM, MISMATCH
@@ -78,8 +78,8 @@ def test_a_contact_is_sought_anew_beside_what_it_was_found_without() -> None:
     hollow = nominal.changed({"controls.column.loader.friction_stiffness_N_per_m": 4.0 / 6e-6})
     held = replace(best, rig=hollow, values={**best.values, length: 6e-6}, cost=1e6)
     assert case.gaps(held.rig)["loader"] > 2.0
-    found = _with_contact_anew(case, held)
+    found = with_contact_anew(case, held)
     assert found.values[length] == pytest.approx(true_m, rel=0.1)
     assert case.gaps(found.rig)["loader"] < 1.1
     # Within its limit it stays as it was found.
-    assert _with_contact_anew(case, found) is found
+    assert with_contact_anew(case, found) is found

@@ -67,9 +67,10 @@ def fitted_candidates(
 
 def _from_ends(one: Screened, ends: Ends) -> Screened:
     """Return a screened effect that starts where its last fit ended, too; not a law of friction."""
-    if one.effect.name not in ends or one.effect.dry or len(one.effect.free) < 2:
+    end, keys = ends.get(one.effect.name, {}), [one.effect.value_key(p) for p in one.effect.free]
+    # One that was asked by its level alone has no other numbers there.
+    if one.effect.dry or len(keys) < 2 or not end.keys() >= set(keys):
         return one
-    end, keys = ends[one.effect.name], [one.effect.value_key(p) for p in one.effect.free]
     return one._replace(starts=[*one.starts, {key: end[key] for key in keys}])
 
 

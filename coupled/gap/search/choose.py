@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.settings import is_dry
+from coupled.gap.search.anew import with_contact_anew, with_settings_anew
 from coupled.gap.search.candidates import Ends, fitted_candidates
 from coupled.gap.search.case import Case
 from coupled.gap.search.contest import distinguished, overtaken, switched
@@ -73,7 +74,7 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
         steps.append(found_by(best, ranked))
         halves = found = best.fit
         current = case.fit((*current.effects, best.effect), start=found.values, near=found)
-        current = _with_contact_anew(case, current)
+        current = with_settings_anew(case, with_contact_anew(case, current))
         idle -= set(best.effect.shows_in)
         held = [step for step in steps if _holds(best.effect, step.effect)]
         if held:
@@ -130,18 +131,6 @@ def _looked_over(
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current
-
-
-def _with_contact_anew(case: Case, current: Fit) -> Fit:
-    """Return a fit, or the one with the contact of dry friction sought anew if that leaves less.
-
-    Where the loader is over its limit: what the contact was found beside lacked this effect.
-    """
-    start = case.but_for_contact(current.values)
-    over = case.gaps(current.rig).get("loader", 0.0) > stage_limits(case.outputs).get("loader", 0.0)
-    if not over or start == current.values:
-        return current
-    return min([current, case.fit(current.effects, start=start)], key=lambda one: one.cost)
 
 
 def _is_open(case: Case, effect: Effect, current: Fit) -> bool:

@@ -17,6 +17,7 @@ from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
+    FAR_BELOW_NOISE,
     JUST_WITHIN,
     LEAST_GAIN,
     RIVAL_GAIN,
@@ -50,7 +51,11 @@ def strained(case: Case, current: Fit, library: Sequence[Effect]) -> list[Candid
     over its limit is only just within. None but where the best is surely beyond its setting, or
     gains far more than any setting there and needs none at its end.
     """
-    at_end = _at_end(case, current)
+    # Where far less is left than the noise known beside what was found, as of air whose motion is
+    # known by an error, a setting at its end says nothing.
+    lost = {at for at, gap in case.gaps(current.rig).items() if gap < FAR_BELOW_NOISE}
+    held = _at_end(case, current).items()
+    at_end = {name: one for name, one in held if not lost & set(one.shows_in)}
     shown = {s for one in at_end.values() for s in one.shows_in} | _just_within(case, current)
     ranked = fitted_candidates(case, current, library, shown, at_end)
     relieved = _relieves(ranked, list(at_end.values()))
