@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from coupled.blind.trials import NEWEST
 from coupled.cli.app import JsonOption, app, check_cluster
 from coupled.cli.progress import progress
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
@@ -30,7 +31,7 @@ def make(
     ] = None,
     records: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 300,
     rigs: Annotated[int, typer.Option(min=0, max=999, help="Rigs beside the version's own.")] = 24,
-    trials: Annotated[int, typer.Option(min=1, help="Version of the trials.")] = 1,
+    trials: Annotated[int, typer.Option(min=1, help="Version of the trials.")] = NEWEST,
     workers: Annotated[
         int | None,
         typer.Option(

@@ -222,3 +222,19 @@ def test_a_servo_s_damping_is_asked_where_its_dead_time_was_found() -> None:
     assert (law, least) == (tuning, RIVAL_GAIN)
     assert [start[tuning.value_key(p)] for p in tuning.free] == [0.02, 1.02, 1.0]
     assert not list(richer._richer(case, EFFECTS, tuning, replace(current, effects=(tuning,))))
+
+
+def test_a_law_of_friction_is_not_held_against_what_has_no_contact() -> None:
+    """Of a damper friction by load is as well a damping: its contact's numbers made it likelier."""
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.friction * FIRST + loader.bob_weight * (FIRST + SECOND))
+
+    case = Case(bench(), "column", [Output("loader", "x", FIRST + NOISE, predict, 1.0, 120.0)])
+    rival = Candidate(199.0, WEIGHT, case.fit((WEIGHT,), "fitted"))
+    step = Found(PLAIN, 200.0, 0.5, (rival,))
+    assert distinguished(case, case.fit((PLAIN,)), step)[0] == step
+    rubbing = replace(case, nominal=bench({"friction_N": 1e-6}))
+    one, _ = distinguished(rubbing, rubbing.fit((PLAIN,)), step)
+    assert not one.rivals

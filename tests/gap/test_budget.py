@@ -34,7 +34,8 @@ def shares(found: Diagnosis, stage: str) -> dict[str, float]:
 
 def without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Take an effect out of the library: it is then one that the library lacks."""
-    monkeypatch.setattr(diagnosing, "EFFECTS", tuple(e for e in EFFECTS if e.name != name))
+    known = [e for e in EFFECTS if e.name != name]
+    monkeypatch.setattr(diagnosing, "library_of", lambda *_: known)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from coupled.blind.trials import NEWEST
 from coupled.blind.twin.conditions import PLAIN, Realism
 from coupled.blind.twin.effects import EFFECTS
 from coupled.blind.twin.kinds import Kind
@@ -23,8 +24,8 @@ from coupled.rig.rigfile import read_rig
 from coupled.schema import load_toml
 
 VERSIONS = Path(__file__).parent / "versions"
-KNOWN = (1, 2, 3, 4)
-DEFAULT = 4  # the newest
+KNOWN = tuple(range(1, NEWEST + 1))
+DEFAULT = NEWEST
 
 
 @dataclass(frozen=True)

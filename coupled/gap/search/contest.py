@@ -86,15 +86,20 @@ def distinguished(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
     """Return a step without the rivals that all of the record tells from it beside dry friction.
 
     Either may stand in a hollow there, so that each is begun from where the other ended, and with
-    its contact sought anew. One of more numbers is not asked: it can bend farther.
+    its contact sought anew. One of more numbers is not asked, since it can bend farther; nor, on a
+    rig that does not rub, what has no contact against a law of friction.
     """
-    if not is_dry(case.nominal, case.control) and not any(one.dry for one in current.effects):
+    rubs = is_dry(case.nominal, case.control)
+    rubs |= any(one.dry for one in current.effects if one is not step.effect)
+    if not rubs and not step.effect.dry:
         return step, current
     left = list[Candidate]()
     odds = 1.0 / step.probability - 1.0
     for rival in step.rivals:
         fits = None
-        if len(rival.effect.free) <= len(step.effect.free) and rival.effect not in current.effects:
+        as_free = len(rival.effect.free) <= len(step.effect.free)
+        as_free &= rubs or rival.effect.dry == step.effect.dry
+        if as_free and rival.effect not in current.effects:
             own = own_values(rival.effect, rival.fit)
             starts = [{**current.values, **own}, {**current.values, **rival.fit.values}]
             starts.append(case.but_for_contact(starts[0]))
