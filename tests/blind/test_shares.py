@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from coupled.blind.trials import shares
 from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.make import Numbers, make_one
 from coupled.blind.trials.readings import same_law
-from coupled.blind.trials.shares import _judged, _shared, _shown
+from coupled.blind.trials.shares import _judged, _shared, _shown, true_shares
 from coupled.blind.trials.trial import Plan, draw_trial, plans
 from coupled.blind.twin.setting import draw_setting
 from coupled.gap.signals.output import Output
@@ -47,12 +49,29 @@ def test_a_stage_without_an_output_is_judged_where_its_effects_show() -> None:
     assert [output.stage for output in both] == ["loader", "linkage"]
 
 
-def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it() -> None:
+def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     still = np.zeros(2400)
     surface = Output("surface", "elevator_rad", still, lambda rig: still, 1.0, 120.0)
     both = frozenset(("surface_rate_limit", "viscous_damping"))
     assert _shown([surface], both) == {"surface_rate_limit"}
     assert _shown([surface], frozenset(["flutter"])) == {"flutter"}  # an outsider has no outputs
+    rate, damping = frozenset(["surface_rate_limit"]), frozenset(["viscous_damping"])
+    none = frozenset[str]()
+    noise = np.random.default_rng(1).normal(0.0, 1.0, 2400)
+    noise /= np.sqrt(np.mean(noise**2))
+    sizes = {both: 4.0, damping: 2.0, rate: 3.0, none: 1.0}
+
+    def outputs(rig: object, size: float, flown: bool) -> list[Output]:
+        return [replace(surface, measured=size * noise, _known=[])]
+
+    monkeypatch.setattr(shares, "outputs_of", outputs)
+    given: Any = (bench({}), sizes, ["surface"])
+    assert true_shares(*given, apart=True) == {
+        "surface": pytest.approx({"surface_rate_limit": 12.0 / 13.0})
+    }
+    assert set(true_shares(*given)["surface"]) == both
 
 
 def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
@@ -138,5 +157,5 @@ def test_a_force_read_with_a_zero_is_an_offset_where_nothing_bends() -> None:
         plan = Plan("single", tuple(names))
         truth = draw_trial(np.random.default_rng(5), plan, deck, rigid).truth
         assert truth.not_distinguished == ({other} if other else set())
-        [shares] = truth.budget.values()
-        assert 0.0 < shares[names[0]] < 1.0
+        [held] = truth.budget.values()
+        assert 0.0 < held[names[0]] < 1.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.effects.effect import Effect
-from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.effects.library import BY_NAME, EFFECTS, library_of
 from coupled.gap.search import information, richer, screen, small
 from coupled.gap.search.anew import with_settings_anew
 from coupled.gap.search.candidates import _from_ends
@@ -68,6 +68,8 @@ def test_plain_friction_stays_plain_by_all_of_the_record(
     assert richer_on_all(case, EFFECTS, [step], current) == ([step], current)
     monkeypatch.undo()
     monkeypatch.setattr(richer, "foretold", lambda *_: RICHER_GAIN)
+    assert richer_on_all(case, EFFECTS, [step], current) == ([step], current)
+    monkeypatch.setattr(richer, "_is_cause", lambda *_: True)
     assert richer_on_all(case, EFFECTS, [step], current) == ([step], current)
 
 
@@ -143,6 +145,9 @@ def test_a_motion_that_is_stamped_late_opens_no_gap_of_the_loader(tmp_path: Path
         for one in Reader(nominal, record, "column", surface_points).outputs()
         if one.stage == "loader"
     ]
+    shown = [one.shows_in for one in library_of(nominal, "column") if one.name == "motion_skew"]
+    assert shown == [("airframe", "loader")]
+    assert library_of(nominal_rig(True), "column") == list(EFFECTS)
     late = nominal.changed({"flight.motion_stamp_s": 0.1})
     assert loader.gap(nominal) > 2.0 * loader.limit
     assert loader.gap(late) < loader.limit
@@ -162,7 +167,9 @@ def test_air_that_is_known_by_a_late_motion_moved_before(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("wide", [True, False])
-def test_a_fit_with_a_setting_at_its_end_is_begun_anew_where_a_gap_is_left(wide: bool) -> None:
+def test_a_fit_with_a_setting_at_its_end_is_begun_anew_where_a_gap_is_left(
+    wide: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A servo at 0.98 of its frequency held a limit of acceleration in a hollow, 2.7 of 172."""
 
     def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -178,7 +185,15 @@ def test_a_fit_with_a_setting_at_its_end_is_begun_anew_where_a_gap_is_left(wide:
     values = {**right.values, key: 1.02, offset: 6.0 if wide else 9.0}
     stood = replace(right, values=values, at_bound=(key,), cost=2.0 * right.cost)
     stood = replace(stood, rig=case.with_only(stood, (OFFSET,)))
+    starts = list[dict[str, float]]()
+
+    def begun(self: Case, effects: object, start: dict[str, float]) -> Fit:
+        starts.append(start)
+        return right
+
+    monkeypatch.setattr(Case, "fit", begun)
     found = with_settings_anew(case, stood)
+    assert starts == [{k: v for k, v in values.items() if k == offset}]
     assert found.values[key] == pytest.approx(1.0, abs=2e-3)
     assert found.values[offset] == pytest.approx(9.0, abs=0.1)
     free = replace(stood, at_bound=())
