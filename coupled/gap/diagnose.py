@@ -33,6 +33,7 @@ from coupled.gap.stages.imposed import under_motion
 from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import RIGS_KEPT
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -97,15 +98,16 @@ def _diagnose(
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)
 
-    known: list[tuple[Rig, Sequence[Output]]] = []  # the last one asked for: it takes as long again
+    known: list[tuple[Rig, Sequence[Output]]] = []  # the last asked for: each takes as long again
 
     def refloored(other: Rig) -> Sequence[Output]:
-        if not known or known[0][0] != other:
+        held = next((outputs for rig_, outputs in known if rig_ == other), None)
+        if held is None:
             flown = [one for one in judged if one.stage == "airframe"]
             anew = [replace(reader, rig=other) for reader in readers]
-            made = raised(_outputs(anew, flights, flown if _fly_alike(rig, other) else None))
-            known[:] = [(other, made)]
-        return known[0][1]
+            held = raised(_outputs(anew, flights, flown if _fly_alike(rig, other) else None))
+            known[:] = [*known[1 - RIGS_KEPT :], (other, held)]
+        return held
 
     case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
     case, choice = search(case, library)

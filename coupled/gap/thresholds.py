@@ -118,10 +118,8 @@ TRIM_s = 1.0  # chosen: from a record's start, over which the trim is measured
 TRIM_SIGMAS = 4.0  # chosen: of its noise, by which a record starts at another trim than the model's
 TRIM_STILL = 0.25  # chosen: of what it is off, that a command may have moved a surface before
 TRIM_ANSWERED = 13.8  # χ² of two more numbers, 1 in 1000 by chance
-TRIM_FLIGHT_s = (
-    15.0  # flown to decide whether a surface that stands off is in trim, and TRIM_LAGS_s:
-)
-# 26 records of a T-37 with one fault or two; longer, the phugoid's own error decided
+# Flown to decide whether a surface that stands off is in trim, by TRIM_LAGS_s: on 26 records of a
+TRIM_FLIGHT_s = 15.0  # T-37 with one fault or two; longer, the phugoid's own error decided
 TRIM_LAGS_s = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)  # chosen
 TRIM_SINCE = 4.0  # chosen: twice the log-likelihood by which it must have been moved since
 UNTRIMMED = 1e3  # chosen: floors by which an aircraft that does not trim is off
@@ -151,7 +149,8 @@ FIT_ITERATIONS = 40  # chosen
 WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 17 blind records (seed 101) went wrong
 WIDE_NEAR = 0.25  # floors; 26 blind records (seed 101) stand under 0.16, an oscillator's above 0.35
 WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
-RACE_EVALUATIONS = 6  # chosen: of each start, after which they are compared,
+RACE_FIRST, RACE_FAR = 3, 10.0  # chosen: such evaluations first, and times the best's to give up
+RACE_EVALUATIONS = 6  # chosen: of each other, after which they are compared,
 RACE_FLIGHTS = 3  # chosen: the same where each is a flight, which is nearly linear in its numbers
 FLOWN_FIRST = 2  # chosen: effects to be flown that are fitted before the others are asked,
 HOPELESS_BEHIND = 10.0  # chosen: which are not, where their signatures leave so much more still
@@ -173,6 +172,7 @@ HOPELESS = 6  # chosen: so many, whatever they foretold
 REACHED = 0.75  # chosen: of what a step foretold, from which the next may be twice as long
 ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
 SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
+RIGS_KEPT = 3  # chosen: rigs, of the last asked for, whose floors are kept
 
 # A nominal rig from records (`nominal`).
 ALIKE = 0.05  # least eigenvalue of signatures' cosines: two at cosine 0.95 are one answer together
@@ -203,6 +203,7 @@ RICHER = 1.5  # chosen: the same, by which it is foretold what a breakaway would
 SHAPES = (0.25, 1.0, 4.0)  # chosen: and times the usual speed over which it fades
 BEHIND_GAIN = 20.0  # chosen: log-likelihood by which a fit by wide steps is behind the best,
 BEHIND_SHARE = 0.2  # chosen: and share of the best's gain, from which it is left at that
+LOOP_NOISES = 3.0  # on plain bends (seeds 2036, 2037) loops of 0.6 to 1.6 gain 16 to 33
 
 # Choosing (`choose`).
 LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it
@@ -211,15 +212,14 @@ RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only a
 MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leave
 SIMPLER_GAIN = 6.0  # chosen: by which more numbers must win in the loader where fewer close the gap
 SIMPLER_SHARE = 0.05  # chosen: or by that share of the gain, since no law of dry friction is exact
-FAR_BELOW_NOISE = (
-    0.7  # chosen: gap by the floors of what was found, under which no setting is at fault
-)
+FAR_BELOW_NOISE = 0.7  # chosen: gap by the floors of what was found, that needs no setting
 JUST_WITHIN = 0.5  # chosen: of what a limit allows over noise, from which settings may hide a gap
 STRAINED_GAIN = 30.0  # chosen: by which an effect must beat settings at their ends within a limit
 FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway fades
 BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again
 SWITCH_LEAVES = 0.5  # chosen: of a gap, the most that what has no number may leave to be asked
 RICHER_GAIN = 10.0  # chosen: by which all of a record must speak for a richer law of dry friction
+FORETOLD_LEAST, RICHER_STARTS = 1.0, 2  # chosen: foretold of a richer bend, to be fitted; from where
 NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen
 MOST_EFFECTS = 4  # chosen: effects in one answer
 

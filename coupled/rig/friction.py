@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from coupled.rig.compiled import layout, seldom, stage
+from coupled.rig.compiled import TINY, layout, seldom, stage
 from coupled.rig.declaration import Declaration, Given
 
 
@@ -38,6 +38,7 @@ class FrictionParameters(Protocol):
     breakaway: float  # F_s ≥ F_c, N
     stribeck_rate: float  # v_s, d/s
     stiffness: float  # of the contact, N/d; 0 for a rigid one
+    compliance: float  # one over it, d/N; 0 for a rigid one
     contact_damping: float  # N·s/d at rest
     pull: float  # more where the control moves aft, N
     push: float  # and where it moves forward, N
@@ -78,6 +79,7 @@ FRICTION = Declaration(
         "running": lambda g: g.control.loader.friction,
         "breakaway": lambda g: max(g.control.loader.friction, g.control.loader.breakaway),
         "stiffness": _stiffness,
+        "compliance": lambda g: 1.0 / _stiffness(g) if _stiffness(g) > 0.0 else 0.0,
         "contact_damping": lambda g: (
             CONTACT_DAMPING * math.sqrt(_stiffness(g) * g.control.loader.mass)
         ),
@@ -93,12 +95,18 @@ FRICTION = Declaration(
 
 
 @stage
+def kept_at(p: FrictionParameters, rate: float) -> float:
+    """Return the share of what fades with speed that is left at `rate` in d/s."""
+    ratio = rate / p.stribeck_rate
+    return math.exp(-ratio * ratio) if abs(ratio) < FADED else 0.0
+
+
+@stage
 def running_friction(p: FrictionParameters, rate: float) -> float:
     """Return the friction's size in N when sliding at `rate` in d/s."""
     if p.breakaway <= p.running:
         return p.running
-    ratio = rate / p.stribeck_rate
-    return p.running + (p.breakaway - p.running) * math.exp(-ratio * ratio)
+    return p.running + (p.breakaway - p.running) * kept_at(p, rate)
 
 
 @stage
@@ -110,10 +118,44 @@ def more_friction(p: FrictionParameters, load: float, direction: float) -> float
 
 
 @stage
-def _slipping(p: FrictionParameters, load: float, rate: float) -> float:
-    """Return the friction at which bristles slip at a rate, N."""
-    level = running_friction(p, rate) + more_friction(p, load, rate)
+def _slipping(p: FrictionParameters, load: float, rate: float, kept: float) -> float:
+    """Return the friction at which bristles slip at a rate, N, of which `kept_at` is left."""
+    level = p.running + (p.breakaway - p.running) * kept + more_friction(p, load, rate)
     return max(level, LEAST_N)  # of breakaway alone nothing is left at speed
+
+
+@stage
+def reached(x: float) -> float:
+    """Return 1 − e^(−x) to 14 digits, for x ≥ 0, in half the time that `math.expm1` takes."""
+    if x > 0.1:
+        return 1.0 - math.exp(-x)
+    near, far = 1.0 - x * (1 / 2 - x / 6), 1 / 24 - x * (1 / 120 - x / 720)
+    return x * (near - x * x * x * (far - x * x * x * (1 / 5040 - x / 40320)))
+
+
+@stage
+def _along(
+    level: float, share: float, compliance: float, per_soft: float, bent: float, way: float
+) -> tuple[float, float, float]:
+    """Return how far bristles are bent after a way, on the mean over it, both in d, and 1/way.
+
+    `per_soft` is one over how far they bend while they slip, 1/d. A step asks for few divisions:
+    each takes as long as all else here.
+    """
+    side, per_way = 1.0 if way > 0.0 else -1.0, 1.0 / way
+    most = level * compliance
+    slips, soft = share * most, (1.0 - share) * most
+    z, left, area = side * bent, abs(way), 0.0
+    if z < slips:
+        straight = min(left, slips - z)
+        area = straight * (z + 0.5 * straight)
+        z += straight
+        left -= straight
+    if left > 0.0:
+        nearer = reached(left * per_soft) * (most - z)
+        area += most * left - soft * nearer
+        z += nearer
+    return side * z, area * per_way, per_way
 
 
 @stage
@@ -122,30 +164,18 @@ def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tup
 
     `level` is the friction at which they slip, N.
     """
-    if way == 0.0:
+    if abs(way) <= TINY:
         return bent, bent
-    side = 1.0 if way > 0.0 else -1.0
-    most = level / p.stiffness
-    slips, soft = p.elastic_share * most, (1.0 - p.elastic_share) * most
-    z, left, area = side * bent, abs(way), 0.0
-    if z < slips:
-        straight = min(left, slips - z)
-        area = straight * (z + 0.5 * straight)
-        z += straight
-        left -= straight
-    if left > 0.0:
-        nearer = -math.expm1(-left / soft) * (most - z)
-        area += most * left - soft * nearer
-        z += nearer
-    return side * z, side * area / abs(way)
+    per_soft = p.stiffness / ((1.0 - p.elastic_share) * level)
+    after, mean, _ = _along(level, p.elastic_share, p.compliance, per_soft, bent, way)
+    return after, mean
 
 
 @stage
-def _bending(p: FrictionParameters, level: float, bent: float, way: float) -> float:
+def _bending(level: float, compliance: float, per_soft: float, bent: float, way: float) -> float:
     """Return by how much bristles bend on for each d of the way, 1 where none of it slips."""
-    most = level / p.stiffness
-    left = most - (bent if way > 0.0 else -bent)
-    return min(max(left / ((1.0 - p.elastic_share) * most), 0.0), 1.0)
+    left = level * compliance - (bent if way > 0.0 else -bent)
+    return min(max(left * per_soft, 0.0), 1.0)
 
 
 @stage
@@ -153,18 +183,7 @@ def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load
     """Return how far bristles are bent after a way at a rate, d; 0 of a rigid contact."""
     if p.stiffness == 0.0:
         return 0.0
-    return yielded(p, _slipping(p, load, rate), bent, way)[0]
-
-
-@stage
-def _curvatures(p: FrictionParameters, level: float, span: float) -> tuple[float, float]:
-    """Return half of the most that a yielding contact curves with speed, N·s²/d², beyond fading.
-
-    Of its mean force over the way, and of what it carries at the end.
-    """
-    most = level / p.stiffness
-    bowed = 0.5 * p.stiffness * span * span / ((1.0 - p.elastic_share) * most)
-    return bowed / 3.0, bowed
+    return yielded(p, _slipping(p, load, rate, kept_at(p, rate)), bent, way)[0]
 
 
 @seldom
@@ -185,32 +204,33 @@ def yielding_speed(
     rises with the way, ever less: from the speed that its slope at the start would let, Newton's
     steps run up to u from one side, each a smaller part of the last.
     """
-    level = _slipping(p, load, v)
-    free = inertia * v + push - p.stiffness * bent
+    stiffness, compliance, share = p.stiffness, p.compliance, p.elastic_share
+    level = _slipping(p, load, v, kept_at(p, v) if p.breakaway > p.running else 0.0)
+    free = inertia * v + push - stiffness * bent
     side = 1.0 if free > 0.0 else -1.0
-    if level - side * p.stiffness * bent <= SLIPS_ALL * level and (
-        p.breakaway <= p.running or abs(v) > FADED * p.stribeck_rate
+    faded = FADED * p.stribeck_rate
+    if level - side * stiffness * bent <= SLIPS_ALL * level and (
+        p.breakaway <= p.running or abs(v) > faded
     ):
         u = v + (push - side * level) / inertia
-        if u * side > (0.0 if p.breakaway <= p.running else FADED * p.stribeck_rate):
-            return u, side * level / p.stiffness
-    spring = p.stiffness * (0.5 * span)
-    bends = _bending(p, level, bent, free)
+        if u * side > (0.0 if p.breakaway <= p.running else faded):
+            return u, side * level * compliance
+    bends = _bending(level, compliance, stiffness / ((1.0 - share) * level), bent, free)
+    spring = stiffness * (0.5 * span)
     u, last, after = free / (inertia + bends * (spring + p.contact_damping)), 0.0, bent
-    curved, bowed = _curvatures(p, level, span)
-    faded = FADED * p.stribeck_rate
+    per_span = 1.0 / span
     for _ in range(NEWTON_STEPS):
-        level, fading = _slipping(p, load, u), u / p.stribeck_rate
-        damping = 0.0
-        if abs(fading) < FADED:
-            damping = p.contact_damping * math.exp(-fading * fading)
+        kept = kept_at(p, u)
+        level, damping = _slipping(p, load, u, kept), p.contact_damping * kept
+        per_soft = stiffness / ((1.0 - share) * level)
         way = u * span
-        after, mean = yielded(p, level, bent, way)
-        force = p.stiffness * mean + damping * (after - bent) / span
-        bends = _bending(p, level, after, way)
-        slope = inertia + damping * bends
-        if way != 0.0:
-            slope += max(p.stiffness * (after - mean) / way * span, 0.0)
+        after, mean, slope = bent, bent, inertia
+        if abs(way) > TINY:
+            after, mean, per_way = _along(level, share, compliance, per_soft, bent, way)
+            slope += max(stiffness * (after - mean) * per_way * span, 0.0)
+        force = stiffness * mean + damping * (after - bent) * per_span
+        bends = _bending(level, compliance, per_soft, after, way)
+        slope += damping * bends
         change = (push - force - inertia * (u - v)) / slope
         u += change
         after += bends * (change * span)
@@ -219,8 +239,11 @@ def yielding_speed(
         if step <= near or step * step <= near * last:
             break
         if min(abs(u), abs(v)) > faded:  # else the slope lacks how damping and level fade
-            square = step * step
-            if square * curved <= near * slope and square * bowed <= SOLVED * level:
+            # Half of the most that it curves with speed, N·s²/d²: of what it carries at the end,
+            # and of its mean force over the way a third of that.
+            bowed = 0.5 * stiffness * span * span * per_soft
+            square = step * step * bowed
+            if square <= 3.0 * near * slope and square <= SOLVED * level:
                 break
         last = step
     return u, after

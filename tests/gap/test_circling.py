@@ -39,7 +39,7 @@ def test_effects_that_displace_one_another_end_the_search(monkeypatch: pytest.Mo
     monkeypatch.setattr(Case, "fit", unfitted)
     monkeypatch.setattr(choose, "_round", next_of)
     monkeypatch.setattr(choose, "_needless", first_of_two)
-    monkeypatch.setattr(choose, "says_nothing", lambda *_: False)
+    monkeypatch.setattr(choose, "is_open", lambda *_: False)
     found = searched(Case(RIG, "column", []), list(BY_NAME.values()))
     assert found.circled
     assert len(found.steps) == 1

@@ -17,10 +17,10 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import choose, information
 from coupled.gap.search.candidates import fitted_candidates, may_be_causes
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice, _is_open, searched
+from coupled.gap.search.choose import Choice, searched
 from coupled.gap.search.fit import Fit, fit
 from coupled.gap.search.gain import Candidate
-from coupled.gap.search.information import may_be_plainer, says_nothing
+from coupled.gap.search.information import is_open, may_be_plainer, says_nothing
 from coupled.gap.search.screen import screen
 from coupled.gap.search.search import _kept
 from coupled.gap.signals.output import Output
@@ -77,7 +77,7 @@ def test_an_effect_in_reserve_takes_the_place_of_one_whose_numbers_it_holds(
 
     monkeypatch.setattr(choose, "fitted_candidates", candidates)
     monkeypatch.setattr(choose, "_needless", lambda case, current: None)
-    monkeypatch.setattr(choose, "_is_open", lambda case, effect, current: False)
+    monkeypatch.setattr(choose, "is_open", lambda case, effect, current: False)
     choice = searched(Case(bench(), "column", [wide]), [])
     assert [step.effect.name for step in choice.steps] == ["servo_tuning"]
     assert [effect.name for effect in choice.fit.effects] == ["servo_tuning"]
@@ -297,7 +297,7 @@ def test_what_all_of_the_record_puts_at_a_bound_is_no_cause(at_bound: bool) -> N
     case, offset = Case(bench(), "column", [made_by]), BY_NAME["force_offset"]
     found = case.fit((offset,))
     key = offset.value_key(offset.free[0])
-    assert _is_open(case, offset, replace(found, at_bound=(key,) if at_bound else ())) == at_bound
+    assert is_open(case, offset, replace(found, at_bound=(key,) if at_bound else ())) == at_bound
 
 
 def test_a_play_with_a_stiff_contact_has_a_start_near_it(tmp_path: Path) -> None:

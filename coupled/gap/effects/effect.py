@@ -41,7 +41,9 @@ class Parameter:
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
     its own number for it, which is then to be set. A frequency `folds` about half of the frame
-    rate. `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
+    rate. `beyond` names the quantity whose noise a loop has to be wider than: it would smooth
+    that noise alone. One with a `tolerance`, relative, is off by so much without being there.
+    `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
     how much it is off at most for what a record does not say.
     """
 
@@ -61,6 +63,8 @@ class Parameter:
     unsure: float = 0.0
     host: str = ""
     folds: bool = False
+    beyond: str = ""
+    tolerance: float = 0.0
 
     def named(self, control: str) -> str:
         """Return its name with its unit on this control."""
@@ -107,7 +111,8 @@ class Parameter:
 
     def error(self, value: float, rig: Rig, control: ControlName) -> float:
         """Return how well a value is known at best: by its way from none, or by a limit."""
-        size = abs(value) if self.inverse else abs(value - self.neutral(rig, control))
+        none = self.base(rig, control) if self.above else self.neutral(rig, control)
+        size = abs(value) if self.inverse else abs(value - none)
         return hypot(self.model_error * size, self.unsure)
 
     def neutral(self, rig: Rig, control: ControlName) -> float:

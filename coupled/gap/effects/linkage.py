@@ -18,7 +18,11 @@ from coupled.gap.effects.entries import (
 )
 
 DAMPING_RATIO = replace(
-    factor("loader.servo_damping_ratio", 1.0), name="damping_factor", scanned=False, may_end=True
+    factor("loader.servo_damping_ratio", 1.0),
+    name="damping_factor",
+    scanned=False,
+    may_end=True,
+    tolerance=SETTING,
 )
 LINKAGE: tuple[Effect, ...] = (
     one("linkage", "bend", real_bend(5e-5), *("force", "bent")),
@@ -62,6 +66,7 @@ LINKAGE: tuple[Effect, ...] = (
             replace(
                 value("width_N", "loader.bend_hysteresis_width_N", 0, 500, 5.0, 1.0, 25.0),
                 scanned=False,
+                beyond="force",
             ),
         ),
         Signature("force", "bent", "loop", 6.0),

@@ -23,8 +23,11 @@ from coupled.gap.thresholds import (
     BEHIND_SHARE,
     FLOWN_FIRST,
     HOPELESS_BEHIND,
+    LOOP_NOISES,
     RACE_BEHIND,
     RACE_EVALUATIONS,
+    RACE_FAR,
+    RACE_FIRST,
     RACE_FLIGHTS,
 )
 from coupled.parallel import in_threads
@@ -74,7 +77,8 @@ def _from_ends(one: Screened, ends: Ends) -> Screened:
     return one._replace(starts=[*one.starts, {key: end[key] for key in keys}])
 
 
-BEGUN, WIDE = Descent("wide", RACE_EVALUATIONS), Descent("wide")
+FIRST, BEGUN = Descent("wide", RACE_FIRST), Descent("wide", RACE_EVALUATIONS - RACE_FIRST + 1)
+WIDE = Descent("wide")
 FLOWN = Descent("wide", RACE_FLIGHTS)
 
 
@@ -92,7 +96,7 @@ def _fitted(case: Case, current: Fit, screened: Sequence[Screened]) -> list[tupl
     def first(effect: Effect) -> Descent:
         if STAGE_OF[effect.stage].flown:
             return FLOWN
-        return BEGUN if many[effect.name] > 1 else WIDE
+        return FIRST if many[effect.name] > 1 else WIDE
 
     def begin(tried: tuple[Effect, dict[str, float]]) -> tuple[Effect, Fit]:
         effect, start = tried
@@ -112,7 +116,15 @@ def _fitted(case: Case, current: Fit, screened: Sequence[Screened]) -> list[tupl
         return effect, _beside(case, current, effect, fitted.values, Descent("own"), fitted)
 
     late = {one.effect for one in later}
+
+    def race(begun: tuple[Effect, Fit]) -> tuple[Effect, Fit]:
+        effect, fitted = begun
+        if first(effect) is not FIRST:
+            return begun
+        return effect, _beside(case, current, effect, fitted.values, BEGUN, fitted)
+
     fits = in_threads(begin, [each for each in tries if each[0] not in late])
+    fits = in_threads(race, _not_far_behind(fits))
     hopeful = {one.effect for one in later if not _hopeless(case, current, one, fits)}
     fits += in_threads(begin, [each for each in tries if each[0] in hopeful])
     racing, given_up = _still_racing(case, fits)
@@ -163,6 +175,12 @@ def _least(fits: Sequence[tuple[Effect, Fit]]) -> dict[str, tuple[Effect, Fit]]:
     return best
 
 
+def _not_far_behind(begun: Fits) -> Fits:
+    """Return the fits that do not stand far behind the best of the same effect."""
+    best = _least(begun)
+    return [each for each in begun if each[1].cost <= RACE_FAR * best[each[0].name][1].cost]
+
+
 def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits, Fits]:
     """Return the fits of each effect that are not far behind its best one, and the effects left.
 
@@ -194,7 +212,8 @@ def _still_racing(case: Case, begun: Sequence[tuple[Effect, Fit]]) -> tuple[Fits
 def may_be_causes(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple[Effect, Fit]]:
     """Return the effects fitted that are away from their bounds, and beyond their settings.
 
-    Not those of a frequency too fast for the frames, but a tone's, which is known to fold.
+    And beyond the noise of what drives them. Not those of a frequency too fast for the frames, but
+    a tone's, which is known to fold.
     """
     fastest = 0.5 * min(output.frame_rate_Hz for output in case.outputs)
     return [
@@ -202,6 +221,7 @@ def may_be_causes(case: Case, found: Sequence[tuple[Effect, Fit]]) -> list[tuple
         for effect, fitted in found
         if not any(effect.value_key(p) in fitted.at_bound for p in effect.free)
         and not _within_tolerance(case, effect, fitted)
+        and not _within_noise(case, effect, fitted)
         and all(fitted.values[key] < fastest for key in _frequencies(effect))
     ]
 
@@ -239,8 +259,21 @@ def _near_the_best(
 
 def _within_tolerance(case: Case, effect: Effect, fitted: Fit) -> bool:
     """Tell whether a nominal number moved by no more than its setting can be trusted to."""
+    for p in effect.free:
+        if p.tolerance and abs(fitted.values[effect.value_key(p)] - 1.0) <= p.tolerance:
+            return True
     ends = case.ends(effect)
     if ends is None:
         return False
     (number,) = effect.free
     return ends[0] < fitted.values[effect.value_key(number)] < ends[1]
+
+
+def _within_noise(case: Case, effect: Effect, fitted: Fit) -> bool:
+    """Tell whether a loop is no wider than noise of its drive, which it only smooths then."""
+    return any(
+        fitted.values[effect.value_key(p)] <= LOOP_NOISES * output.noises.get(p.beyond, 0.0)
+        for p in effect.free
+        if p.beyond
+        for output in touched(case.outputs, [effect])
+    )

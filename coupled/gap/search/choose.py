@@ -16,13 +16,13 @@ from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.anew import with_contact_anew, with_settings_anew
 from coupled.gap.search.candidates import Ends, fitted_candidates
 from coupled.gap.search.case import Case
-from coupled.gap.search.contest import distinguished, overtaken, switched
+from coupled.gap.search.contest import distinguished, in_place_of_open, overtaken, switched
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, ranked_by_gain
-from coupled.gap.search.information import may_be_plainer, says_nothing, shape_is_open
+from coupled.gap.search.information import is_open, may_be_plainer, shape_is_open
 from coupled.gap.search.intwo import in_two
 from coupled.gap.search.onelaw import same_in_a_limit
-from coupled.gap.search.richer import richer_on_all
+from coupled.gap.search.richer import plainer_on_all, richer_on_all
 from coupled.gap.search.rivals import Found, found_by, separated, tried_again
 from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained, taken_by_switch
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
@@ -110,13 +110,15 @@ def _looked_over(
     """Return the steps and the fit, each effect looked at once more beside all the others."""
     if len(steps) > 1:
         steps, current = _law_again(case, stood[0], library, steps, current)
+    steps, current = plainer_on_all(case, library, steps, current)
     steps, current = richer_on_all(case, library, steps, current)
     yields = yielding_reading(case, current)
     if yields is not None:
         plain, law, start = yields
         steps = [replace(one, effect=law) if one.effect is plain else one for one in steps]
         current = case.fit([one.effect for one in steps], start=start)
-    empty = [step for step in steps if _is_open(case, step.effect, current)]
+    steps, current = in_place_of_open(case, steps, current)
+    empty = [step for step in steps if is_open(case, step.effect, current)]
     if empty:
         steps = [step for step in steps if step not in empty]
         current = _with_only(case, stood, steps, current)
@@ -131,12 +133,6 @@ def _looked_over(
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
     return last, current
-
-
-def _is_open(case: Case, effect: Effect, current: Fit) -> bool:
-    """Tell whether all of the record leaves an effect open, or at a bound of one of its numbers."""
-    at_bound = any(effect.value_key(p) in current.at_bound for p in effect.free)
-    return at_bound or says_nothing(case, effect, current)
 
 
 def _with_only(case: Case, stood: Sequence[Fit], steps: Sequence[Found], current: Fit) -> Fit:

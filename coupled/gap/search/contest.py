@@ -15,10 +15,10 @@ from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, likelier_by
-from coupled.gap.search.information import says_nothing
+from coupled.gap.search.information import is_open, says_nothing
 from coupled.gap.search.rivals import Found, weight
 from coupled.gap.signals.output import stage_gaps
-from coupled.gap.thresholds import RIVAL_GAIN, SWITCH_LEAVES
+from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN, SWITCH_LEAVES
 
 
 def contested(
@@ -27,14 +27,19 @@ def contested(
     """Return the fits of all of the record with an effect found and with another in its place.
 
     The other is begun from each of the starts. Beside dry friction either may stand in a hollow, so
-    the one found is fitted again from where the other ended. None where the other is no cause.
+    the one found is fitted again from where the other ended, and where the other is likelier, with
+    its contact sought anew. None where the other is no cause.
     """
     effects = [other if one is effect else one for one in current.effects]
     there = min((case.fit(effects, start=one) for one in starts), key=lambda one: one.cost)
     if not may_be_causes(case, [(other, there)]) or says_nothing(case, other, there):
         return None
-    back = case.fit(current.effects, start={**there.values, **own_values(effect, current)})
-    return min(current, back, key=lambda one: one.cost), there
+    start = {**there.values, **own_values(effect, current)}
+    here = min(current, case.fit(current.effects, start=start), key=lambda one: one.cost)
+    anew = case.but_for_contact(start)
+    if anew != start and likelier_by(case.outputs, here, there) <= -RIVAL_GAIN:
+        here = min(here, case.fit(current.effects, start=anew), key=lambda one: one.cost)
+    return here, there
 
 
 def overtaken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
@@ -115,6 +120,32 @@ def distinguished(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
         current = here
         odds += weight(less) - weight(step.gain - rival.gain)
     return replace(step, probability=1.0 / (1.0 + max(odds, 0.0)), rivals=tuple(left)), current
+
+
+def in_place_of_open(case: Case, steps: Sequence[Found], current: Fit) -> tuple[list[Found], Fit]:
+    """Return the steps and the fit, with a rival for an effect that all of the record leaves open.
+
+    Half of a record did not tell the two apart. The rival has to say something, and to be surely
+    likelier than the rig without either.
+    """
+    found = list(steps)
+    for i, step in enumerate(steps):
+        if not step.rivals or not is_open(case, step.effect, current):
+            continue
+        rest = [one for one in current.effects if one is not step.effect]
+        without = case.fit(rest, start=current.values)
+        for rival in step.rivals:
+            effects = [*rest, rival.effect]
+            if rival.effect in rest:
+                continue
+            fitted = case.fit(effects, start={**current.values, **rival.fit.values})
+            causes = may_be_causes(case, [(rival.effect, fitted)])
+            more = likelier_by(case.outputs, fitted, without)
+            if causes and not is_open(case, rival.effect, fitted) and more >= LEAST_GAIN:
+                found[i] = replace(step, effect=rival.effect, rivals=(), behind=())
+                current = fitted
+                break
+    return found, current
 
 
 def own_values(effect: Effect, fitted: Fit) -> dict[str, float]:

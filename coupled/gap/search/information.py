@@ -125,6 +125,12 @@ def says_nothing(case: Case, effect: Effect, fitted: Fit) -> bool:
     return fitted.low[key] <= nothing <= fitted.high[key]
 
 
+def is_open(case: Case, effect: Effect, current: Fit) -> bool:
+    """Tell whether all of the record leaves an effect open, or at a bound of one of its numbers."""
+    at_bound = any(effect.value_key(p) in current.at_bound for p in effect.free)
+    return at_bound or says_nothing(case, effect, current)
+
+
 def _stands_above(case: Case, effect: Effect, fitted: Fit) -> list[bool]:
     """Tell of each number that stands above another of the rig whether it surely does."""
     return [

@@ -121,14 +121,19 @@ def little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Starts
 
 
 def foretold(
-    case: Case, law: Effect, plain: Effect, fitted: Fit, part: Part = "fitted"
+    case: Case,
+    law: Effect,
+    plain: Effect,
+    fitted: Fit,
+    part: Part = "fitted",
+    tries: Starts | None = None,
 ) -> float | None:
     """Return the log-likelihood that a richer law is foretold to gain over a plain one.
 
-    On the part of the record that was fitted. All of that goes along, by its slopes. None where
-    that cannot be foretold.
+    On the part of the record that was fitted, by a little of what it has more, or by what is to be
+    tried. All of that goes along, by its slopes. None where that cannot be foretold.
     """
-    tries = little_richer(case, law, plain, fitted)
+    tries = little_richer(case, law, plain, fitted) if tries is None else tries
     keys, slope = _slope_of(plain, fitted)
     if slope is None or not tries:
         return None

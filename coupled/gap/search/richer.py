@@ -1,46 +1,101 @@
-"""The richer of two laws asked on all of the record, where the plainer one was found.
+"""The richer and the plainer of two laws, asked on all of the record where the other was found.
 
 Half of a record may hold too few breakaways to earn a law of friction its place, or leave open how
-a servo with a dead time is damped; and a fit to it may end in a hollow. On all of it the richer law
-must do more, since it can bend farther: by `RICHER_GAIN` of dry friction, of which no law is exact.
-What that could gain is foretold first (`laws`): it costs six replays and spares most of the fits.
+a servo with a dead time is damped, or whether a bend has a loop; and a fit to it may end in a
+hollow. On all of it the richer law must do more, since it can bend farther: by `RICHER_GAIN` of dry
+friction, of which no law is exact, and by `RIVAL_GAIN` elsewhere. What a law of friction could gain
+is foretold first (`laws`): it costs six replays and spares most of the fits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
-from coupled.gap.effects.effect import Effect
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
-from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.gain import Candidate, likelier_by
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import Starts, foretold, little_richer
 from coupled.gap.search.rivals import Found, weight
-from coupled.gap.thresholds import RICHER_GAIN, RIVAL_GAIN
+from coupled.gap.thresholds import (
+    FORETOLD_LEAST,
+    RICHER_GAIN,
+    RICHER_STARTS,
+    RIVAL_GAIN,
+    SCREEN_SIZES,
+)
+from coupled.parallel import in_threads
 
 
 def richer_on_all(
     case: Case, library: Sequence[Effect], steps: Sequence[Found], current: Fit
 ) -> tuple[list[Found], Fit]:
-    """Return the steps and the fit, with a richer law in place of a plainer one if that is it."""
+    """Return the steps and the fit, with a richer law in place of a plainer one if that is it.
+
+    Of several the likeliest, and those that all of the record does not tell from it are its rivals.
+    """
     found = list(steps)
     for i, step in enumerate(steps):
+        asked = list[Candidate]()
         for law, least, starts in _richer(case, library, step.effect, current):
             effects = [law if one is step.effect else one for one in current.effects]
-            fits = [case.fit(effects, start=start) for start in starts]
+            fits = in_threads(partial(_fitted, case, effects), starts)
             fitted = min(fits, key=lambda one: one.cost, default=None)
             if fitted is None or not _is_cause(case, law, step.effect, fitted):
                 continue
             more = likelier_by(case.outputs, fitted, current)
             if more >= least:
-                sure = 1.0 / (1.0 + weight(more))
-                found[i] = replace(step, effect=law, probability=sure, rivals=(), behind=())
+                asked.append(Candidate(more, law, fitted))
+        if not asked:
+            continue
+        best = max(asked, key=lambda one: one.gain)
+        others = [one for one in asked if one is not best]
+        odds = weight(best.gain) + sum(weight(best.gain - one.gain) for one in others)
+        rivals = tuple(
+            replace(one, gain=step.gain + one.gain - best.gain)
+            for one in others
+            if one.gain > best.gain - RIVAL_GAIN
+        )
+        sure = 1.0 / (1.0 + odds)
+        found[i] = replace(step, effect=best.effect, probability=sure, rivals=rivals, behind=())
+        current = best.fit
+    return found, current
+
+
+def plainer_on_all(
+    case: Case, library: Sequence[Effect], steps: Sequence[Found], current: Fit
+) -> tuple[list[Found], Fit]:
+    """Return the steps and the fit, with a plainer law in place of a richer one if that does.
+
+    Not of dry friction, whose laws their intervals distinguish.
+    """
+    found = list(steps)
+    for i, step in enumerate(steps):
+        for law in library:
+            if law in current.effects or not _holds(step.effect, law):
+                continue
+            effects = [law if one is step.effect else one for one in current.effects]
+            known = {p.key: current.values[step.effect.value_key(p)] for p in step.effect.free}
+            start = {**current.values, **{law.value_key(p): known[p.key] for p in law.free}}
+            begun = {**current.values, **{law.value_key(p): p.starts[0] for p in law.free}}
+            fits = [case.fit(effects, start=one) for one in (start, begun)]
+            fitted = min(fits, key=lambda one: one.cost)
+            causes = may_be_causes(case, [(law, fitted)]) and not says_nothing(case, law, fitted)
+            if causes and likelier_by(case.outputs, current, fitted) < RIVAL_GAIN:
+                found[i] = replace(step, effect=law, rivals=(), behind=())
                 current = fitted
                 break
     return found, current
+
+
+def _fitted(case: Case, effects: Sequence[Effect], start: Mapping[str, float]) -> Fit:
+    return case.fit(effects, start=start)
 
 
 def _richer(
@@ -54,10 +109,47 @@ def _richer(
             gain = foretold(case, law, plain, current, "all")
             if gain is None or gain >= RICHER_GAIN:
                 yield law, RICHER_GAIN, little_richer(case, law, plain, current)
-        elif plain.reserve and law.reserve and _keys(plain) < _keys(law):
-            known = {p.key: current.values[plain.value_key(p)] for p in plain.free}
-            start = {law.value_key(p): known.get(p.key, p.starts[0]) for p in law.free}
-            yield law, RIVAL_GAIN, [{**current.values, **start}]
+        elif _holds(law, plain):
+            yield law, RIVAL_GAIN, _promising(case, law, plain, current)
+
+
+def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> Starts:
+    """Return where fits of a richer law begin: where most is foretold, and not too little."""
+    starts = _begun(law, plain, current)
+    each = [foretold(case, law, plain, current, "all", [start]) for start in starts]
+    gains = [np.inf if gain is None else gain for gain in each]
+    best = sorted(range(len(starts)), key=lambda k: -gains[k])[:RICHER_STARTS]
+    return [starts[k] for k in best if gains[k] >= FORETOLD_LEAST]
+
+
+def _begun(law: Effect, plain: Effect, current: Fit) -> Starts:
+    """Return where a richer law is tried: at the plainer one's end, by each of its shapes."""
+    known = {p.key: current.values[plain.value_key(p)] for p in plain.free}
+    shared = {law.value_key(p): known[p.key] for p in law.free if p.key in known}
+    sizes = {law.value_key(p): _sizes(p) for p in law.free if p.key not in known}
+    return [
+        {**current.values, **shared}
+        | {key: each[min(shape, len(each) - 1)] for key, each in sizes.items()}
+        for shape in range(max(map(len, sizes.values())))
+    ]
+
+
+def _sizes(number: Parameter) -> list[float]:
+    """Return the values at which a number is tried: a limit over three decades."""
+    if not number.inverse:
+        return list(number.starts)
+    wide = [times * number.starts[0] for times in SCREEN_SIZES]
+    return sorted({min(max(one, number.low), number.high) for one in wide})
+
+
+def _holds(law: Effect, plain: Effect) -> bool:
+    """Tell whether a law is the richer of two: it frees what the other does, and more.
+
+    Neither is of dry friction, and both are looked for in the same search.
+    """
+    alike = law.stage == plain.stage and law.reserve == plain.reserve
+    wet = not law.dry and not plain.dry
+    return alike and wet and bool(plain.free) and _keys(plain) < _keys(law)
 
 
 def _keys(effect: Effect) -> set[str]:

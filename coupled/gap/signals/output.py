@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -84,7 +84,8 @@ class Output:
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
     One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
     that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
-    `rough` predicts nearly as well with fewer replays, where slopes are asked for.
+    `rough` predicts nearly as well with fewer replays, where slopes are asked for. `noises` are the
+    rms noises of what drives the stage, by the control's quantity.
     """
 
     stage: str
@@ -102,6 +103,7 @@ class Output:
     stepped: bool = False
     mismatch: float = 0.0
     rough: Predict | None = field(default=None, repr=False, compare=False)
+    noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:

@@ -260,7 +260,8 @@ class Reader(Reading):
             return driven(with_error(smooth, k, level), f)(rig)
 
         made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
-        return [self._made("linkage", self.name_of("deflection"), *made, "computed")]
+        linkage = self._made("linkage", self.name_of("deflection"), *made, "computed")
+        return [replace(linkage, noises={"force": force_level.rms})]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""
