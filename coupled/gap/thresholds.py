@@ -219,7 +219,7 @@ FAINT_STRIBECK_d_per_s = 2e-3  # chosen: speed over which an unknown breakaway f
 BEGUN_AT = (0.7, 1.4)  # chosen: times its size, from which a doubtful fit is begun again
 SWITCH_LEAVES = 0.5  # chosen: of a gap, the most that what has no number may leave to be asked
 RICHER_GAIN = 10.0  # chosen: by which all of a record must speak for a richer law of dry friction
-FORETOLD_LEAST, RICHER_STARTS = 1.0, 2  # chosen: foretold of a richer bend, to be fitted; from where
+FORETOLD_LEAST, RICHER_STARTS = 1.0, 2  # chosen: foretold of a richer bend to be fitted, and starts
 NEEDLESS_GAIN = 4.0  # an effect that others have made needless would be missed by less; chosen
 MOST_EFFECTS = 4  # chosen: effects in one answer
 

@@ -10,7 +10,15 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from coupled.rig.friction import SLIPS_ALL, running_friction, yielded, yielding_speed
+from coupled.rig.friction import (
+    FADED,
+    SLIPS_ALL,
+    kept_at,
+    reached,
+    running_friction,
+    yielded,
+    yielding_speed,
+)
 from coupled.rig.packing import pack
 from coupled.rig.rig import Rig
 from tests.support.rigs import bench, push
@@ -103,6 +111,22 @@ def test_a_steps_speed_balances_its_forces(
     speeds = abs(u) + abs(rate)
     assert inertia * (u - rate) + force == pytest.approx(push_N, abs=1e-6 * inertia * speeds + 1e-9)
     assert after == pytest.approx(ends, abs=1e-6 * TRAVEL_m)
+
+
+@given(st.floats(0.0, 800.0))
+@example(0.1)
+@example(math.nextafter(0.1, 1.0))
+@example(1e-300)
+def test_what_is_reached_of_an_exponential_is_known_to_thirteen_digits(x: float) -> None:
+    assert float(reached(x)) == pytest.approx(-math.expm1(-x), rel=1e-13)
+
+
+def test_nothing_is_kept_of_what_fades_with_speed_far_above_it() -> None:
+    p = pack(bench(YIELDS))[0]["parameters"]["friction"]
+    for ratio in (0.0, 0.7, -2.0, 5.9):
+        rate = ratio * float(p["stribeck_rate"])
+        assert float(kept_at(p, rate)) == pytest.approx(math.exp(-(ratio**2)), rel=1e-12)
+    assert kept_at(p, 1.01 * FADED * float(p["stribeck_rate"])) == 0.0
 
 
 def test_a_small_force_is_held_by_spring_and_contact_together() -> None:

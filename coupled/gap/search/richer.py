@@ -82,9 +82,10 @@ def plainer_on_all(
                 continue
             effects = [law if one is step.effect else one for one in current.effects]
             known = {p.key: current.values[step.effect.value_key(p)] for p in step.effect.free}
-            start = {**current.values, **{law.value_key(p): known[p.key] for p in law.free}}
-            begun = {**current.values, **{law.value_key(p): p.starts[0] for p in law.free}}
-            fits = [case.fit(effects, start=one) for one in (start, begun)]
+            sizes = {law.value_key(p): [known[p.key], p.starts[0], *p.starts] for p in law.free}
+            level = law.free[0]  # which may be right while what shapes it is not
+            sizes[law.value_key(level)][1] = known[level.key]
+            fits = in_threads(partial(_fitted, case, effects), _each(current.values, sizes))
             fitted = min(fits, key=lambda one: one.cost)
             causes = may_be_causes(case, [(law, fitted)]) and not says_nothing(case, law, fitted)
             if causes and likelier_by(case.outputs, current, fitted) < RIVAL_GAIN:
@@ -127,9 +128,13 @@ def _begun(law: Effect, plain: Effect, current: Fit) -> Starts:
     known = {p.key: current.values[plain.value_key(p)] for p in plain.free}
     shared = {law.value_key(p): known[p.key] for p in law.free if p.key in known}
     sizes = {law.value_key(p): _sizes(p) for p in law.free if p.key not in known}
+    return _each({**current.values, **shared}, sizes)
+
+
+def _each(values: Mapping[str, float], sizes: Mapping[str, Sequence[float]]) -> Starts:
+    """Return values with each of the sizes of some numbers, of the shorter ones the last."""
     return [
-        {**current.values, **shared}
-        | {key: each[min(shape, len(each) - 1)] for key, each in sizes.items()}
+        {**values, **{key: each[min(shape, len(each) - 1)] for key, each in sizes.items()}}
         for shape in range(max(map(len, sizes.values())))
     ]
 
