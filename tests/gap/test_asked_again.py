@@ -166,24 +166,40 @@ def test_air_that_is_known_by_a_late_motion_moved_before(tmp_path: Path) -> None
     assert stage_gaps(outputs, in_time)["airframe"] > 3.0 * stage_limits(outputs)["airframe"]
 
 
-@pytest.mark.parametrize("wide", [True, False])
-def test_a_fit_with_a_setting_at_its_end_is_begun_anew_where_a_gap_is_left(
-    wide: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("wide", "stands", "rubs", "asked"),
+    [
+        (True, 1.02, False, (1.0, 0.7, 1.4)),
+        (False, 1.0199, False, (1.0, 0.7, 1.4)),
+        (False, 1.015, False, ()),
+        (True, 1.02, True, (1.0,)),
+        (False, 1.02, True, ()),
+    ],
+    ids=["a gap", "next to its end", "within", "a gap and friction", "friction alone"],
+)
+def test_a_fit_with_a_setting_at_its_end_is_begun_anew(
+    wide: bool,
+    stands: float,
+    rubs: bool,
+    asked: tuple[float, ...],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A servo at 0.98 of its frequency held a limit of acceleration in a hollow, 2.7 of 172."""
+    """A servo at 0.98 of its frequency held a limit of acceleration in a hollow, 2.7 of 172.
+
+    And within the limit a play of 3.7 mm that was 4.0, which all of the record shows by 322.
+    """
 
     def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         loader, filed = rig.controls["column"].loader, bench().controls["column"].loader
-        return np.asarray(loader.offset * FIRST + (loader.mass / filed.mass - 1.0) * 50.0 * SECOND)
+        return np.asarray(loader.offset * FIRST + (loader.mass / filed.mass - 1.0) * 25.0 * SECOND)
 
-    case = Case(
-        bench(), "column", [Output("loader", "x", 9.0 * FIRST + NOISE, predict, 1.0, 120.0)]
-    )
+    rig = bench({"friction_N": 2.0} if rubs else {})
+    case = Case(rig, "column", [Output("loader", "x", 9.0 * FIRST + NOISE, predict, 1.0, 120.0)])
     right = case.fit((OFFSET,))
     mass = case.known["inertia"]
     key, offset = mass.value_key(mass.free[0]), OFFSET.value_key(OFFSET.free[0])
-    values = {**right.values, key: 1.02, offset: 6.0 if wide else 9.0}
-    stood = replace(right, values=values, at_bound=(key,), cost=2.0 * right.cost)
+    values = {**right.values, key: stands, offset: 6.0 if wide else 9.0}
+    stood = replace(right, values=values, at_bound=(), cost=2.0 * right.cost)
     stood = replace(stood, rig=case.with_only(stood, (OFFSET,)))
     starts = list[dict[str, float]]()
 
@@ -193,11 +209,12 @@ def test_a_fit_with_a_setting_at_its_end_is_begun_anew_where_a_gap_is_left(
 
     monkeypatch.setattr(Case, "fit", begun)
     found = with_settings_anew(case, stood)
-    assert starts == [{k: v for k, v in values.items() if k == offset}]
-    assert found.values[key] == pytest.approx(1.0, abs=2e-3)
-    assert found.values[offset] == pytest.approx(9.0, abs=0.1)
-    free = replace(stood, at_bound=())
-    assert with_settings_anew(case, free) is free
+    assert sorted(start[offset] for start in starts) == pytest.approx(
+        sorted(times * values[offset] for times in asked)
+    )
+    settings = {one.value_key(p) for one in case.known.values() for p in one.free}
+    assert not any(settings & {*start} for start in starts)
+    assert found is (right if asked else stood)
 
 
 def test_less_than_the_noise_known_of_a_stage_strains_no_setting(
@@ -233,9 +250,10 @@ def test_a_servo_s_damping_is_asked_where_its_dead_time_was_found() -> None:
     current = replace(case.fit(()), effects=(delay,))
     known = {delay.value_key(p): 0.02 + k for k, p in enumerate(delay.free)}
     current = replace(current, values=known)
-    [(law, least, [start])] = list(richer._richer(case, EFFECTS, delay, current))
+    [(law, least, starts)] = list(richer._richer(case, EFFECTS, delay, current))
     assert (law, least) == (tuning, RIVAL_GAIN)
-    assert [start[tuning.value_key(p)] for p in tuning.free] == [0.02, 1.02, 1.0]
+    asked = [[start[tuning.value_key(p)] for p in tuning.free] for start in starts]
+    assert asked == [[0.02, 1.02, 0.8], [0.02, 1.02, 1.25]]
     assert not list(richer._richer(case, EFFECTS, tuning, replace(current, effects=(tuning,))))
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from coupled.gap import diagnose as diagnosis
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import candidates, richer
 from coupled.gap.search import search as search_module
@@ -204,17 +206,17 @@ def test_the_floors_of_a_rig_asked_again_are_kept(
     read = list[Rig]()
     outputs, search = diagnosis._outputs, search_module.search
 
-    def counted(readers: list[Reader], *more: object) -> object:
+    def counted(readers: list[Reader], *more: Any) -> list[Output]:
         read.append(readers[0].rig)
-        return outputs(readers, *more)  # type: ignore[arg-type]
+        return outputs(readers, *more)
 
-    def asked(case: Case, library: object) -> tuple[Case, Choice]:
+    def asked(case: Case, library: list[Effect]) -> tuple[Case, Choice]:
         read.clear()
         assert case.refloored is not None
         for friction in (1.0, 2.0, 1.0, 2.0):
             case.refloored(rig.changed({"controls.column.loader.friction_N": friction}))
         assert len(read) == 2
-        return search(case, library)  # type: ignore[arg-type]
+        return search(case, library)
 
     monkeypatch.setattr(diagnosis, "_outputs", counted)
     monkeypatch.setattr(diagnosis, "search", asked)

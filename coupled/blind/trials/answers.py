@@ -137,8 +137,12 @@ class Answer:
         return sum(share for name, share in shares.items() if name in others)
 
     def interval(self, effect: str, parameter: str) -> Interval | None:
-        """Return the interval of a true effect's parameter, by whatever name it was found."""
-        names = [effect] if effect in self.found else sorted({*self.found} - self.truth.names)
+        """Return the interval of a true effect's parameter, by any name that is the same law.
+
+        A rival is another law, in which a number of the same name is another number.
+        """
+        others = sorted({*self.found} & self._known - self.truth.names)
+        names = [effect] if effect in self.found else others
         found = (self.found[name].intervals.get(parameter) for name in names)
         return next((interval for interval in found if interval is not None), None)
 

@@ -25,7 +25,7 @@ from coupled.gap.search.choose import Choice
 from coupled.gap.search.courses import course_in
 from coupled.gap.search.rivals import Found
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -139,7 +139,10 @@ def _estimate(
     choice: Choice, effect: Effect, p: Parameter, case: Case, scatter: float
 ) -> ParameterEstimate:
     key, fit = effect.value_key(p), choice.fit
-    value, low, high = fit.values[key], fit.low[key], fit.high[key]
+    value = fit.values[key]
+    # The formulas count noise and misfit, and not that a fit may end beside the best.
+    low = value - UNDERSTATED * (value - fit.low[key])
+    high = value + UNDERSTATED * (fit.high[key] - value)
     if scatter > 0.0:  # the records meet a sample of it
         low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
         high = value + math.hypot(high - value, 1.96 * scatter * value)

@@ -1,4 +1,4 @@
-"""A fit begun anew where something is over its limit: it may have ended in a hollow.
+"""A fit begun anew where it may have ended in a hollow: over a limit, or at a setting's end.
 
 What the contact of dry friction, or a setting, was found beside lacked the effect found last, and
 either may make up for that effect's number.
@@ -6,9 +6,17 @@ either may make up for that effect's number.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from coupled.gap.chain import BY_NAME as STAGE_OF
+from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.signals.output import stage_limits
+from coupled.gap.thresholds import BEGUN_AT, NEXT_TO
+from coupled.parallel import in_threads
 
 
 def with_contact_anew(case: Case, current: Fit) -> Fit:
@@ -24,15 +32,38 @@ def with_contact_anew(case: Case, current: Fit) -> Fit:
 
 
 def with_settings_anew(case: Case, current: Fit) -> Fit:
-    """Return a fit, or the one begun with the settings as filed if that leaves less.
+    """Return a fit, or the least of those begun with the settings as filed where one is at its end.
 
-    Where a setting stands at its end and something is over its limit: the fit may have ended in a
-    hollow, in which the setting makes up for an effect's number.
+    The fit may have ended in a hollow, in which the setting makes up for an effect's number: that
+    is tried at less and at more, too. Of friction and of flights, of which each fit takes long, it
+    is asked only where something is over its limit, and by its number as found.
     """
+    ends = {one.value_key(p): (p.low, p.high) for one in case.known.values() for p in one.free}
+    strained = {key for key in ends if key in current.values and _at_end(current, key, ends[key])}
+    settings = (one for one in case.known.values() if strained & {*map(one.value_key, one.free)})
+    shown = {stage for one in settings for stage in one.shows_in}
+    ours = [one for one in current.effects if one.free and shown & {*one.shows_in}]
+    long = any(STAGE_OF[stage].flown for stage in shown) or any(one.dry for one in ours)
+    long |= "loader" in shown and is_dry(case.nominal, case.control)
     limits = stage_limits(case.outputs)
-    keys = {one.value_key(p) for one in case.known.values() for p in one.free}
-    strained = [key for key in current.at_bound if key in keys]
-    if not strained or all(gap <= limits[at] for at, gap in case.gaps(current.rig).items()):
+    wide = any(gap > limits[at] for at, gap in case.gaps(current.rig).items())
+    if not strained or (long and not wide):
         return current
-    start = {key: value for key, value in current.values.items() if key not in keys}
-    return min([current, case.fit(current.effects, start=start)], key=lambda one: one.cost)
+    filed = {key: value for key, value in current.values.items() if key not in ends}
+    starts = [filed]
+    for effect in [] if long else ours:
+        key, level = effect.value_key(effect.free[0]), effect.free[0]
+        none = level.neutral(case.nominal, case.control)
+        starts += [{**filed, key: none + times * (filed[key] - none)} for times in BEGUN_AT]
+    fits = in_threads(partial(_begun, case, current.effects), starts)
+    return min([current, *fits], key=lambda one: one.cost)
+
+
+def _begun(case: Case, effects: Sequence[Effect], start: Mapping[str, float]) -> Fit:
+    return case.fit(effects, start=start)
+
+
+def _at_end(current: Fit, key: str, ends: tuple[float, float]) -> bool:
+    """Tell whether a setting stands at an end of its tolerance, or next to it."""
+    room = NEXT_TO * (ends[1] - ends[0])
+    return key in current.at_bound or not ends[0] + room < current.values[key] < ends[1] - room

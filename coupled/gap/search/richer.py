@@ -24,6 +24,7 @@ from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import Starts, foretold, little_richer
 from coupled.gap.search.rivals import Found, weight
 from coupled.gap.thresholds import (
+    BESIDE_ONE,
     FORETOLD_LEAST,
     RICHER_GAIN,
     RICHER_STARTS,
@@ -140,7 +141,12 @@ def _each(values: Mapping[str, float], sizes: Mapping[str, Sequence[float]]) -> 
 
 
 def _sizes(number: Parameter) -> list[float]:
-    """Return the values at which a number is tried: a limit over three decades."""
+    """Return the values at which a number is tried: a limit over three decades.
+
+    A factor that begins at 1 is tried beside that: nothing is foretold of what changes nothing.
+    """
+    if number.mode == "factor" and number.starts == (1.0,):
+        return list(BESIDE_ONE)
     if not number.inverse:
         return list(number.starts)
     wide = [times * number.starts[0] for times in SCREEN_SIZES]
