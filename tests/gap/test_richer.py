@@ -26,7 +26,7 @@ from coupled.gap.search.rivals import Found
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import LOOP_NOISES, RIVAL_GAIN
+from coupled.gap.thresholds import LEAST_GAIN, LOOP_NOISES
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.records import NOISE as NOISE_OF
@@ -102,7 +102,7 @@ def test_a_richer_law_is_fitted_only_where_something_is_foretold(
         for law, least, starts in richer._richer(case, EFFECTS, BEND, current)
     }
     assert set(asked) == {"stiffening_bend", "bend_hysteresis", "structural_mode"}
-    assert all(least == RIVAL_GAIN and len(starts) == 2 for least, starts in asked.values())
+    assert all(least == LEAST_GAIN and len(starts) == 2 for least, starts in asked.values())
     key = BEND.value_key(BEND.free[0])
     for law in (STIFFENING, LOOP, MODE):
         assert all(

@@ -3,8 +3,8 @@
 Half of a record may hold too few breakaways to earn a law of friction its place, or leave open how
 a servo with a dead time is damped, or whether a bend has a loop; and a fit to it may end in a
 hollow. On all of it the richer law must do more, since it can bend farther: by `RICHER_GAIN` of dry
-friction, of which no law is exact, and by `RIVAL_GAIN` elsewhere. What a law of friction could gain
-is foretold first (`laws`): it costs six replays and spares most of the fits.
+friction, of which no law is exact, by `LEAST_GAIN` of a bend, and of a servo, which may be either,
+by `RIVAL_GAIN`. What a richer law could gain is foretold first (`laws`), which spares most fits.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from coupled.gap.search.rivals import Found, weight
 from coupled.gap.thresholds import (
     BESIDE_ONE,
     FORETOLD_LEAST,
+    LEAST_GAIN,
     RICHER_GAIN,
     RICHER_STARTS,
     RIVAL_GAIN,
@@ -112,7 +113,8 @@ def _richer(
             if gain is None or gain >= RICHER_GAIN:
                 yield law, RICHER_GAIN, little_richer(case, law, plain, current)
         elif _holds(law, plain):
-            yield law, RIVAL_GAIN, _promising(case, law, plain, current)
+            least = RIVAL_GAIN if law.reserve else LEAST_GAIN
+            yield law, least, _promising(case, law, plain, current)
 
 
 def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> Starts:
