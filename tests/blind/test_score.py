@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from coupled.blind.trials.answers import Answer, FoundEffect, read_answers
+from coupled.blind.trials.answers import Answer, FoundEffect, Interval, read_answers
 from coupled.blind.trials.key import Key, Seal, digest, read_key
 from coupled.blind.trials.result import Share
 from coupled.blind.trials.score import score, share
@@ -242,6 +242,18 @@ def test_brier_and_reliability_by_hand(tmp_path: Path) -> None:
     [only] = found.bins
     assert only.stated == pytest.approx(0.9)
     assert only.true.share == 0.5
+
+
+def test_an_interval_is_not_held_against_a_rivals_number_of_the_same_name() -> None:
+    """A gauge's zero of -0.40 N was held against an offset of the loader of 0.40 N."""
+    found = {"viscous_damping": FoundEffect(0.5, {"factor": Interval(1.1, 1.3)})}
+    alike = replace(truth("single", "inertia"), alike=("viscous_damping",))
+    nothing: frozenset[str] = frozenset()
+    answer = Answer("r001", alike, "ambiguous", found, nothing, nothing, nothing, None)
+    assert answer.interval("inertia", "factor") is None
+    same = replace(alike, readings=(Reading(("viscous_damping",), ("loader",), True),))
+    by_another_name = replace(answer, truth=same).interval("inertia", "factor")
+    assert by_another_name == Interval(1.1, 1.3)
 
 
 def test_intervals_of_shares_are_exact() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from coupled.gap import diagnose as diagnosis
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
-from coupled.gap.search import candidates, richer
+from coupled.gap.search import candidates, contest, richer
 from coupled.gap.search import search as search_module
 from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
@@ -221,3 +221,67 @@ def test_the_floors_of_a_rig_asked_again_are_kept(
     monkeypatch.setattr(diagnosis, "_outputs", counted)
     monkeypatch.setattr(diagnosis, "search", asked)
     assert diagnosis.diagnose(rig, {"r": record}).verdict == "no_gap"
+
+
+def test_of_several_richer_laws_the_likeliest_is_named_and_what_is_near_it_a_rival(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    case = Case(bench(), "column", [Output("linkage", "x", NOISE, lambda _: 0.0 * NOISE, 1.0, 120)])
+    current = replace(case.fit(()), effects=(BEND,))
+    gains = {STIFFENING: 20.0, LOOP: 31.0, MODE: 29.0}
+    nowhere = list[dict[str, float]]([{}])
+    asked = [(law, LEAST_GAIN, nowhere) for law in gains]
+    monkeypatch.setattr(richer, "_richer", lambda *_: iter(asked))
+    monkeypatch.setattr(richer, "_is_cause", lambda *_: True)
+    monkeypatch.setattr(
+        richer, "_fitted", lambda case, effects, start: replace(current, effects=tuple(effects))
+    )
+    monkeypatch.setattr(richer, "likelier_by", lambda _, fitted, __: gains[fitted.effects[0]])
+    [one], last = richer_on_all(case, EFFECTS, [Found(BEND, 800.0, 0.97, ())], current)
+    assert (one.effect, last.effects) == (LOOP, (LOOP,))
+    assert [(rival.effect, rival.gain) for rival in one.rivals] == [(MODE, 798.0)]
+    assert one.probability == pytest.approx(1.0 / (1.0 + np.exp(-2.0) + np.exp(-11.0)), rel=1e-4)
+
+
+def test_what_says_something_is_not_given_up_for_its_rival() -> None:
+    def predict(rig: Rig) -> NDArray[np.float64]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + 0.1 * SECOND))
+
+    case = Case(bench(), "column", [Output("loader", "x", 3.0 * FIRST + NOISE, predict, 1.0, 120)])
+    current = case.fit((OFFSET,))
+    step = Found(OFFSET, 46.0, 0.5, (Candidate(46.0, WEIGHT, case.fit((WEIGHT,), "fitted")),))
+    assert in_place_of_open(case, [step], current) == ([step], current)
+
+
+def test_one_that_another_would_overtake_is_begun_with_its_contact_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It may stand in a hollow; where nothing would overtake it, that is spared."""
+    rig = bench({"friction_N": 2.0})
+    case = Case(rig, "column", [Output("loader", "x", NOISE, lambda _: 0.0 * NOISE, 1.0, 120)])
+    contact = {one.value_key(p): 0.1 for one in case.contact for p in one.free}
+    own = {OFFSET.value_key(OFFSET.free[0]): 1.0}
+    here = replace(case.fit(()), effects=(OFFSET,), values={**own, **contact})
+    starts = list[dict[str, float]]()
+
+    def begun(self: Case, effects: tuple[Effect, ...], start: dict[str, float]) -> Fit:
+        starts.append(start)
+        return replace(here, effects=tuple(effects), values={**here.values})
+
+    monkeypatch.setattr(Case, "fit", begun)
+    monkeypatch.setattr(contest, "may_be_causes", lambda *_: True)
+    monkeypatch.setattr(contest, "says_nothing", lambda *_: False)
+    for less, anew in ((-5.0, True), (1.0, False)):
+        starts.clear()
+        monkeypatch.setattr(contest, "likelier_by", lambda *_, less=less: less)
+        contest.contested(case, here, OFFSET, WEIGHT, [{}])
+        assert any(contact.keys().isdisjoint(start) for start in starts[1:]) is anew
+
+
+def test_how_far_a_breakaway_stands_above_running_friction_has_the_error_of_that() -> None:
+    """One of 16.3 N above 15.5 N was known to 1.5 % of 16.3 N alone, and so was none."""
+    breakaway = BY_NAME["stribeck_friction"].free[1]
+    rig = bench({"friction_N": 15.0})
+    assert breakaway.error(16.0, rig, "column") == pytest.approx(0.015 * 1.0)
+    assert BY_NAME["force_offset"].free[0].error(2.0, rig, "column") == pytest.approx(0.03)
