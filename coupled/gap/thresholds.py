@@ -51,11 +51,14 @@ MAINS_OFF = 0.01  # chosen: relative; a public grid stays within 1 % for 99.5 % 
 JUMPS = 0.5  # chosen: of the rms of fourth differences, under which the usual one shows jumps
 LOUDER = 3.0  # chosen: times a signal's own noise, from which what a stage leaves is none
 LEAST_NOISE = 1e-3  # chosen: of a signal's rms, the noise of a channel whose own was filtered away
+REST_FRAMES, REST_PART = 30, 20  # chosen: of a window that may rest, and of a part of a rest
+REST_LEAST, REST_FADES = 36, 8  # chosen: frames of the shortest rest, and over which one begins
+REST_SPREAD, REST_CHANCE = 1.35, 3.0  # chosen: times the noise, and standard deviations of means
 HEARD_ANEW = 0.8  # chosen: of a noise, under which another rig's residual says that it was a gap
 BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the force itself
 FELT_FRAMES = 4  # chosen: to either side, over which an answer says what was felt of a force
-FELT = 0.9  # chosen: share of a force's roughness in its answer, from which it is no noise
-HALF_FELT = 0.5  # chosen: the same, from which to smooth it would take more than it gives
+FELT, HALF_FELT = 0.9, 0.5  # chosen: share of a force's roughness in its answer, from which it is
+# no noise, and from which to smooth it would take more than it gives
 UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
 
 # Halves of a record: fitted and held out (`output`).
@@ -162,8 +165,7 @@ MOST_CORRECTIONS = 6  # chosen: and how often, before differences are taken anew
 MOVED_LEAST = 1e-3  # chosen: floors of such a move, under which they stay
 MISSED_LITTLE = 0.05  # chosen: share of it, up to which they say as much as new ones
 MOVED_LITTLE = 0.02  # floors that what jumps has moved, with its slopes kept; 0.1 misled 1 of 24
-DAMPING_FIRST = 0.01  # chosen: of a fit's first step,
-DAMPING_NEXT = 0.03  # and of one after a step that gained nothing; chosen
+DAMPING_FIRST, DAMPING_NEXT = 0.01, 0.03  # chosen: of a fit's first step, and after one in vain
 DAMPED_MORE = 10.0  # chosen: times as much after each more of them,
 REFUSED = 3  # of which so many end a fit, chosen, where they foretold less than this
 JUMPS_HIDE = 0.01  # chosen: of its cost; and
@@ -266,13 +268,11 @@ BOOTSTRAPS = 400  # chosen: draws of a bootstrap interval
 FEW_STRETCHES = 8  # under which a bootstrap interval is not to be relied on; chosen
 
 # What size would have shown (`power`).
-POWER_DECADES = 3  # chosen: to either side of a fit's start
-POWER_HALVINGS = 5  # of the decade where an effect begins to show: to 7 %
+POWER_DECADES, POWER_HALVINGS = 3, 5  # chosen: beside a start; of the decade that shows: to 7 %
 SETTING_NUDGE = 0.5  # chosen: of a setting's tolerance, at which its signature is taken
 
 # The next test (`proposal`), and the flight again (`flown`).
-TEST_s = 15.0  # chosen: length of a test
-TEST_EDGE_s = 0.25  # chosen: in which a hand can begin or end a push
+TEST_s, TEST_EDGE_s = 15.0, 0.25  # chosen: of a test, and in which a hand begins or ends a push
 SEPARATED_GAIN = 10.0  # chosen: log-likelihood that settles which of two it is
 SAME_FLIGHT = 0.01  # chosen: of the mean logarithm, by which an improved rig may fly further off
 PROFILE_EVERY = 12  # chosen: frames between the points of a bench's q̄

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.driven import Drive
 from coupled.gap.signals.floors import floor_from, input_noise, noise_in
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.sensed import Sensed
@@ -117,18 +118,18 @@ class Reading:
         """The quantity that is imposed: the grip's motion where the record has it, else δc."""
         return "deflection" if self.name_of("deflection") in self.record else "computed"
 
-    def commanded(self) -> tuple[Floats, Noise]:
-        """Return δc as it drives the linkage, and its noise: a set point has none."""
+    def commanded(self) -> Drive:
+        """Return δc as it drives the linkage: a set point has no noise."""
         computed = self.signal("computed")
         if self.set_points:
-            return computed, Noise(0.0)
-        return smoothed(computed), self.heard("computed")
+            return Drive.of(computed, Noise(0.0))
+        return Drive.of(computed, self.heard("computed"))
 
-    def pulled(self) -> tuple[Floats, Noise]:
-        """Return F as it drives the linkage, and its noise; none where the record lacks it."""
+    def pulled(self) -> Drive:
+        """Return F as it drives the loader and the linkage; none where the record lacks it."""
         if self.name_of("force") not in self.record:
-            return np.zeros(len(self.record)), Noise(0.0)
-        return smoothed(self.signal("force")), self.heard("force")
+            return Drive.of(np.zeros(len(self.record)), Noise(0.0))
+        return Drive.of(self.signal("force"), self.heard("force"))
 
     def name_of(self, quantity: str) -> str:
         """Return the name of a quantity's channel."""

@@ -11,7 +11,8 @@ push what √2 times as much does: then the record shows no push, and none is ta
 A contact of dry friction that yields walks likewise: where the force rests, each tremble of F as
 measured lets it slip a little, and it gives way as the real one, which never felt that, does not.
 Of 24 blind records (seed 103) it walked by over half a floor in three, and by ten in one that held
-its force for seconds. It walks as far as the tremble is large, and is put back alike.
+its force for seconds. It walks as far as the tremble is large, and is put back alike. Where the
+force rests altogether it is held (`resting`), and does not tremble.
 """
 
 from __future__ import annotations
@@ -21,36 +22,12 @@ from collections.abc import Callable
 import numpy as np
 
 from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
-from coupled.gap.noise.noise import Noise
-from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import PUSHED, RATCHET, WALKED, WALKED_BY, WALKED_N
 from coupled.record.channels import ControlName, unit_of
-from coupled.rig.nodes import Nodes
 from coupled.rig.rig import Rig
 
 Driven = Callable[[Rig, float], Floats]  # by a rig and so many times a sample of the noise
-
-
-def passed(signal: Floats, noise: Noise) -> Floats:
-    """Return a sample of what the smoother of a signal passes of its noise, same shape and unit."""
-    rng = np.random.default_rng(47)
-    return Smoother.of(signal).smooth(noise.sample(len(signal), rng))
-
-
-def passed_noise(
-    signals: tuple[Floats, Floats], noises: tuple[Noise, Noise]
-) -> tuple[Nodes, Floats]:
-    """Return samples of what the smoothers of δc and F pass of their noise.
-
-    δc's on the loader's nodes, in d, F's at the frames, in N.
-    """
-    rng = np.random.default_rng(47)
-    computed, force = (
-        Smoother.of(signal).smooth(noise.sample(len(signal), rng))
-        for signal, noise in zip(signals, noises, strict=True)
-    )
-    return Nodes(computed), force
 
 
 def unratcheted(rig: Rig, control: ControlName, at: Driven, measured: Floats) -> Floats:

@@ -27,7 +27,6 @@ from coupled.gap.signals.floors import (
     given_noise,
     left_noise,
     noise_in,
-    unsmoothed,
     with_error,
     without_echo,
 )
@@ -41,8 +40,6 @@ from coupled.gap.stages.product import Product
 from coupled.gap.stages.ratchet import (
     Driven,
     is_walked,
-    passed,
-    passed_noise,
     unratcheted,
     unwalked,
 )
@@ -73,6 +70,7 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
+SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
 
 
 @dataclass(frozen=True)
@@ -162,11 +160,10 @@ class Reader(Reading):
         return [self._made("schedule", self.name_of("gradient"), gradient, predict, noisy, own)]
 
     def _loader(self) -> list[Output]:
-        noisy_force, gradient = self.signal("force"), self.gradient()
-        force, level = smoothed(noisy_force), self.heard("force")
+        force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
         load_of = self.load()
-        smooth, own, wandering = smoothed(computed), self.heard("computed"), with_error
+        smooth, own = smoothed(computed), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
@@ -202,18 +199,20 @@ class Reader(Reading):
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + NOISE_TRIES, own)
-            return predicted(driven(wandering(force, k, level), seen), 2.0**0.5)(rig)
+            return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
-        if level.rms > BROAD * float(np.std(noisy_force)):
-            share = felt(noisy_force, computed)
-            level = replace(level, rms=level.rms * float(np.sqrt(max(1.0 - share, 0.0))))
+        if force.noise.rms > BROAD * float(np.std(force.recorded)):
+            share = felt(force.recorded, computed)
+            less = float(np.sqrt(max(1.0 - share, 0.0)))
+            level = replace(force.noise, rms=force.noise.rms * less)
             if share > FELT:
-                level = given_noise(self.rig, self.name_of("force"), noisy_force)
-            if share > HALF_FELT:
-                force, wandering = noisy_force, unsmoothed
-        trembling = Nodes(passed(noisy_force, level))
-        answer = driven(force, smooth)
-        walks = force is not noisy_force and is_walked(self.rig, self.control, answer, own.rms)
+                level = given_noise(self.rig, self.name_of("force"), force.recorded)
+            smooth_enough = share <= HALF_FELT
+            force = replace(force, noise=level) if smooth_enough else force.unsmoothed(level)
+        trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
+        answer = driven(force.smooth, smooth)
+        walks = force.smooth is not force.recorded
+        walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
         whole = self._made("loader", *made)
         return [replace(whole, rough=lambda rig: answer(rig, 0.0)) if walks else whole]
@@ -238,10 +237,10 @@ class Reader(Reading):
 
     def _linkage(self) -> list[Output]:
         computed, measured = self.signal("computed"), self.signal("deflection")
-        (smooth, level), (smooth_force, force_level) = self.commanded(), self.pulled()
+        command, force = self.commanded(), self.pulled()
         others = {name: smoothed(signal) for name, signal in self.others().items()}
-        force = self.signal("force") if self.name_of("force") in self.record else smooth_force
-        noise = passed_noise((computed, force), (level, force_level))
+        rng = np.random.default_rng(SAMPLED)
+        noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats) -> Predict:
             nodes = Nodes(c)
@@ -256,12 +255,12 @@ class Reader(Reading):
             return lambda rig: unratcheted(rig, self.control, at, measured)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            f = with_error(smooth_force, k + NOISE_TRIES, force_level)
-            return driven(with_error(smooth, k, level), f)(rig)
+            pulled = force.with_error(k + NOISE_TRIES)
+            return driven(command.with_error(k), pulled)(rig)
 
-        made = (measured, driven(smooth, smooth_force), noisy, self.heard("deflection"))
+        made = (measured, driven(command.smooth, force.smooth), noisy, self.heard("deflection"))
         linkage = self._made("linkage", self.name_of("deflection"), *made, "computed")
-        return [replace(linkage, noises={"force": force_level.rms})]
+        return [replace(linkage, noises={"force": force.noise.rms})]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""

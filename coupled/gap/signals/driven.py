@@ -1,0 +1,48 @@
+"""A measured signal as it drives a stage: smoothed, held where it rests, and what noise does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.resting import Rest, rest_of
+from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.floors import unsmoothed, with_error
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A signal that drives a stage, as recorded and as it drives it, its noise and its rest."""
+
+    recorded: Floats
+    smooth: Floats
+    noise: Noise
+    rest: Rest
+
+    @classmethod
+    def of(cls, signal: Floats, noise: Noise) -> Drive:
+        """Return a signal smoothed, and held where it rests; one without noise as it is."""
+        rest = rest_of(signal, noise)
+        return cls(signal, rest.held(smoothed(signal)) if noise.rms else signal, noise, rest)
+
+    def unsmoothed(self, noise: Noise) -> Drive:
+        """Return it as recorded: what is rough in it is no noise."""
+        none = np.zeros(len(self.recorded))
+        return replace(self, smooth=self.recorded, noise=noise, rest=Rest(none, none))
+
+    def with_error(self, k: int) -> Floats:
+        """Return it with a sample of its error, number k; shape (frames,)."""
+        if self.smooth is self.recorded:
+            return unsmoothed(self.smooth, k, self.noise)
+        error = with_error(self.smooth, k, self.noise) - self.smooth
+        return np.asarray(self.smooth + self.rest.beside(error))
+
+    def passed(self, rng: np.random.Generator) -> Floats:
+        """Return a sample of what its smoother passes of its noise, shape (frames,)."""
+        sample = self.noise.sample(len(self.recorded), rng)
+        return self.rest.beside(Smoother.of(self.recorded).smooth(sample))
