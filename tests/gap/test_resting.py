@@ -98,13 +98,21 @@ def test_noise_and_level_do_not_change_where_nothing_rests(seed: int, level: flo
     assert not still.beside(error).any()
 
 
-def test_a_drive_that_rests_has_no_error_there() -> None:
+def test_a_drive_that_rests_has_the_error_of_its_level_there() -> None:
+    """Without it a healthy rig of seed 2039 (r180) stood at 1.25 floors of 1.2, and at 1.09 so."""
     drive = Drive.of(trembling(np.interp(t, [0.0, 5.0, 10.0], [0.0, 0.0, 40.0])), NOISE)
     rests = drive.rest.share == 1.0
     assert np.mean(rests[: 5 * 120]) > 0.7
-    for one in (drive.with_error(0) - drive.smooth, drive.passed(np.random.default_rng(1))):
-        assert not one[rests].any()
-        assert np.std(one[~rests]) > 0.0
+    [(start, end), *_] = drive.rest.ends
+    inner = slice(start + 10, end - 10)
+    errors = [(drive.with_error(k) - drive.smooth)[inner] for k in range(200)]
+    assert all(np.ptp(error) < 1e-12 for error in errors)
+    levels = [float(error[0]) for error in errors]
+    assert np.std(levels) == pytest.approx(NOISE.rms / np.sqrt(end - start), rel=0.2)
+    assert np.std((drive.with_error(0) - drive.smooth)[~rests]) > 0.01
+    passed = drive.passed(np.random.default_rng(1))
+    assert not passed[rests].any()
+    assert np.std(passed[~rests]) > 0.01
     rough = drive.unsmoothed(NOISE)
     assert rough.smooth is drive.recorded
     assert not rough.rest.share.any()

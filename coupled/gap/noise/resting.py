@@ -31,10 +31,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rest:
-    """Where a signal rests, 1 in `share`, and at which level, in its unit; shapes (frames,)."""
+    """Where a signal rests, 1 in `share`, and at which level, in its unit; shapes (frames,).
+
+    `ends` are the first frame of each rest and the one after its last, `errors` the standard errors
+    of their levels, in its unit.
+    """
 
     share: Floats
     level: Floats
+    ends: tuple[tuple[int, int], ...] = ()
+    errors: tuple[float, ...] = ()
 
     def held(self, smooth: Floats) -> Floats:
         """Return a smoothed signal, held where it rests; same shape."""
@@ -44,6 +50,13 @@ class Rest:
         """Return the error of a smoothed signal without that where it rests; same shape."""
         return (1.0 - self.share) * error
 
+    def with_error(self, error: Floats, rng: np.random.Generator) -> Floats:
+        """Return the error of a smoothed signal, and of its level where it rests; same shape."""
+        whole = self.beside(error)
+        for (start, end), size in zip(self.ends, self.errors, strict=True):
+            whole[start:end] += self.share[start:end] * rng.normal(0.0, size)
+        return whole
+
 
 def rest_of(signal: Floats, noise: Noise) -> Rest:
     """Return where a signal with noise rests; nowhere, where it has none or is short.
@@ -51,6 +64,7 @@ def rest_of(signal: Floats, noise: Noise) -> Rest:
     Nor where the noise is a large part of it: that may be the signal itself, which then moves.
     """
     share, level = np.zeros(len(signal)), np.zeros(len(signal))
+    ends, errors = list[tuple[int, int]](), list[float]()
     clear = 0.0 < noise.rms <= BROAD * float(np.std(signal))
     if clear and len(signal) > 2 * REST_FRAMES:
         for start, end in _stretches(_quiet(signal, noise)):
@@ -59,7 +73,9 @@ def rest_of(signal: Floats, noise: Noise) -> Rest:
                 frames = np.arange(1, end - start + 1)
                 near = np.minimum(frames, frames[::-1]) / REST_FADES
                 share[start:end], level[start:end] = np.minimum(1.0, near), mean
-    return Rest(share, level)
+                ends.append((start, end))
+                errors.append(noise.rms * math.sqrt(_longer(noise) / (end - start)))
+    return Rest(share, level, tuple(ends), tuple(errors))
 
 
 def _quiet(signal: Floats, noise: Noise) -> NDArray[np.bool_]:

@@ -40,7 +40,7 @@ class Drive:
         if self.smooth is self.recorded:
             return unsmoothed(self.smooth, k, self.noise)
         error = with_error(self.smooth, k, self.noise) - self.smooth
-        return np.asarray(self.smooth + self.rest.beside(error))
+        return self.smooth + self.rest.with_error(error, np.random.default_rng([43, k]))
 
     def passed(self, rng: np.random.Generator) -> Floats:
         """Return a sample of what its smoother passes of its noise, shape (frames,)."""
