@@ -35,7 +35,7 @@ from coupled.plots.saving import save
 from coupled.plots.trials import draw_score
 from tests.support.commands import ROOT
 
-SCORED = "the version of 24 November 2026"  # whose diagnoses the file scores
+SCORED = "the version of 25 November 2026"  # whose diagnoses the file scores
 SINCE = "No threshold was set on them, and they were scored once."
 JSON, FIGURE = ROOT / "docs" / "blind-score.json", ROOT / "docs" / "blind-score.png"
 README, TABLE = ROOT / "README.md", ROOT / "docs" / "diagnosis.md"
