@@ -256,6 +256,19 @@ def test_an_interval_is_not_held_against_a_rivals_number_of_the_same_name() -> N
     assert by_another_name == Interval(1.1, 1.3)
 
 
+def test_the_key_of_another_set_is_refused(trials: Path) -> None:
+    """It scored 600 diagnoses of seed 2039 by the key of seed 2038."""
+    path = trials / "answers" / "r001.json"
+    table = json.loads(path.read_text())
+    for rig, refused in (("x", False), ("other", True)):
+        path.write_text(json.dumps({**table, "made": {"rig": rig}}))
+        if not refused:
+            assert read_answers(trials / "answers", read_key(trials / "set.key.json"))
+            continue
+        with pytest.raises(InputError, match=r"made\.rig: is other, in the key x"):
+            read_answers(trials / "answers", read_key(trials / "set.key.json"))
+
+
 def test_intervals_of_shares_are_exact() -> None:
     # Clopper and Pearson, Biometrika 26, 1934: 0 of n leaves 1 − (α/2)^(1/n).
     assert share(0, 60).high == pytest.approx(1 - 0.025 ** (1 / 60))

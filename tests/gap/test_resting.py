@@ -144,7 +144,7 @@ def test_a_hand_that_rests_walks_neither_a_contact_nor_a_play(
     values: dict[str, float],
     stage: str,
 ) -> None:
-    """A healthy rig of seed 2036 (r066) stood at 1.69 by its true contact, and stands at 1.08."""
+    """A healthy rig of seed 2036 (r066) stood at 1.69 by its true contact, and stands at 1.09."""
     nominal = nominal_rig(False)
     time = np.arange(round(gaps.LONG_s * 120) + 1) / 120.0
     push = 12.0 * np.maximum(np.sin(2.0 * np.pi * time / 1.5), 0.0) * (time % 8.0 < 3.0)

@@ -165,6 +165,10 @@ def _read(path: Path, truth: Truth) -> Answer:
     if not isinstance(table, dict) or table.get("verdict") not in VERDICTS:
         raise InputError(path, "verdict", f"is missing or not one of {', '.join(VERDICTS)}")
     check_format(table.get("format"), FORMAT, path, "diagnosis")
+    made = table.get("made")
+    rig = made.get("rig", truth.rig) if isinstance(made, dict) else truth.rig
+    if rig != truth.rig:
+        raise InputError(path, "made.rig", f"is {rig}, in the key {truth.rig}: give this set's key")
     try:
         return _answer(path.stem, truth, table)
     except (KeyError, TypeError, AttributeError, ValueError):
