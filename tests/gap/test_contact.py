@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.anew import with_contact_anew
 from coupled.gap.search.case import Case
 from coupled.gap.search.contact import allowing_for_contact, contact_start
@@ -83,3 +84,26 @@ def test_a_contact_is_sought_anew_beside_what_it_was_found_without() -> None:
     assert case.gaps(found.rig)["loader"] < 1.1
     # Within its limit it stays as it was found.
     assert with_contact_anew(case, found) is found
+
+
+def test_a_breakaway_in_a_hollow_is_begun_anew_higher() -> None:
+    """Of a withheld record one of 6.1 N above 3.5 N left six floors, and one of 7.8 N only 1.7."""
+    nominal, law = bench({"friction_N": 0.0}), BY_NAME["stribeck_friction"]
+    true_N = 4.4
+    first, second = np.sin(np.outer([0.1, 0.17], np.arange(2400)))
+    noise = np.random.default_rng(1).normal(size=2400)
+    key = law.value_key(next(p for p in law.free if p.above))
+    level = law.value_key(law.free[0])
+
+    def predict(rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        height = (loader.breakaway or 0.0) - loader.friction
+        left = min(4.0 * abs(height - true_N), 1.5 + 8.0 * abs(height - 2.6))
+        return np.asarray(left * first + (loader.friction - 3.5) * second)
+
+    case = Case(nominal, "column", [Output("loader", "x", noise, predict, 1.0, 120.0)])
+    held = case.fit((law,), start={level: 3.5, key: 6.1})
+    assert held.values[key] - held.values[level] == pytest.approx(2.6, abs=0.1)
+    found = with_contact_anew(case, held)
+    assert found.values[key] - found.values[level] == pytest.approx(true_N, abs=0.1)
+    assert case.gaps(found.rig)["loader"] < 1.1

@@ -10,25 +10,41 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.signals.output import stage_limits
-from coupled.gap.thresholds import BEGUN_AT, NEXT_TO
+from coupled.gap.thresholds import BEGUN_AT, HIGHER, NEXT_TO
 from coupled.parallel import in_threads
 
 
 def with_contact_anew(case: Case, current: Fit) -> Fit:
     """Return a fit, or the one with the contact of dry friction sought anew if that leaves less.
 
-    Where the loader is over its limit: what the contact was found beside lacked this effect.
+    Where the loader is over its limit: what the contact was found beside lacked this effect. A
+    breakaway that was found too low has a contact of its own, and fits between the two are worse:
+    one that stands higher above running friction is tried, too.
     """
     start = case.but_for_contact(current.values)
     over = case.gaps(current.rig).get("loader", 0.0) > stage_limits(case.outputs).get("loader", 0.0)
     if not over or start == current.values:
         return current
-    return min([current, case.fit(current.effects, start=start)], key=lambda one: one.cost)
+    starts = [start, *({**start, **one} for one in _higher_breakaways(case, current))]
+    fits = in_threads(partial(_begun, case, current.effects), starts)
+    return min([current, *fits], key=lambda one: one.cost)
+
+
+def _higher_breakaways(case: Case, current: Fit) -> list[dict[str, float]]:
+    """Return each breakaway that was found, higher above the friction that it was found with."""
+    found = []
+    for effect in current.effects:
+        for p in effect.free:
+            if p.above:
+                key = effect.value_key(p)
+                running = float(value_of(current.rig, case.control, p.above))
+                found += [{key: running + HIGHER * (current.values[key] - running)}]
+    return found
 
 
 def with_settings_anew(case: Case, current: Fit) -> Fit:
