@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.anew import with_contact_anew
 from coupled.gap.search.case import Case
 from coupled.gap.search.contact import allowing_for_contact, contact_start
+from coupled.gap.search.fit import Fit
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import GUILTY_FROM, MISMATCH
 from coupled.rig.rig import Rig
@@ -82,11 +85,12 @@ def test_a_contact_is_sought_anew_beside_what_it_was_found_without() -> None:
     found = with_contact_anew(case, held)
     assert found.values[length] == pytest.approx(true_m, rel=0.1)
     assert case.gaps(found.rig)["loader"] < 1.1
-    # Within its limit it stays as it was found.
-    assert with_contact_anew(case, found) is found
+    # Within its limit it stays as it was found, though another may leave less.
+    within = replace(found, cost=1e6)
+    assert with_contact_anew(case, within) is within
 
 
-def test_a_breakaway_in_a_hollow_is_begun_anew_higher() -> None:
+def test_a_breakaway_in_a_hollow_is_begun_anew_higher(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a withheld record one of 6.1 N above 3.5 N left six floors, and one of 7.8 N only 1.7."""
     nominal, law = bench({"friction_N": 0.0}), BY_NAME["stribeck_friction"]
     true_N = 4.4
@@ -104,6 +108,17 @@ def test_a_breakaway_in_a_hollow_is_begun_anew_higher() -> None:
     case = Case(nominal, "column", [Output("loader", "x", noise, predict, 1.0, 120.0)])
     held = case.fit((law,), start={level: 3.5, key: 6.1})
     assert held.values[key] - held.values[level] == pytest.approx(2.6, abs=0.1)
+    starts, fit = list[Mapping[str, float]](), Case.fit
+
+    def seen(self: Case, effects: Sequence[Effect], start: Mapping[str, float]) -> Fit:
+        starts.append(start)
+        return fit(self, effects, start=start)
+
+    monkeypatch.setattr(Case, "fit", seen)
     found = with_contact_anew(case, held)
+    contact = {one.value_key(p) for one in case.contact for p in one.free}
+    assert contact
+    assert contact <= held.values.keys()
+    assert [contact & start.keys() for start in starts] == [set(), set()]  # sought anew by both
     assert found.values[key] - found.values[level] == pytest.approx(true_N, abs=0.1)
     assert case.gaps(found.rig)["loader"] < 1.1

@@ -48,6 +48,17 @@ def test_a_level_is_held_at_its_mean(noise: Noise) -> None:
     assert not rest.share[1100:].any()
 
 
+@pytest.mark.parametrize("noise", [NOISE, Noise(0.1, 0.6)], ids=["white", "coloured"])
+def test_the_error_of_a_level_is_that_of_a_mean_of_its_noise(noise: Noise) -> None:
+    off = []
+    for seed in range(300):
+        rest = rest_of(trembling(np.full(FRAMES, 3.0) + PUSH, seed, noise), noise)
+        for (start, _), error in zip(rest.ends, rest.errors, strict=True):
+            off.append((rest.level[start] - 3.0) / error)
+    assert len(off) > 280  # nearly each of them is seen to rest
+    assert np.std(off) == pytest.approx(1.0, abs=0.15)
+
+
 def test_two_levels_are_two_rests_and_the_way_between_is_none() -> None:
     way = np.interp(t, [0.0, 4.0, 4.6, 10.0], [0.0, 0.0, 5.0, 5.0])
     rest = rest_of(trembling(way), NOISE)

@@ -36,7 +36,7 @@ def with_contact_anew(case: Case, current: Fit) -> Fit:
 
 
 def _higher_breakaways(case: Case, current: Fit) -> list[dict[str, float]]:
-    """Return each breakaway that was found, higher above the friction that it was found with."""
+    """Return each breakaway that was found, HIGHER times as far above the friction beside it."""
     found = []
     for effect in current.effects:
         for p in effect.free:
