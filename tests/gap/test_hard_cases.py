@@ -15,7 +15,8 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search.case import Case
 from coupled.gap.search.screen import screen
 from coupled.gap.signals.air import vertical_air
-from coupled.gap.signals.output import Output, echoed, white
+from coupled.gap.signals.output import Output, white
+from coupled.gap.signals.shared import echoed
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import STRETCH_s

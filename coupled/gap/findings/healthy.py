@@ -82,6 +82,7 @@ class ModelError:
             floor=floor,
             spread=math.hypot((1.0 - share) * output.spread, share * scatter),
             smoothed=(1.0 - share) * output.smoothed,
+            unsure=(1.0 - share) * output.unsure,
             hides=None,  # what the healthy machine stayed within is a measure of its own
             _known=[],
         )

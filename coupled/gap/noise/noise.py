@@ -38,11 +38,13 @@ class Noise:
     """Noise of a level, rms in the channel's unit; `memory` is its correlation by frames, 0 to 1.
 
     `filtered`: the spectrum falls on to its end, so that this is the most that is left of it.
+    `unsure` is by how much more of its power at low frequencies there may be, as a share of that.
     """
 
     rms: float
     memory: float = 0.0
     filtered: bool = False
+    unsure: float = 0.0
 
     def sample(self, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of it, shape (frames,)."""

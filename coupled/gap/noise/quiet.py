@@ -8,7 +8,8 @@ The noise is white, or that of a first-order lag, as in `noise`.
 
 A force drives its stage, and no residual is of it alone. There the signal's own spectrum, which
 falls by some power of the frequency, is fitted beside the noise. Of what fits about as well, the
-noise with the least power at low frequencies is taken: the rest may be the signal.
+noise with the least power at low frequencies is taken: the rest may be the signal. But it may be
+the noise that fits best, too: how much more that has there is `unsure`.
 """
 
 from __future__ import annotations
@@ -87,24 +88,33 @@ def noise_of_input(signal: Floats) -> Noise | None:
     if not np.all(np.isfinite(logs)):
         return None
     shapes = _shape(omega, _SHAPES) - _shape(math.pi, _SHAPES)  # (colours, frequencies)
-    found = []
+    each = []
     for steepness in STEEPNESSES:
         beside = np.outer(SIGNALS, (0.5 * math.pi / omega) ** steepness)
         left = logs - np.log(np.exp(shapes)[:, None, :] + beside)
         left -= np.median(left, axis=2, keepdims=True)
         misfit = np.sum(np.minimum(left**2 / variance, OUTLYING**2), axis=2)
         misfit += BESIDE_BY * (_SHAPES > 0.0) + BESIDE_BY * (SIGNALS > 0.0)
-        found.append(misfit)
-    misfits = np.array(found)
+        each.append(misfit)
+    misfits = np.array(each)
+
+    def level(colour: int) -> float:
+        """Return the power of what drives noise of a colour, with the signal that fits best."""
+        best = int(misfits[:, colour].argmin())
+        steep, size = np.unravel_index(best, misfits[:, colour].shape)
+        power = (0.5 * math.pi / omega) ** STEEPNESSES[steep]
+        left = logs - np.log(np.exp(shapes[colour]) + SIGNALS[size] * power)
+        near_it = np.abs(left - np.median(left)) < OUTLYING * math.sqrt(variance)
+        return float(np.exp(np.mean(left[near_it]))) * (1.0 + COLOURS[colour]) ** 2
+
     near = misfits < misfits.min() + BESIDE_BY
-    colour = int(np.argmax(near.any(axis=(0, 2))))  # the least that fits
-    steep, size = np.unravel_index(int(misfits[:, colour].argmin()), misfits[:, colour].shape)
-    power = (0.5 * math.pi / omega) ** STEEPNESSES[steep]
-    left = logs - np.log(np.exp(shapes[colour]) + SIGNALS[size] * power)
-    near_it = np.abs(left - np.median(left)) < OUTLYING * math.sqrt(variance)
-    memory = COLOURS[colour]
-    driven = float(np.exp(np.mean(left[near_it]))) * (1.0 + memory) ** 2
-    return Noise(math.sqrt(driven / (1.0 - memory**2)), memory)
+    least = int(np.argmax(near.any(axis=(0, 2))))
+    likeliest = int(misfits.min(axis=(0, 2)).argmin())
+    memory, driven = COLOURS[least], level(least)
+    slow = driven / (1.0 - memory) ** 2
+    most = level(likeliest) / (1.0 - COLOURS[likeliest]) ** 2
+    unsure = max(0.0, most / slow - 1.0)
+    return Noise(math.sqrt(driven / (1.0 - memory**2)), memory, unsure=unsure)
 
 
 def _levels(signal: Floats, differences: int) -> tuple[Floats, Floats, float]:

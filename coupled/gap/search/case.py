@@ -98,6 +98,23 @@ class Case:
             found[one.stage] = max(found.get(one.stage, 0.0), gap)
         return found
 
+    def surely_open(self) -> Case:
+        """Return the case in which a gap that no colour of noise explains is held to noise alone.
+
+        What is not known of the colour of what drives a stage says whether it has a gap. Once it
+        has one, what effects leave of it is judged as anywhere else.
+        """
+        if not any(output.unsure for output in self.outputs):
+            return self
+        settled, limits = stage_gaps(self.outputs, self.fit(()).rig), stage_limits(self.outputs)
+        outputs = [
+            replace(one, unsure=0.0) if settled[one.stage] > limits[one.stage] else one
+            for one in self.outputs
+        ]
+        anew = replace(self, outputs=outputs)
+        anew._known.update(self._known)  # no fit asks for a limit
+        return anew
+
     def heard_anew(self, rig: Rig) -> Case | None:
         """Return the case with the noise that a rig's residuals have; None where none is lower.
 

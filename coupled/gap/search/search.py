@@ -22,6 +22,7 @@ def search(case: Case, library: Sequence[Effect] = EFFECTS) -> tuple[Case, Choic
     search is made again over that, as long as less comes out; what it then finds has to be as
     likely as what was found before.
     """
+    case = case.surely_open()
     found = _search(case, library)
     while True:
         anew = case.heard_anew(found.fit.rig) if found.steps else None

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.signals.steps import widely_stepped
 from coupled.gap.thresholds import (
-    ECHO_FRAMES,
-    FELT_FRAMES,
     FLOOR_SHARE,
     GUILTY_FROM,
     MISMATCH,
@@ -85,7 +83,8 @@ class Output:
     One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
     that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
     `rough` predicts nearly as well with fewer replays, where slopes are asked for. `noises` are the
-    rms noises of what drives the stage, by the control's quantity.
+    rms noises of what drives the stage, by the control's quantity. `unsure` is the part of the
+    floor by which it may be too low, the colour of what drives the stage being what it may be.
     """
 
     stage: str
@@ -104,6 +103,7 @@ class Output:
     mismatch: float = 0.0
     rough: Predict | None = field(default=None, repr=False, compare=False)
     noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
+    unsure: float = 0.0
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
@@ -130,6 +130,11 @@ class Output:
             left = (self.measured - predict(rig)) / self.floor
             self._known[:] = [*self._known[1 - _KEPT :], (key, left)]
         return left if part == "all" else left[self.rows(part)]
+
+    def under(self, noise: Noise) -> Output:
+        """Return the output of what is driven by a signal with this noise, which may be more."""
+        more = noise.unsure * self.smoothed**2
+        return replace(self, unsure=math.sqrt(1.0 + more) - 1.0, _known=[])
 
     @property
     def carried(self) -> float:
@@ -177,7 +182,7 @@ class Output:
     def limit(self) -> float:
         """The gap up to which noise may be all there is."""
         noise = 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
-        return max(GUILTY_FROM, noise, 1.0 + self.mismatch)
+        return max(GUILTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
 
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
@@ -208,36 +213,6 @@ def rounding(signal: Floats, noise: float) -> float:
     steps = np.diff(np.unique(signal))
     error = float(steps.min()) / math.sqrt(12.0) if steps.size else 0.0
     return error if error < ROUNDED * noise else 0.0
-
-
-def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
-    """Return how much of a signal's white noise is that of what it was made from, and the rest.
-
-    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal as it should
-    be, with the noise of its source: where that comes late or filtered, it echoes over frames.
-    """
-    noise, source = np.diff(signal, 4)[ECHO_FRAMES:], np.diff(made, 4)
-    echo = np.column_stack([source[ECHO_FRAMES - k : len(source) - k] for k in range(ECHO_FRAMES)])
-    left = noise - echo @ np.linalg.lstsq(echo, noise, rcond=None)[0]
-    power = float(noise @ noise)
-    share = 1.0 - float(left @ left) / power if power > 0.0 else 0.0
-    rest = float(np.sqrt(np.mean(left**2) / 70.0))
-    return share, max(rest, rounding(signal, float(np.sqrt(power / len(noise) / 70.0))))
-
-
-def felt(force: Floats, answer: Floats) -> float:
-    """Return how much of a force's roughness its answer shows, 0 to 1, as a share of the power.
-
-    What is rough in a force, and no noise, is in what answers to it: fourth differences of the
-    force are regressed on those of the answer about the same frame, without a model of what lies
-    between.
-    """
-    rough, shown = np.diff(force, 4)[FELT_FRAMES:-FELT_FRAMES], np.diff(answer, 4)
-    last = len(shown) - 2 * FELT_FRAMES
-    near = np.column_stack([shown[k : k + last] for k in range(2 * FELT_FRAMES + 1)])
-    left = rough - near @ np.linalg.lstsq(near, rough, rcond=None)[0]
-    power = float(rough @ rough)
-    return 1.0 - float(left @ left) / power if power > 0.0 else 0.0
 
 
 def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:

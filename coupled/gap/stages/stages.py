@@ -30,9 +30,10 @@ from coupled.gap.signals.floors import (
     with_error,
     without_echo,
 )
-from coupled.gap.signals.output import Hides, Output, Predict, echoed, felt, heard, spread
+from coupled.gap.signals.output import Hides, Output, Predict, heard, spread
 from coupled.gap.signals.reading import Reading
 from coupled.gap.signals.served import asked, left, services
+from coupled.gap.signals.shared import echoed, felt
 from coupled.gap.stages.compensated import compensated
 from coupled.gap.stages.imposed import Imposed
 from coupled.gap.stages.openloop import about
@@ -214,7 +215,7 @@ class Reader(Reading):
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
-        whole = self._made("loader", *made)
+        whole = self._made("loader", *made).under(force.noise)
         return [replace(whole, rough=lambda rig: answer(rig, 0.0)) if walks else whole]
 
     def _answering(self) -> list[Output]:
