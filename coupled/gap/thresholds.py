@@ -99,7 +99,7 @@ REPLAY_KNOWN = 1e-5
 SURFACE_KNOWN = 1e-4  # chosen: of its span, to which the model's map of commands gives a position
 FLIGHT_KNOWN = 1e-4  # chosen: of its span, to which measured surfaces replay the motion
 SLOW_LOADER_s = 5.0  # own period from which a replay is restarted: the EMPS axis has no spring
-RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts
+RESTART_s = 0.25  # chosen: between the restarts of a loader that drifts, and of short replays
 RATCHET = 1.0 / (2.0**0.5 - 1.0)  # noise of √2 times the size ratchets a play by √2 times as much
 # By how much more, mean square, an answer may depart from what was measured without the push that
 # noise is foretold to give it, to be left without; 0.35 to 3.4 in three blind records (seeds 2029,
@@ -155,7 +155,7 @@ WIDE_NEAR = 0.25  # floors; 26 blind records (seed 101) stand under 0.16, an osc
 WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
 RACE_FIRST, RACE_FAR = 3, 10.0  # chosen: such evaluations first, and times the best's to give up
 RACE_EVALUATIONS = 6  # chosen: of each other, after which they are compared,
-RACE_FLIGHTS = 3  # chosen: the same where each is a flight, which is nearly linear in its numbers
+RACE_FLIGHTS, SHOOTINGS = 3, 10  # chosen: where each is a flight, nearly linear; by short replays
 FLOWN_FIRST, HOPELESS_BEHIND = 2, 10.0  # chosen: to be flown first, and times as much for no others
 NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
 RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
@@ -171,7 +171,7 @@ REFUSED = 3  # of which so many end a fit, chosen, where they foretold less than
 JUMPS_HIDE = 0.01  # chosen: of its cost; and
 HOPELESS = 6  # chosen: so many, whatever they foretold
 REACHED = 0.75  # chosen: of what a step foretold, from which the next may be twice as long
-ENOUGH = 0.2  # chosen: floors², by which a fit of noise that gains less has ended
+ENOUGH, FEWER = 0.2, 5.0  # chosen: floors² that a step must gain, times the frames that are one
 SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept for another fit
 RIGS_KEPT = 3  # chosen: rigs, of the last asked for, whose floors are kept
 

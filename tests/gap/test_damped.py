@@ -26,7 +26,12 @@ def test_of_a_straight_residual_the_least_between_the_bounds_is_reached(
     law, said = rng.normal(size=(60, numbers)), rng.normal(size=60)
     ends = (np.full(numbers, -0.1), np.full(numbers, 0.1))
     found = descend(
-        lambda x: law @ x - said, lambda x: law, np.zeros(numbers), ends, most=30, enough=1e-9
+        lambda x: law @ x - said,
+        lambda x: law,
+        np.zeros(numbers),
+        ends,
+        most=30,
+        enough=lambda _: 1e-9,
     )
     least = lsq_linear(law, said, ends, tol=1e-12)
     assert found.cost == pytest.approx(least.cost, rel=1e-6)
@@ -43,7 +48,7 @@ def test_a_curved_valley_is_followed_to_its_end() -> None:
     def slopes(x: Floats) -> Floats:
         return np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
 
-    found = descend(residual, slopes, np.array([-1.2, 1.0]), WIDE, most=60, enough=1e-9)
+    found = descend(residual, slopes, np.array([-1.2, 1.0]), WIDE, most=60, enough=lambda _: 1e-9)
     assert found.x == pytest.approx([1.0, 1.0], abs=1e-3)
 
 
@@ -54,7 +59,7 @@ def test_the_slopes_at_the_end_are_those_of_the_end() -> None:
         np.array([3.0, 4.0]),
         WIDE,
         most=30,
-        enough=1e-9,
+        enough=lambda _: 1e-9,
     )
     assert found.jac[0, 0] == pytest.approx(2.0 * found.x[0])
     assert found.fun == pytest.approx([found.x[0] ** 2 - 2.0, 0.1 * found.x[1]])
@@ -70,7 +75,9 @@ def test_among_jumps_a_fit_ends_after_few_steps_that_bring_nothing(jump: float) 
         shaken = np.random.default_rng(crc32(x.tobytes())).normal(size=500)
         return np.asarray(law @ x - noise + jump * shaken)
 
-    found = descend(residual, lambda x: law, np.array([5.0, -5.0]), WIDE, most=40, enough=1e-8)
+    found = descend(
+        residual, lambda x: law, np.array([5.0, -5.0]), WIDE, most=40, enough=lambda _: 1e-8
+    )
     least = np.linalg.lstsq(law, noise, rcond=None)[0]
     assert found.x == pytest.approx(least, abs=0.03)
     assert found.asked == len(asked) <= 9
@@ -84,7 +91,9 @@ def test_where_each_place_nearby_is_worse_three_steps_end_a_fit() -> None:
     def residual(x: Floats) -> Floats:
         return np.append(law @ x - noise, 0.0 if np.array_equal(x, first) else 9.0)
 
-    found = descend(residual, lambda x: np.vstack((law, [0.0, 0.0])), first, WIDE, 40, 1e-12)
+    found = descend(
+        residual, lambda x: np.vstack((law, [0.0, 0.0])), first, WIDE, 40, lambda _: 1e-12
+    )
     assert found.refused
     assert np.array_equal(found.x, first)
     assert found.asked == 1 + 3
@@ -103,7 +112,7 @@ def test_a_limit_is_found_from_where_it_does_too_much_and_from_where_it_does_lit
         np.array([start]),
         ends,
         most=40,
-        enough=1e-6,
+        enough=lambda _: 1e-6,
     )
     assert found.x[0] == pytest.approx(1.0, rel=1e-2)
 
@@ -115,7 +124,7 @@ def test_no_more_is_asked_than_allowed() -> None:
         np.array([-1.2, 1.0]),
         WIDE,
         most=4,
-        enough=1e-9,
+        enough=lambda _: 1e-9,
     )
     assert found.asked == 4
 
@@ -127,6 +136,6 @@ def test_a_number_that_does_nothing_stays_where_it_is() -> None:
         np.array([4.0, 3.0]),
         WIDE,
         most=30,
-        enough=1e-9,
+        enough=lambda _: 1e-9,
     )
     assert found.x == pytest.approx([1.0, 3.0])

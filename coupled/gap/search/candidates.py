@@ -15,8 +15,9 @@ from coupled.gap.search.descent import Descent
 from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import informative
-from coupled.gap.search.laws import law_starts, leaves_only_noise, may_gain
+from coupled.gap.search.laws import leaves_only_noise, may_gain
 from coupled.gap.search.screen import Screened, screen
+from coupled.gap.search.shooting import shot_starts
 from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEHIND_GAIN,
@@ -62,7 +63,7 @@ def fitted_candidates(
     laws = [one for one in screened if one.effect.dry and not one.effect.yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
     laws = [one for one in laws if may_gain(case, one.effect, found)]
-    laws = [one._replace(starts=law_starts(case, *one[:2], found)) for one in laws]
+    laws = [one._replace(starts=shot_starts(case, current, *one[:2], found)) for one in laws]
     found += _fitted(case, current, laws)
     closing = [one for one in found if not _opens_a_gap(case, current, one[1])]
     return informative(case, current, closing or found)

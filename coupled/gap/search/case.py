@@ -65,6 +65,13 @@ class Case:
         return {output.stage for output in self.outputs if output.gap(self.nominal) > SETTLE_FROM}
 
     @cached_property
+    def by_shots(self) -> Case | None:
+        """The case with outputs predicted by short replays; None where none has them."""
+        if not any(output.shots for output in self.outputs):
+            return None
+        return replace(self, outputs=[output.by_shots() for output in self.outputs])
+
+    @cached_property
     def neutral(self) -> dict[str, float]:
         """The settings as the rig file has them."""
         every = (*self.known.values(), *self.contact)

@@ -51,24 +51,26 @@ def descend(
     first: Floats,
     ends: tuple[Floats, Floats],
     most: int,
-    enough: float,
+    enough: Callable[[Floats], float],
 ) -> Reached:
     """Return the least of half a residual's sum of squares that is reached from the first numbers.
 
     `residual` has shape (frames,), `slopes` (frames, numbers). It asks for residuals `most` times
-    at most. A step that foretells less than the share `enough` of the cost is the end.
+    at most. A step that foretells less than the share `enough` of the cost is the end, by the
+    residual there.
     """
     x = np.clip(first, *ends)
     left, jacobian = residual(x), slopes(x)
     cost, asked = 0.5 * float(left @ left), 1
     damping, refused = DAMPING_FIRST, 0
+    share = enough(left)
     # Slopes lead far beyond where a limit or a play stops to matter, and none leads back.
     reach = max(float(np.linalg.norm(x)), 1.0)
     scale = np.linalg.norm(jacobian, axis=0)
     while asked < most:
         near = np.maximum(ends[0], x - reach), np.minimum(ends[1], x + reach)
         step, foretold = _step(jacobian, left, x, near, damping, scale)
-        if foretold <= enough * cost:
+        if foretold <= share * cost:
             break
         there = np.clip(x + step, *ends)
         other = residual(there)
@@ -81,8 +83,9 @@ def descend(
                 break
             damping = max(DAMPED_MORE * damping, DAMPING_NEXT)
             continue
-        little = cost - reached <= enough * cost
+        little = cost - reached <= share * cost
         x, left, cost, jacobian = there, other, reached, slopes(there)
+        share = enough(left)
         scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
         damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
         reach, refused = 2.0 * reach if gain > REACHED else reach, 0

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from coupled.gap.search.damped import descend
 from coupled.gap.search.slopes import Ends, Floats, Slope, Slopes
+from coupled.gap.signals.output import memory
 from coupled.gap.thresholds import (
     ENOUGH,
+    FEWER,
     FIT_ITERATIONS,
     NOISE_LEFT,
     RACE_BEHIND,
@@ -140,7 +142,10 @@ class _Search:
         slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
         x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
-        enough = max(1e-5, ENOUGH / max(frames, 1000))
+
+        def enough(left: Floats) -> float:
+            """Return the share of the cost that a step must gain; of what remembers itself more."""
+            return max(1e-5, ENOUGH * min(memory(left), FEWER) / max(frames, 1000))
 
         def left(x: Floats) -> Floats:
             return np.asarray(self.residual(x)[self.rows])

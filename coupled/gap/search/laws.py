@@ -85,12 +85,12 @@ def _from_plainer(case: Case, effect: Effect, found: Fits) -> Starts:
     for plain, fitted in found:
         if plain.name == effect.alike.plainer:
             alike = {**fitted.values, **imitating(case, effect, plain, fitted)}
-            hardly = _above(case, effect, fitted, HARDLY)
+            hardly = above(case, effect, fitted, HARDLY)
             starts += [alike, {**alike, **hardly}]
     return starts
 
 
-def _above(case: Case, effect: Effect, fitted: Fit, times: float) -> dict[str, float]:
+def above(case: Case, effect: Effect, fitted: Fit, times: float) -> dict[str, float]:
     """Return the numbers of a richer law that stand above another, so many times it."""
     return {
         effect.value_key(p): times * float(value_of(fitted.rig, case.control, p.above))
@@ -108,8 +108,8 @@ def little_richer(case: Case, law: Effect, plain: Effect, fitted: Fit) -> Starts
         alike = {**fitted.values, **imitating(case, law, plain, fitted)}
         shape = {law.value_key(p): p.starts[0] for p in law.free if p.shape}
         each = [{key: k * value for key, value in shape.items()} for k in SHAPES]
-        above = [_above(case, law, fitted, times) for times in (HARDLY, RICHER)]
-        return [{**alike, **one, **more} for one in each for more in above]
+        levels = [above(case, law, fitted, times) for times in (HARDLY, RICHER)]
+        return [{**alike, **one, **more} for one in each for more in levels]
     if law.even is None or law.even[0] != plain.name:
         return []
     level = fitted.values[plain.value_key(plain.free[0])]

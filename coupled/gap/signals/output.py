@@ -85,6 +85,7 @@ class Output:
     `rough` predicts nearly as well with fewer replays, where slopes are asked for. `noises` are the
     rms noises of what drives the stage, by the control's quantity. `unsure` is the part of the
     floor by which it may be too low, the colour of what drives the stage being what it may be.
+    `shots` predicts by short replays, each begun as measured: what went before misleads none.
     """
 
     stage: str
@@ -104,6 +105,7 @@ class Output:
     rough: Predict | None = field(default=None, repr=False, compare=False)
     noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     unsure: float = 0.0
+    shots: Predict | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
@@ -135,6 +137,12 @@ class Output:
         """Return the output of what is driven by a signal with this noise, which may be more."""
         more = noise.unsure * self.smoothed**2
         return replace(self, unsure=math.sqrt(1.0 + more) - 1.0, _known=[])
+
+    def by_shots(self) -> Output:
+        """Return the output predicted by short replays, where it has them."""
+        if self.shots is None:
+            return self
+        return replace(self, predict=self.shots, rough=None, _known=[])
 
     @property
     def carried(self) -> float:

@@ -168,7 +168,7 @@ class Reader(Reading):
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
-        def driven(f: Floats, seen: Floats) -> Driven:
+        def driven(f: Floats, seen: Floats, every: int = every) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start."""
             nodes = Nodes(f)
             misread = computed - seen
@@ -216,6 +216,9 @@ class Reader(Reading):
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
         whole = self._made("loader", *made).under(force.noise)
+        if not every:
+            shot = driven(force.smooth, smooth, round(RESTART_s * self.rig.frame_rate))
+            whole = replace(whole, shots=lambda rig: shot(rig, 0.0))
         return [replace(whole, rough=lambda rig: answer(rig, 0.0)) if walks else whole]
 
     def _answering(self) -> list[Output]:

@@ -1,0 +1,47 @@
+"""Where the fit of a law that breaks away begins: where one to short replays ended.
+
+A control that breaks loose once too early goes another way for seconds: a fit to the whole replay
+stands in hollows, one for each order of slips, far from the least. Replays of a quarter second,
+each begun as measured, forget what went before, and a fit to them goes down from afar (multiple
+shooting: Bock 1983, in Numerical Treatment of Inverse Problems). They know the contact less well,
+whose memory begins anew with each, and noise moves their beginnings: where they end is only where
+the fit to the whole replay begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coupled.gap.effects.effect import Effect
+from coupled.gap.search.case import Case
+from coupled.gap.search.descent import Descent
+from coupled.gap.search.fit import Fit
+from coupled.gap.search.laws import Starts, above, imitating, law_starts, leaves_only_noise
+from coupled.gap.thresholds import RICHER, SHOOTINGS
+
+SHORT = Descent("wide", SHOOTINGS)
+
+
+def shot_starts(
+    case: Case,
+    current: Fit,
+    law: Effect,
+    starts: Starts,
+    found: Sequence[tuple[Effect, Fit]],
+) -> Starts:
+    """Return where the fit of a law of friction starts beside the effects of `current`.
+
+    A law that holds plain friction, where that was fitted and leaves more than noise, at the end of
+    a fit to short replays, and at plain friction itself. Any other, and where no output has
+    short replays, as `law_starts` says.
+    """
+    plain = None if law.alike is None else law.alike.plainer
+    fits = [fitted for one, fitted in found if one.name == plain]
+    laws = [one for one, _ in found if one.name == plain]
+    if not fits or case.by_shots is None or leaves_only_noise(case, laws[0], fits[0]):
+        return law_starts(case, law, starts, found)
+    beside = {**current.values, **fits[0].values, **imitating(case, law, laws[0], fits[0])}
+    shapes = {law.value_key(p): p.starts[0] for p in law.free if p.shape}
+    first = {**beside, **shapes, **above(case, law, fits[0], RICHER)}
+    short = case.by_shots.fit((*current.effects, law), "fitted", first, law, SHORT)
+    return [dict(short.values), beside]
