@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from coupled.gap.noise.filters import filtered
 from coupled.gap.search.descent import Descent, leaves_noise
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.steps import widely_stepped
@@ -16,6 +17,7 @@ from tests.support import gaps
 Floats = NDArray[np.float64]
 RNG = np.random.default_rng(5)
 LAW, SAID = RNG.normal(size=(200, 2)), RNG.normal(size=200)
+SURE = 0.25 / np.sqrt(200)  # a fourth of what the rows know a number by
 ENDS = (np.full(2, -5.0), np.full(2, 5.0))
 RIG = gaps.nominal_rig(False)
 
@@ -28,9 +30,9 @@ def straight(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
 def test_a_fit_ends_at_the_least_by_own_steps_and_not_by_wide_ones() -> None:
     least = np.linalg.lstsq(LAW, SAID, rcond=None)[0]
     begin = [np.array([1.0, 1.0])]
-    assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=5e-3)
+    assert np.allclose(Descent().end(straight, begin, ENDS, stepped=True).x, least, atol=SURE)
     found = Descent("wide").end(straight, begin, ENDS, stepped=True).x
-    assert np.allclose(found, least - [0.3, 0.0], atol=5e-3)
+    assert np.allclose(found, least - [0.3, 0.0], atol=SURE)
 
 
 def test_slopes_may_be_rough_and_the_end_is_the_exact_residuals() -> None:
@@ -46,6 +48,22 @@ def test_slopes_may_be_rough_and_the_end_is_the_exact_residuals() -> None:
     assert np.allclose(found.x, least, atol=0.02)
     assert found.fun == pytest.approx(straight(found.x))
     assert asked.count(True) > asked.count(False)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.97])
+def test_a_fit_ends_sooner_where_what_is_left_remembers_itself(memory: float) -> None:
+    """A frame of it says less, and the last steps along a valley gain nothing that it tells."""
+    white = np.random.default_rng(7).normal(size=4000)
+    left = filtered([np.sqrt(1.0 - memory**2)], [1.0, -memory], white)
+    asked: list[int] = []
+
+    def valley(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
+        asked.append(1)
+        return np.concatenate((left, [60.0 * (scaled[1] - scaled[0] ** 2), 4.0 * (1 - scaled[0])]))
+
+    rows = np.ones(4002, dtype=bool)
+    Descent().end(valley, [np.array([-1.2, 1.0])], ENDS, stepped=False, rows=rows)
+    assert (len(asked) < 60) == (memory > 0.0)
 
 
 def test_of_two_starts_the_one_that_leads_lower_is_kept_whatever_their_order() -> None:

@@ -14,7 +14,6 @@ from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
-from coupled.gap.signals.output import stage_limits
 from coupled.gap.thresholds import BEGUN_AT, HIGHER, NEXT_TO
 from coupled.parallel import in_threads
 
@@ -27,8 +26,7 @@ def with_contact_anew(case: Case, current: Fit) -> Fit:
     one that stands higher above running friction is tried, too.
     """
     start = case.but_for_contact(current.values)
-    over = case.gaps(current.rig).get("loader", 0.0) > stage_limits(case.outputs).get("loader", 0.0)
-    if not over or start == current.values:
+    if "loader" not in case.over_limit(current.rig) or start == current.values:
         return current
     starts = [start, *({**start, **one} for one in _higher_breakaways(case, current))]
     fits = in_threads(partial(_begun, case, current.effects), starts)
@@ -61,9 +59,7 @@ def with_settings_anew(case: Case, current: Fit) -> Fit:
     ours = [one for one in current.effects if one.free and shown & {*one.shows_in}]
     long = any(STAGE_OF[stage].flown for stage in shown) or any(one.dry for one in ours)
     long |= "loader" in shown and is_dry(case.nominal, case.control)
-    limits = stage_limits(case.outputs)
-    wide = any(gap > limits[at] for at, gap in case.gaps(current.rig).items())
-    if not strained or (long and not wide):
+    if not strained or (long and not case.over_limit(current.rig)):
         return current
     filed = {key: value for key, value in current.values.items() if key not in ends}
     starts = [filed]

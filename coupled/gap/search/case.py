@@ -105,6 +105,11 @@ class Case:
             found[one.stage] = max(found.get(one.stage, 0.0), gap)
         return found
 
+    def over_limit(self, rig: Rig) -> set[str]:
+        """Return the outputs of which a rig leaves more than noise may."""
+        limits = stage_limits(self.outputs)
+        return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
+
     def surely_open(self) -> Case:
         """Return the case in which a gap that no colour of noise explains is held to noise alone.
 

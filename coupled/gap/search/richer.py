@@ -23,6 +23,7 @@ from coupled.gap.search.gain import Candidate, likelier_by
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import Starts, foretold, little_richer
 from coupled.gap.search.rivals import Found, weight
+from coupled.gap.search.shooting import shot
 from coupled.gap.thresholds import (
     BESIDE_ONE,
     FORETOLD_LEAST,
@@ -110,8 +111,13 @@ def _richer(
             continue
         if law.alike is not None and law.alike.plainer == plain.name:
             gain = foretold(case, law, plain, current, "all")
-            if gain is None or gain >= RICHER_GAIN:
-                yield law, RICHER_GAIN, little_richer(case, law, plain, current)
+            promising = gain is None or gain >= RICHER_GAIN
+            starts = little_richer(case, law, plain, current) if promising else []
+            # What is foretold is of a little breakaway, and one that opens a gap is none.
+            if case.over_limit(current.rig) & {*law.shows_in}:
+                starts += shot(case, law, plain, current, "all")
+            if starts:
+                yield law, RICHER_GAIN, starts
         elif _holds(law, plain):
             least = RIVAL_GAIN if law.reserve else LEAST_GAIN
             yield law, least, _promising(case, law, plain, current)

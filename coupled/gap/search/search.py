@@ -79,7 +79,7 @@ def _search(case: Case, library: Sequence[Effect]) -> Choice:
     """
     plain = [effect for effect in library if not effect.reserve]
     found = searched(case, plain)
-    open_ones = _open(case, found)
+    open_ones = case.over_limit(found.fit.rig)
     freed = {p.key for step in found.steps for p in step.effect.free}
     more = [
         effect
@@ -91,13 +91,6 @@ def _search(case: Case, library: Sequence[Effect]) -> Choice:
         return found
     other = searched(case, [*more, *plain])
     return other if _gain(case, found, other) >= LEAST_GAIN else found
-
-
-def _open(case: Case, choice: Choice) -> set[str]:
-    """Return the outputs that the effects found leave wider than noise alone does."""
-    limits = stage_limits(case.outputs)
-    left = case.gaps(choice.fit.rig)
-    return {at for at, gap in left.items() if gap > limits[at]}
 
 
 def _unexplained(case: Case, choice: Choice) -> set[str]:

@@ -17,6 +17,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.laws import Starts, above, imitating, law_starts, leaves_only_noise
+from coupled.gap.signals.output import Part
 from coupled.gap.thresholds import RICHER, SHOOTINGS
 
 SHORT = Descent("wide", SHOOTINGS)
@@ -35,13 +36,24 @@ def shot_starts(
     a fit to short replays, and at plain friction itself. Any other, and where no output has
     short replays, as `law_starts` says.
     """
-    plain = None if law.alike is None else law.alike.plainer
-    fits = [fitted for one, fitted in found if one.name == plain]
-    laws = [one for one, _ in found if one.name == plain]
-    if not fits or case.by_shots is None or leaves_only_noise(case, laws[0], fits[0]):
-        return law_starts(case, law, starts, found)
-    beside = {**current.values, **fits[0].values, **imitating(case, law, laws[0], fits[0])}
+    for plain, fitted in found:
+        if law.alike is not None and plain.name == law.alike.plainer:
+            short = [] if leaves_only_noise(case, plain, fitted) else shot(case, law, plain, fitted)
+            if short:
+                alike = imitating(case, law, plain, fitted)
+                return [*short, {**current.values, **fitted.values, **alike}]
+    return law_starts(case, law, starts, found)
+
+
+def shot(case: Case, law: Effect, plain: Effect, fitted: Fit, part: Part = "fitted") -> Starts:
+    """Return where a fit to short replays ends with a law in place of plain friction, if any has.
+
+    It begins at plain friction with a breakaway above it, and leaves what shares no output.
+    """
+    if case.by_shots is None:
+        return []
+    effects = [law if one is plain else one for one in fitted.effects]
     shapes = {law.value_key(p): p.starts[0] for p in law.free if p.shape}
-    first = {**beside, **shapes, **above(case, law, fits[0], RICHER)}
-    short = case.by_shots.fit((*current.effects, law), "fitted", first, law, SHORT)
-    return [dict(short.values), beside]
+    begun = {**fitted.values, **imitating(case, law, plain, fitted), **shapes}
+    begun |= above(case, law, fitted, RICHER)
+    return [dict(case.by_shots.fit(effects, part, begun, law, SHORT).values)]
