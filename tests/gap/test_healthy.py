@@ -99,6 +99,9 @@ def test_the_error_of_a_model_is_what_it_leaves_beside_noise() -> None:
     assert raised.floor == pytest.approx(np.hypot(0.4, 0.1), rel=0.06)
     assert raised.gap(rig) == pytest.approx(1.0, rel=0.06)
     assert raised.limit > 1.4  # 1 + 3 standard deviations of 0.3/√3 from record to record
+    # Of what is not known of the input's colour, as much as noise has of the floor.
+    doubted = error.raised(replace(same, unsure=0.5))
+    assert doubted.unsure == pytest.approx(0.5 * (0.1 / raised.floor) ** 2, rel=0.05)
     [larger] = outputs([0.4], moves=3.0)
     assert error.raised(larger).floor > 2.0 * raised.floor
     scattered = ModelError.of(outputs([0.1, 0.4, 0.8]), rig)
