@@ -51,10 +51,10 @@ def test_slopes_may_be_rough_and_the_end_is_the_exact_residuals() -> None:
 
 
 @pytest.mark.parametrize(
-    ("memory", "stepped", "sooner"), [(0.0, True, False), (0.97, True, True), (0.97, False, False)]
+    ("memory", "rubs", "sooner"), [(0.0, True, False), (0.97, True, True), (0.97, False, False)]
 )
-def test_a_fit_of_what_jumps_ends_sooner_where_the_rest_remembers_itself(
-    memory: float, stepped: bool, sooner: bool
+def test_a_fit_of_dry_friction_ends_sooner_where_the_rest_remembers_itself(
+    memory: float, rubs: bool, sooner: bool
 ) -> None:
     """A frame of it says less, and the last steps along a valley gain nothing that it tells."""
     white = np.random.default_rng(7).normal(size=4000)
@@ -66,7 +66,7 @@ def test_a_fit_of_what_jumps_ends_sooner_where_the_rest_remembers_itself(
         return np.concatenate((left, [60.0 * (scaled[1] - scaled[0] ** 2), 4.0 * (1 - scaled[0])]))
 
     rows = np.ones(4002, dtype=bool)
-    Descent().end(valley, [np.array([-1.2, 1.0])], ENDS, stepped=stepped, rows=rows)
+    Descent(rubs=rubs).end(valley, [np.array([-1.2, 1.0])], ENDS, stepped=False, rows=rows)
     assert (len(asked) < 60) == sooner
 
 

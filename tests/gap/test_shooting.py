@@ -5,12 +5,13 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.descent import Descent
+from coupled.gap.search.descent import Descent, End
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.richer import richer_on_all
 from coupled.gap.search.rivals import Found
@@ -77,3 +78,20 @@ def test_a_short_replay_forgets_what_went_before() -> None:
     assert loader.by_shots().gap(plain.rig) < 0.7 * loader.gap(plain.rig)
     (linkage,) = [one for one in case.outputs if one.stage == "linkage"]
     assert linkage.by_shots() is linkage
+
+
+def test_a_fit_ends_sooner_beside_dry_friction_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, _ = stuck(35)
+    rubs: list[bool] = []
+    end = Descent.end
+
+    def asked(self: Descent, *given: Any) -> End:
+        rubs.append(self.rubs)
+        return end(self, *given)
+
+    monkeypatch.setattr(Descent, "end", asked)
+    case.fit((BY_NAME["bend"],), descent=Descent("wide", 2))
+    assert rubs and not any(rubs)
+    rubs.clear()
+    case.fit((PLAIN,), "all", {}, PLAIN, Descent("wide", 2))
+    assert rubs == [True]

@@ -61,7 +61,8 @@ class Descent:
 
     By its `own` alone from a start that is near; by `wide` ones alone where the end is not needed.
     `known` remembers what was fitted to the same outputs, so that none is fitted twice; `slopes`
-    are those of a fit to them that ended at the start, by the keys of its numbers.
+    are those of a fit to them that ended at the start, by the keys of its numbers. Of dry friction,
+    which `rubs`, the last steps along a valley gain what no record tells, and a fit ends sooner.
     """
 
     steps: Literal["wide", "own", "both"] = "both"
@@ -70,6 +71,7 @@ class Descent:
     slopes: Mapping[tuple[str, ...], Slope | None] = field(
         default_factory=dict, repr=False, compare=False
     )
+    rubs: bool = False
 
     def end(
         self,
@@ -89,11 +91,13 @@ class Descent:
         best: End | None = None
         if self.steps != "own" or not stepped:
             share = WIDE_DIFFERENCE if stepped else 0.0
-            search = _Search(near, sloping, ends, rows, share, smooth=not stepped)
+            search = _Search(near, sloping, ends, rows, share, not stepped, self.rubs)
             best = self._raced(search, firsts, slope)
         if self.steps != "wide" and stepped:
             first, known = (firsts[0], slope) if best is None else (best.x, best.slope)
-            best = _Search(residual, sloping, ends, rows).down(first, self.most, known)
+            best = _Search(residual, sloping, ends, rows, rubs=self.rubs).down(
+                first, self.most, known
+            )
         assert best is not None
         return best
 
@@ -132,6 +136,7 @@ class _Search:
     rows: Rows
     share: float = 0.0
     smooth: bool = False
+    rubs: bool = False
 
     def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
         """Return where they lead from a start, by so many evaluations at most.
@@ -144,11 +149,8 @@ class _Search:
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
 
         def enough(left: Floats) -> float:
-            """Return the share of the cost that a step must gain.
-
-            More where what is left jumps and remembers itself: a smooth fit ends fast.
-            """
-            times = 1.0 if self.smooth else min(memory(left), FEWER)
+            """Return the share of the cost that a step must gain, by what is left."""
+            times = min(memory(left), FEWER) if self.rubs else 1.0
             return max(1e-5, ENOUGH * times / max(frames, 1000))
 
         def left(x: Floats) -> Floats:

@@ -8,12 +8,13 @@ of them stand at a bound, and the residuals.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, Parameter, possible
+from coupled.gap.effects.settings import CONTACT
 from coupled.gap.search.descent import WHOLE, Descent
 from coupled.gap.search.intervals import beyond, half_width
 from coupled.gap.search.slopes import Slope
@@ -194,7 +195,9 @@ def _fit(
     low, high = ends / scale
     stepped = any(output.stepped for output in ours)
     firsts = [np.array(first) / scale for first in _starts(keys, frees, start)]
-    best = descent.end(
+    # A contact is free beside any dry friction that is filed.
+    rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
+    best = replace(descent, rubs=rubs).end(
         residual, firsts, (low, high), stepped, rows, descent.slopes.get(tuple(keys))
     )
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
