@@ -82,9 +82,10 @@ def _held_together(
     """Return the share that some effects hold of the gaps of all guilty stages.
 
     A gap counts by its logarithm, as in a likelihood: floors of two stages are no common measure.
+    That of a stage without an output of its own is its neighbours' as filed.
     """
-    wide = [stage for stage in stages if stage.guilty and (stage.settled or 0.0) > 1.0]
-    sizes = {stage.name: math.log(stage.settled or 1.0) for stage in wide}
+    each = {stage.name: stage.settled or stage.gap or 1.0 for stage in stages if stage.guilty}
+    sizes = {name: math.log(gap) for name, gap in each.items() if gap > 1.0}
     held = sum(size * min(_held(known.get(name), effects), 1.0) for name, size in sizes.items())
     return held / max(sum(sizes.values()), 1e-300)
 

@@ -1,4 +1,4 @@
-"""Taking the white noise off a smooth input, without a choice to make.
+"""Taking the noise off a smooth input, without a choice to make.
 
 A stage driven by a noisy input answers to noise that the rig never felt, and a fit then
 mistakes the missing answer for more inertia, or a lag (errors in variables). The inputs are
@@ -7,8 +7,10 @@ smooth on the scale of a frame, so the Whittaker smoother with n-th differences,
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
 takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979),
-which leaves sharp inputs sharp. A line (`lines`), as the mains' hum, is no noise: it is taken off
-before, and put back.
+which leaves sharp inputs sharp. It takes neighbours' noise for independent, and would keep what
+coloured noise has more of at low frequencies: so the spectra are first divided by the noise's, and
+λ rises with it. A line (`lines`), as the mains' hum, is no noise: it is taken off before, and put
+back.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from coupled.gap.noise.lines import Line, lines_in
-from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.noise import Noise, noise_of
 
 Floats = NDArray[np.float64]
 _REMEMBERED = 64  # signals whose smoother is known: those of one record, noise and all
@@ -43,12 +45,18 @@ class Smoother:
     lines: tuple[Line, ...] = ()
 
     @classmethod
-    def of(cls, signal: Floats, orders: Sequence[int] = (3, 2, 1)) -> Smoother:
-        """Return the one that suits a signal best, with differences of one of these orders."""
-        return _known(np.ascontiguousarray(signal, dtype=np.float64).tobytes(), tuple(orders))
+    def of(
+        cls, signal: Floats, orders: Sequence[int] = (3, 2, 1), noise: Noise | None = None
+    ) -> Smoother:
+        """Return the one that suits a signal best, with differences of one of these orders.
+
+        `noise` has the colour of what is taken off; without it that is heard from the signal.
+        """
+        whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
+        return _known(whole, tuple(orders), None if noise is None else noise.memory)
 
     def smooth(self, signal: Floats) -> Floats:
-        """Return a signal of the same length without its white noise; zero phase.
+        """Return a signal of the same length without its noise; zero phase.
 
         It is the one whose smoother this is, or one with the same lines.
         """
@@ -69,24 +77,29 @@ class Smoother:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def _known(signal: bytes, orders: tuple[int, ...]) -> Smoother:
+def _known(signal: bytes, orders: tuple[int, ...], memory: float | None) -> Smoother:
     """Return the smoother of a signal; a diagnosis smooths each of them several times."""
     plain = np.frombuffer(signal)
     lines = tuple(lines_in(plain))
     reach = min(len(plain) - 1, 200)
-    long = _lengthened(plain - sum(line.over(len(plain)) for line in lines), reach)
-    gain = _gain(long, orders)
+    without = plain - sum(line.over(len(plain)) for line in lines)
+    memory = noise_of(without).memory if memory is None else memory
+    gain = _gain(_lengthened(without, reach), orders, memory)
     gain.flags.writeable = False
     return Smoother(gain, reach, lines)
 
 
-def _gain(long: Floats, orders: Sequence[int]) -> Floats:
-    """Return the gain by which a lengthened signal is best foretold from its own neighbours."""
+def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:
+    """Return the gain by which a lengthened signal is best foretold from its own neighbours.
+
+    Its noise correlates from frame to frame by `memory`.
+    """
     rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
-    power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2
+    colour = (1.0 + memory) ** 2 / ((1.0 - memory) ** 2 + memory * rate**2)  # 1 at the end
+    power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2 / colour
     best, found, stopped = np.inf, (orders[0], 0.0), np.empty_like(power)
     for order in orders:
-        steep = rate ** (2 * order)
+        steep = rate ** (2 * order) * colour
         for strength in np.logspace(-3, 12, 61).tolist():
             np.multiply(steep, strength, out=stopped)
             stopped /= 1.0 + stopped  # 1 − H
@@ -95,12 +108,12 @@ def _gain(long: Floats, orders: Sequence[int]) -> Floats:
             if score < best:
                 best, found = score, (order, strength)
     order, strength = found
-    return np.asarray(1.0 / (1.0 + strength * rate ** (2 * order)))
+    return np.asarray(1.0 / (1.0 + strength * rate ** (2 * order) * colour))
 
 
-def smoothed(signal: Floats) -> Floats:
-    """Return the signal without its white noise, same shape; zero phase."""
-    return Smoother.of(signal).smooth(signal)
+def smoothed(signal: Floats, noise: Noise | None = None) -> Floats:
+    """Return the signal without its noise, of a colour as given or heard; same shape, no lag."""
+    return Smoother.of(signal, noise=noise).smooth(signal)
 
 
 def _lengthened(signal: Floats, reach: int) -> Floats:

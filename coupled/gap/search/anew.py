@@ -14,6 +14,7 @@ from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
+from coupled.gap.search.shooting import shot_contact
 from coupled.gap.thresholds import BEGUN_AT, HIGHER, NEXT_TO
 from coupled.parallel import in_threads
 
@@ -29,6 +30,8 @@ def with_contact_anew(case: Case, current: Fit) -> Fit:
     if "loader" not in case.over_limit(current.rig) or start == current.values:
         return current
     starts = [start, *({**start, **one} for one in _higher_breakaways(case, current))]
+    short = shot_contact(case, current)
+    starts += [] if short is None else [dict(short.values)]
     fits = in_threads(partial(_begun, case, current.effects), starts)
     return min([current, *fits], key=lambda one: one.cost)
 

@@ -17,7 +17,7 @@ from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import informative
 from coupled.gap.search.laws import leaves_only_noise, may_gain
 from coupled.gap.search.screen import Screened, screen
-from coupled.gap.search.shooting import shot_starts
+from coupled.gap.search.shooting import screened_short, shot_starts
 from coupled.gap.signals.output import stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEHIND_GAIN,
@@ -44,12 +44,14 @@ def fitted_candidates(
     outputs: set[str],
     always: Collection[str] = (),
     ends: Ends | None = None,
+    short: bool = False,
 ) -> list[Candidate]:
     """Return the effects that show in some outputs, fitted beside the current ones, best first.
 
     Those named in `always` are fitted however little their signature takes. `ends` are the values
     at which an earlier round's fits ended, by effect: a fit starts there, too. Another effect found
-    since may have made the signature less clear than it was.
+    since may have made the signature less clear than it was. By `short` replays, where outputs have
+    them, other effects may come first, and begin elsewhere (`shooting`).
     """
     # A law of friction with its contact's numbers as its own is one beside which they are settings.
     same = {effect.yielding for effect in library} if case.contact else set()
@@ -59,7 +61,11 @@ def fitted_candidates(
         for effect in library
         if effect.name not in chosen and effect.name not in same and outputs & set(effect.shows_in)
     ]
-    screened = [_from_ends(one, ends or {}) for one in screen(case, current, candidates, always)]
+    if short:
+        screened = screened_short(case, current, candidates)
+    else:
+        screened = screen(case, current, candidates, always)
+    screened = [_from_ends(one, ends or {}) for one in screened]
     laws = [one for one in screened if one.effect.dry and not one.effect.yielding]
     found = _fitted(case, current, [one for one in screened if one not in laws])
     laws = [one for one in laws if may_gain(case, one.effect, found)]

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.anew import with_contact_anew, with_settings_anew
@@ -263,6 +265,9 @@ def _round(
     tried: list[Candidate] = []
     for output in sorted(wide - idle, key=lambda at: -now[at]):
         ranked = fitted_candidates(case, current, library, {output}, ends=ends)
+        if output == "loader" and _sticks_elsewhere(case, current, ranked):
+            short = fitted_candidates(case, current, library, {output}, ends=ends, short=True)
+            ranked = max(ranked, short, key=lambda one: one[0].gain if one else -np.inf)
         tried = tried or ranked
         if ranked and ranked[0].gain < LEAST_GAIN:
             ranked = in_two(case, settled, library, output, ranked)
@@ -276,3 +281,9 @@ def _round(
         return switch
     beside = {at for at, gap in now.items() if gap > limits[at]}
     return beside_a_larger(case, current, library, beside) or strained(case, current, library)
+
+
+def _sticks_elsewhere(case: Case, current: Fit, ranked: Sequence[Candidate]) -> bool:
+    """Tell whether the best candidate leaves a gap of a loader with dry friction."""
+    rubs = is_dry(case.nominal, case.control) or any(one.dry for one in current.effects)
+    return rubs and (not ranked or "loader" in case.over_limit(ranked[0].fit.rig))

@@ -17,6 +17,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.laws import Starts, above, imitating, law_starts, leaves_only_noise
+from coupled.gap.search.screen import Screened, screen
 from coupled.gap.signals.output import Part
 from coupled.gap.thresholds import RICHER, SHOOTINGS
 
@@ -57,3 +58,29 @@ def shot(case: Case, law: Effect, plain: Effect, fitted: Fit, part: Part = "fitt
     begun = {**fitted.values, **imitating(case, law, plain, fitted), **shapes}
     begun |= above(case, law, fitted, RICHER)
     return [dict(case.by_shots.fit(effects, part, begun, law, SHORT).values)]
+
+
+def shot_contact(case: Case, current: Fit) -> Fit | None:
+    """Return the fit of the same effects to short replays, begun with the settings as filed.
+
+    How dry friction yields stands in hollows of its own, and the loader's settings with it. None
+    where no output has short replays.
+    """
+    if case.by_shots is None:
+        return None
+    ours = {effect.value_key(p) for effect in current.effects for p in effect.free}
+    begun = {key: value for key, value in current.values.items() if key in ours}
+    return case.by_shots.fit(current.effects, "all", begun, None, SHORT)
+
+
+def screened_short(case: Case, current: Fit, candidates: Sequence[Effect]) -> list[Screened]:
+    """Return the candidates by what their signatures take of short replays, and where to start.
+
+    With the contact and the settings that suit those. Where the whole replay sticks at other times
+    than the record, what it leaves is of those times, and no effect's signature is like it.
+    """
+    short = shot_contact(case, current)
+    if short is None or case.by_shots is None:
+        return []
+    found = screen(case.by_shots, short, candidates)
+    return [one._replace(starts=[{**short.values, **at} for at in one.starts]) for one in found]

@@ -70,13 +70,16 @@ def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Fl
         climb = rate_of(smoothed(height), 1.0 / frame_s)
         noisy = climb + rng.normal(0.0, white(height), len(height))
         return climb, smoothed(noisy) - climb
-    normal, attack = record[LOAD] * GRAVITY_m_per_s2, smoothed(alpha)
+    load = record[LOAD]
+    # JSBSim tells the acceleration that led to a frame: the next one holds that of this frame.
+    normal = np.append(load[1:], load[-1]) * GRAVITY_m_per_s2
+    attack = smoothed(alpha)
     # What the aircraft feels along its path is of its thrust and drag, and of a part of its lift.
     path = rate_of(smoothed(speed), 1.0 / frame_s)
     path += GRAVITY_m_per_s2 * np.sin(smoothed(pitch - alpha))
     ahead = (path + normal * np.sin(attack)) / np.cos(attack)
     upward = normal * np.cos(pitch) + ahead * np.sin(pitch) - GRAVITY_m_per_s2
-    sigma = GRAVITY_m_per_s2 * white(record[LOAD]), white(height)
+    sigma = GRAVITY_m_per_s2 * white(load), white(height)
     noise = rng.normal(0.0, sigma[0], len(height)), rng.normal(0.0, sigma[1], len(height))
     return _held(upward, height, frame_s, sigma), _held(*noise, frame_s, sigma)
 
@@ -87,13 +90,18 @@ def _held(upward: Floats, height: Floats, frame_s: float, sigma: tuple[float, fl
     Least squares in both: what the twice integrated acceleration d lacks of the height solves
     (I + λ·D₂ᵀD₂)·d = h − ∬a with λ = (σ_h/(σ_a·Δt²))².
     """
-    climbs = np.cumsum(upward) * frame_s
-    lacks = height - (np.cumsum(climbs) - 0.5 * climbs) * frame_s
+    climbs = _summed(upward, frame_s)
+    lacks = height - _summed(climbs, frame_s)
     frames = np.arange(len(height))
     slow = Polynomial.fit(frames, lacks, 6)(frames)  # what would cost the equations digits
     weight = min((sigma[1] / max(sigma[0] * frame_s**2, 1e-12)) ** 2, STIFFEST_AIR)
     drift = slow + _whittaker(lacks - slow, weight)
     return np.asarray(climbs + np.gradient(drift, frame_s))
+
+
+def _summed(rate: Floats, frame_s: float) -> Floats:
+    """Return the integral of a rate from the first frame on, by trapezia, same shape."""
+    return np.asarray((np.cumsum(rate) - 0.5 * (rate + rate[0])) * frame_s)
 
 
 def _whittaker(signal: Floats, weight: float) -> Floats:

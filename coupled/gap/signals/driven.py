@@ -28,7 +28,7 @@ class Drive:
     def of(cls, signal: Floats, noise: Noise) -> Drive:
         """Return a signal smoothed, and held where it rests; one without noise as it is."""
         rest = rest_of(signal, noise)
-        return cls(signal, rest.held(smoothed(signal)) if noise.rms else signal, noise, rest)
+        return cls(signal, rest.held(smoothed(signal, noise)) if noise.rms else signal, noise, rest)
 
     def unsmoothed(self, noise: Noise) -> Drive:
         """Return it as recorded: what is rough in it is no noise."""
@@ -45,4 +45,4 @@ class Drive:
     def passed(self, rng: np.random.Generator) -> Floats:
         """Return a sample of what its smoother passes of its noise, shape (frames,)."""
         sample = self.noise.sample(len(self.recorded), rng)
-        return self.rest.beside(Smoother.of(self.recorded).smooth(sample))
+        return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).smooth(sample))

@@ -77,7 +77,7 @@ def with_error(signal: Floats, k: int, level: Noise) -> Floats:
     """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
-    return signal + Smoother.of(raw).wiener_error(level, len(signal), rng)
+    return signal + Smoother.of(raw, noise=level).wiener_error(level, len(signal), rng)
 
 
 def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:

@@ -164,7 +164,7 @@ class Reader(Reading):
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
         load_of = self.load()
-        smooth, own = smoothed(computed), self.heard("computed")
+        smooth = smoothed(computed, own := self.heard("computed"))
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
