@@ -251,9 +251,7 @@ def _numbers(view: View) -> list[tuple[str, str, str]]:
     for effect in view.diagnosis.effects:
         lines.append((f"{plain(effect.name)}, p = {effect.probability:.2f}", "", ""))
         for p in effect.parameters:
-            interval = "not determined"
-            if p.found_low is not None and p.found_high is not None:
-                interval = f"{written(p.found_low)} to {written(p.found_high)}"
+            interval = p.interval(written) or "not determined"
             value = f"{written(p.found)} {p.unit}".rstrip()
             lines.append((f"    {p.key.rpartition('.')[2]}", value, interval))
     return lines

@@ -73,9 +73,7 @@ def _effect_rows(effect: EffectResult, whole: Diagnosis) -> Iterator[tuple[str, 
 
 def _numbers(p: ParameterEstimate) -> tuple[str, str, str]:
     filed = "none" if p.filed is None else figure(p.filed)
-    if p.found_low is None or p.found_high is None:
-        return filed, figure(p.found), "not determined"
-    return filed, figure(p.found), f"{figure(p.found_low)} to {figure(p.found_high)}"
+    return filed, figure(p.found), p.interval(figure) or "not determined"
 
 
 def _stages(whole: Diagnosis) -> tuple[str, Table]:

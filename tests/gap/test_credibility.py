@@ -164,6 +164,20 @@ def test_two_stages_are_explained_beside_one_that_is_not(
     assert verdict_of(choice, stages, found, budget) == said
 
 
+def test_what_explains_sensing_counts_though_that_has_no_gap_of_its_own() -> None:
+    """A force at 1.21 floors of 1.2 made unexplained a zero that had closed a gap of 17."""
+    zero: Any = SimpleNamespace(name="deflection_zero", stage="sensing")
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=zero, rivals=()),))
+    stages = [
+        StageResult("loader", gap=3.1, settled=1.21, limit=1.2, left=1.21, guilty=True),
+        StageResult("sensing", gap=17.5, guilty=True),
+    ]
+    budget: Any = SimpleNamespace(stage="sensing", of=lambda name: 1.0)
+    for probability, said in ((0.97, "mostly"), (0.4, "unexplained")):
+        found = [EffectResult("deflection_zero", "sensing", probability, ())]
+        assert verdict_of(choice, stages, found, [budget]) == said
+
+
 @pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])
 def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -> None:
     """It moves as much at any rate: a lag for it is larger where the pressure goes slowly."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from coupled.gap.search.descent import End
-from coupled.gap.search.intervals import cut, half_width
+from coupled.gap.search.intervals import cut, half_width, open_above
 from coupled.gap.thresholds import LEAST_MEMORIES
 
 FRAMES = 2400
@@ -72,3 +73,25 @@ def test_intervals_of_a_short_record_hold_and_say_something(numbers: int) -> Non
         widths.append(half[0] * np.sqrt(len(groups)))
     assert held >= 184  # of 190 on the mean
     assert np.median(widths) < 3.5
+
+
+@pytest.mark.parametrize("found", [0.99, 1.0, 1.7])
+@pytest.mark.parametrize("worth", [1.0, 4.0])
+def test_where_any_larger_number_does_as_well_the_least_is_named(
+    found: float, worth: float
+) -> None:
+    """It costs 100·(1 − x)² up to 1, and nothing from there on."""
+    open_one = open_above(lambda x: 100.0 * max(0.0, 1.0 - x) ** 2, found, (0.0, 4.0), worth)
+    assert open_one is not None
+    value, low = open_one
+    assert value == pytest.approx(min(found, 1.0), abs=1e-6)
+    assert low == pytest.approx(
+        1.0 - np.sqrt(1.92 * worth + 100.0 * (1.0 - value) ** 2) / 10.0, abs=2e-3
+    )
+
+
+@pytest.mark.parametrize("cost", [lambda x: 100.0 * (1.0 - x) ** 2, lambda x: 7.0 + 0.0 * x])
+def test_a_number_that_is_known_or_says_nothing_is_not_open_above(
+    cost: Callable[[float], float],
+) -> None:
+    assert open_above(cost, 1.0, (0.0, 4.0), 1.0) is None

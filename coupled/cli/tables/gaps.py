@@ -74,9 +74,7 @@ def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
     """Return a parameter's change and interval, in the rig's own number."""
     if parameter is None:
         return "", ""
-    low, high = parameter.found_low, parameter.found_high
-    ends = "" if low is None or high is None else f"{figure(low)} to {figure(high)}"
-    return change(parameter), ends
+    return change(parameter), parameter.interval(figure)
 
 
 def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:

@@ -41,7 +41,8 @@ class Parameter:
     the least size that shows is sought; of an `inverse` one, less does more, and 0 is none. One
     that `may_end` can stand at a bound while the effect is there. `host` is what the host calls
     its own number for it, which is then to be set. A frequency `folds` about half of the frame
-    rate. `beyond` names the quantity whose noise a loop has to be wider than: it would smooth
+    rate. One that `saturates` does all that it can from some size on: a play wider than a motion.
+    `beyond` names the quantity whose noise a loop has to be wider than: it would smooth
     that noise alone. One with a `tolerance`, relative, is off by so much without being there.
     `model_error` is how well, relative, the physics of a right effect gives it, `unsure` by
     how much it is off at most for what a record does not say.
@@ -63,6 +64,7 @@ class Parameter:
     unsure: float = 0.0
     host: str = ""
     folds: bool = False
+    saturates: bool = False
     beyond: str = ""
     tolerance: float = 0.0
 

@@ -67,7 +67,7 @@ EFFECTS: tuple[Effect, ...] = (
     one(
         "surface",
         "surface_freeplay",
-        added("play_norm", "rigging.play_norm", 0, 0.5, 0.01),
+        replace(added("play_norm", "rigging.play_norm", 0, 0.5, 0.01), saturates=True),
         *("wanted", "answer_left", "loop"),
     ),
     one(

@@ -39,7 +39,8 @@ class EffectInFlight:
 
     `shares` are of the power by which the effects change the flight, and sum to 1 over all of
     them; below 0, it works against the others. `changes` are rms differences that leaving it out
-    makes, in the channel's unit, `of_motion` the same over the rms of the channel's own motion.
+    makes, in the channel's unit, `of_motion` the same over the rms of the channel's own motion,
+    with all effects or with none, whichever moves more.
     `share` is over all channels, each power over that of the channel's motion.
     """
 
@@ -87,7 +88,9 @@ def in_flight(
     whole = np.array([flights[-1][name][:rows] for name in names])
     each = np.array([[flown[name][:rows] for name in names] for flown in flights])
     power = np.mean((each - whole) ** 2, axis=2)  # (subsets, channels)
-    motion = np.sqrt(np.mean((whole - whole[:, :1]) ** 2, axis=1))
+    # What an effect takes away whole is held against the motion that there was without it.
+    moved = np.mean((each - each[:, :, :1]) ** 2, axis=2)
+    motion = np.sqrt(np.maximum(moved[0], moved[-1]))
     shares = shapley_weights(count) @ power
     changed = np.flatnonzero((motion > 0.0) & (power[0] > (1e-3 * IN_FLIGHT_LEAST * motion) ** 2))
     weight = 1.0 / motion[changed] ** 2

@@ -5,6 +5,7 @@ Keys are those of the contract. SI units; a gap is a residual's rms over its noi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -115,6 +116,19 @@ class ParameterEstimate:
     found_high: float | None = None
     host: str = ""
     relative: bool = False
+
+    @property
+    def at_least(self) -> bool:
+        """Whether a larger one does as well: a play that swallows all of a motion."""
+        return self.found_low is not None and self.found_high is None
+
+    def interval(self, written: Callable[[float], str]) -> str:
+        """Return the 95 % interval of the rig's own number in words; none where it is open."""
+        if self.found_low is None:
+            return ""
+        if self.found_high is None:
+            return f"{written(self.found_low)} or more"
+        return f"{written(self.found_low)} to {written(self.found_high)}"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""

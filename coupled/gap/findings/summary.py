@@ -295,4 +295,5 @@ def change(p: ParameterEstimate) -> str:
     more = p.found - p.filed
     sign = "+" if more >= 0.0 else ""
     by = f"{100 * (p.value - 1.0):+.3g} %" if p.relative else sign + figure(more)
-    return f"{figure(p.filed)} → {figure(p.found)}{unit} ({by})"
+    more_does = " or more" if p.at_least else ""
+    return f"{figure(p.filed)} → {figure(p.found)}{unit}{more_does} ({by})"

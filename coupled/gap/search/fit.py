@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from coupled.gap.effects.effect import Effect, Parameter, possible
 from coupled.gap.effects.settings import CONTACT
 from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.search.intervals import beyond, half_width
+from coupled.gap.search.intervals import beyond, half_width, least_of, open_above, worth_of
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, Part
 from coupled.gap.thresholds import LEAST_GAIN
@@ -197,9 +198,21 @@ def _fit(
     firsts = [np.array(first) / scale for first in _starts(keys, frees, start)]
     # A contact is free beside any dry friction that is filed.
     rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
-    best = replace(descent, rubs=rubs).end(
-        residual, firsts, (low, high), stepped, rows, descent.slopes.get(tuple(keys))
-    )
+    search = replace(descent, rubs=rubs)
+    best = search.end(residual, firsts, (low, high), stepped, rows, descent.slopes.get(tuple(keys)))
+
+    def cost(at: float, k: int) -> float:
+        left = residual(_with(best.x, k, at))[rows]
+        return 0.5 * float(left @ left)
+
+    swallows = [k for k, p in enumerate(frees) if p.saturates]
+    for k in swallows:
+        most = cost(float(high[k]), k)
+        if most < best.cost:
+            span = (float(best.x[k]), float(high[k]))
+            edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
+            again = search.end(residual, [edge], (low, high), stepped, rows)
+            best = min(best, again, key=lambda one: one.cost)
     number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
     within = {one.value_key(p) for one in nuisances for p in one.free}
     known = np.array([12.0 if key in within else 0.0 for key in keys]) / (high - low) ** 2
@@ -215,15 +228,30 @@ def _fit(
     stuck &= ~np.array([p.may_end for p in frees]) & ~gone
     # A setting may well stand at its end where little would be gained beyond.
     stuck &= (known == 0.0) | (beyond(best, len(ours)) >= LEAST_GAIN)
+    stuck |= ~np.isfinite(half)
+    lower, upper = values - half, values + half
+    for k in swallows:
+        span = (float(low[k]), float(high[k]))
+        open_one = open_above(partial(cost, k=k), float(best.x[k]), span, worth_of(best, len(ours)))
+        if open_one is not None:
+            values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
+            stuck[k] = False
     return _Group(
         dict(zip(keys, values.tolist(), strict=True)),
-        dict(zip(keys, (values - half).tolist(), strict=True)),
-        dict(zip(keys, (values + half).tolist(), strict=True)),
-        tuple(key for key, at in zip(keys, stuck | ~np.isfinite(half), strict=True) if at),
+        dict(zip(keys, lower.tolist(), strict=True)),
+        dict(zip(keys, upper.tolist(), strict=True)),
+        tuple(key for key, at in zip(keys, stuck, strict=True) if at),
         best.cost,
         np.asarray(best.jac.T @ best.jac) / np.outer(scale, scale),
         best.slope,
     )
+
+
+def _with(x: Floats, k: int, at: float) -> Floats:
+    """Return scaled numbers with another in place of one."""
+    other = x.copy()
+    other[k] = at
+    return other
 
 
 def _scale(p: Parameter) -> float:

@@ -8,13 +8,15 @@ parts that hold many times the residual's memory.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import chdtri, stdtrit
 
 from coupled.gap.search.descent import End
 from coupled.gap.signals.output import memory
-from coupled.gap.thresholds import LEAST_MEMORIES, STRETCHES_A_NUMBER
+from coupled.gap.thresholds import EDGE_BISECTIONS, LEAST_MEMORIES, STRETCHES_A_NUMBER
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -54,6 +56,39 @@ def beyond(found: End, outputs: int) -> Floats:
     downhill = found.jac.T @ found.fun
     loose = np.diag(np.linalg.pinv(found.jac.T @ found.jac))
     return np.asarray(0.5 * downhill**2 * loose / (square * memories))
+
+
+def open_above(
+    cost: Callable[[float], float], found: float, ends: tuple[float, float], worth: float
+) -> tuple[float, float] | None:
+    """Return the least number that does as well as one found, and the lower end of its interval.
+
+    None but where any larger one does as well, up to the greater of its `ends`, and none at the
+    lesser does not: a play wider than a motion swallows all of it, and no record tells how wide it
+    is. `cost` is half a sum of squares, and `worth` how much of that a log-likelihood of 1 is.
+    """
+    least, most = ends
+    margin = 0.5 * float(chdtri(1.0, 0.05)) * worth  # χ² of one number, 95 %
+    now, there = cost(found), cost(most)
+    if abs(there - now) > margin or cost(least) - max(there, now) <= margin:
+        return None
+    edge = least_of(cost, (least, found), now) if there == now else found
+    return edge, least_of(cost, (least, edge), max(there, now) + margin)
+
+
+def least_of(cost: Callable[[float], float], ends: tuple[float, float], limit: float) -> float:
+    """Return the least number between two `ends` that costs no more than a limit, as the last."""
+    below, above = ends
+    for _ in range(EDGE_BISECTIONS):
+        middle = 0.5 * (below + above)
+        below, above = (below, middle) if cost(middle) <= limit else (middle, above)
+    return above
+
+
+def worth_of(found: End, outputs: int) -> float:
+    """Return how much of half the sum of squares a log-likelihood of 1 is, at a fit's end."""
+    square, memories = _counted(found.fun, outputs)
+    return square * memories
 
 
 def _counted(left: Floats, outputs: int) -> tuple[float, float]:

@@ -1,0 +1,81 @@
+"""Taking noise off a smooth signal: white, or coloured, with more of it at low frequencies."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from coupled.gap.effects.library import BY_NAME
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.search.case import Case
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
+from coupled.record.record import Record
+from coupled.rig.replay import replay_linkage
+from tests.support import gaps
+
+RATE_Hz = 120.0
+
+
+def pushes(seed: int, most_Hz: float = 3.0, frames: int = 4800) -> NDArray[np.float64]:
+    """Return a smooth motion of many frequencies up to one, of rms 1."""
+    rng = np.random.default_rng(seed)
+    at = np.arange(frames) / RATE_Hz
+    waves = [
+        np.sin(2.0 * np.pi * f * at + rng.uniform(0.0, 6.0)) for f in rng.uniform(0.1, most_Hz, 12)
+    ]
+    return np.asarray(sum(waves) / math.sqrt(6.0))
+
+
+@pytest.mark.parametrize("memory", [0.2, 0.5, 0.7])
+def test_coloured_noise_is_not_kept_as_a_part_of_the_motion(memory: float) -> None:
+    """Taken for white, what it has more of at low frequencies passed for motion."""
+    noise = Noise(0.01, memory)
+    wrong, white = [], []
+    for seed in range(6):
+        true = pushes(seed)
+        read = true + noise.sample(len(true), np.random.default_rng(seed))
+        wrong.append(np.std(smoothed(read, noise) - true))
+        white.append(np.std(smoothed(read, Noise(0.01)) - true))
+        heard = smoothed(read)
+        assert np.std(heard - true) < 1.3 * wrong[-1]
+    assert np.mean(wrong) < 0.9 * np.mean(white)
+
+
+@given(memory=st.floats(0.0, 0.84), seed=st.integers(0, 50))
+def test_a_smoother_passes_what_is_slow_and_adds_nothing(memory: float, seed: int) -> None:
+    gain = Smoother.of(pushes(seed, frames=600), noise=Noise(1.0, memory)).gain
+    assert gain[0] == 1.0
+    assert np.all(np.diff(gain) <= 1e-12)
+    assert gain[-1] >= 0.0
+
+
+def test_a_servo_is_found_as_it_is_beside_coloured_noise_of_its_command() -> None:
+    """Noise that drives the replay made the servo slower than it is, and its dead time shorter."""
+    nominal = gaps.nominal_rig(False)
+    nominal = nominal.changed({"controls.column.loader.servo_frequency_Hz": 19.0})
+    real = nominal.changed({"controls.column.loader.servo_delay_s": 0.02})
+    at = np.arange(4800) / RATE_Hz
+    command = 0.02 * pushes(1, 1.5)
+    motion = replay_linkage(real, "column", command, np.zeros(len(at)))
+    found = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        data = {
+            "time_s": at,
+            "column_force_N": np.zeros(len(at)),
+            "column_computed_m": command + Noise(4e-5, 0.3).sample(len(at), rng),
+            "column_deflection_m": motion + rng.normal(0.0, 4e-5, len(at)),
+        }
+        record = Record(tuple(data), np.column_stack(list(data.values())))
+        outputs = Reader(nominal, record, "column", surface_points).outputs()
+        case = Case(nominal, "column", [one for one in outputs if one.stage == "linkage"])
+        values = case.fit((BY_NAME["servo_delay"],)).values
+        found.append([values["servo_delay.factor"], values["servo_delay.delay_s"]])
+    assert np.mean(found, axis=0) == pytest.approx([1.0, 0.02], rel=0.03)
