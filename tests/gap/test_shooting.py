@@ -41,13 +41,15 @@ def stuck(seed: int) -> tuple[Case, Fit]:
     return case, case.fit((PLAIN,), "fitted", descent=Descent("wide"))
 
 
-@pytest.mark.parametrize("seed", [35, 38, 39])
+@pytest.mark.parametrize("seed", [35, 38, 42, 43])
 def test_short_replays_lead_to_the_breakaway_from_afar(seed: int) -> None:
-    """The law's own starts end in hollows: an order of slips that is not the record's."""
+    """The law's own starts end in hollows: an order of slips that is not the record's.
+
+    They do in five of the seeds 35 to 46.
+    """
     case, plain = stuck(seed)
     (start,) = shot(case, LAW, PLAIN, plain)
-    # Their end is only where a fit begins: of 14 seeds, 35 to 48, 12 come within 5 %.
-    assert start[f"{LAW.name}.friction_N"] == pytest.approx(2.0, rel=0.15)
+    assert start[f"{LAW.name}.friction_N"] == pytest.approx(2.0, rel=0.05)
     assert start[f"{LAW.name}.breakaway_N"] == pytest.approx(6.0, rel=0.05)
     own = case.fit((LAW,), "fitted")
     begun = case.fit((LAW,), "fitted", start)
