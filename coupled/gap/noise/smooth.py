@@ -25,6 +25,7 @@ from scipy.interpolate import CubicSpline
 
 from coupled.gap.noise.lines import Line, lines_in
 from coupled.gap.noise.noise import Noise, noise_of
+from coupled.gap.noise.quiet import noise_of_input
 
 Floats = NDArray[np.float64]
 _REMEMBERED = 64  # signals whose smoother is known: those of one record, noise and all
@@ -83,10 +84,16 @@ def _known(signal: bytes, orders: tuple[int, ...], memory: float | None) -> Smoo
     lines = tuple(lines_in(plain))
     reach = min(len(plain) - 1, 200)
     without = plain - sum(line.over(len(plain)) for line in lines)
-    memory = noise_of(without).memory if memory is None else memory
-    gain = _gain(_lengthened(without, reach), orders, memory)
+    colour = _colour(without) if memory is None else memory
+    gain = _gain(_lengthened(without, reach), orders, colour)
     gain.flags.writeable = False
     return Smoother(gain, reach, lines)
+
+
+def _colour(signal: Floats) -> float:
+    """Return how a signal's noise correlates from frame to frame; 0 in a log that was filtered."""
+    heard = None if noise_of(signal).filtered else noise_of_input(signal)
+    return 0.0 if heard is None else heard.memory
 
 
 def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:

@@ -123,13 +123,13 @@ class Reading:
         computed = self.signal("computed")
         if self.set_points:
             return Drive.of(computed, Noise(0.0))
-        return Drive.of(computed, self.heard("computed"))
+        return Drive.of(computed, self.driving("computed"))
 
     def pulled(self) -> Drive:
         """Return F as it drives the loader and the linkage; none where the record lacks it."""
         if self.name_of("force") not in self.record:
             return Drive.of(np.zeros(len(self.record)), Noise(0.0))
-        return Drive.of(self.signal("force"), self.heard("force"))
+        return Drive.of(self.signal("force"), self.driving("force"))
 
     def name_of(self, quantity: str) -> str:
         """Return the name of a quantity's channel."""
@@ -170,8 +170,11 @@ class Reading:
 
     def heard(self, quantity: str) -> Noise:
         """Return the noise of a control's channel."""
-        known = noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
-        return input_noise(known, self.signal(quantity)) if quantity == "force" else known
+        return noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
+
+    def driving(self, quantity: str) -> Noise:
+        """Return the noise of a control's channel that drives a stage, and may be a signal's."""
+        return input_noise(self.heard(quantity), self.signal(quantity))
 
     def filtered(self) -> dict[str, str]:
         """Return {a channel of the control whose log was filtered: where its floor comes from}."""

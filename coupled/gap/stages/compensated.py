@@ -36,7 +36,7 @@ def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
     floor = max(reading.heard("computed").rms, ROUNDING_SPAN * float(np.ptp(computed)))
     rig = reading.rig
     if rig.controls[control].sensing.force_stamp != 0.0:
-        level, late = reading.heard("force"), reading.sensed(rig).as_the_host_had_it
+        level, late = reading.driving("force"), reading.sensed(rig).as_the_host_had_it
         shaken = late(unsmoothed(recorded, 0, level)), unsmoothed(late(recorded), 0, level)
         floor = math.hypot(floor, *(float(np.std(made(rig, f) - predict(rig))) for f in shaken))
     return reading.name_of("estimate"), reading.signal("estimate"), predict, floor

@@ -34,7 +34,7 @@ class Imposed:
     def __init__(self, reading: Reading) -> None:
         self._reading = reading
         self._motion = smoothed(reading.signal(reading.imposed))
-        self._level: Noise = reading.heard(reading.imposed)
+        self._level: Noise = reading.driving(reading.imposed)
         self._gradient = reading.gradient()
         self._load = reading.load()
 

@@ -103,7 +103,7 @@ class Product:
 
     @cached_property
     def _level(self) -> Noise:
-        return self.reading.heard("computed")
+        return self.reading.driving("computed")
 
     @cached_property
     def _gradients(self) -> tuple[Floats, Floats | None]:

@@ -164,7 +164,7 @@ class Reader(Reading):
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
         load_of = self.load()
-        smooth = smoothed(computed, own := self.heard("computed"))
+        smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
@@ -199,7 +199,7 @@ class Reader(Reading):
             return walked if walks else lambda rig: at(rig, 0.0)
 
         def noisy(rig: Rig, k: int) -> Floats:
-            seen = with_error(smooth, k + NOISE_TRIES, own)
+            seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
         if force.noise.rms > BROAD * float(np.std(force.recorded)):
@@ -224,7 +224,7 @@ class Reader(Reading):
     def _answering(self) -> list[Output]:
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
-        own = min(self.heard("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
+        own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
         made = (force, motion.predict(), motion.noisy, own, self.imposed)
         return [self._made("loader", self.name_of("force"), *made)]
 
