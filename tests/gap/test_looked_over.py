@@ -102,3 +102,42 @@ def test_an_effect_dropped_leaves_the_best_fit_that_is_known() -> None:
     assert _with_only(case, [], steps_of(PLAIN), both).cost == pytest.approx(known.cost, rel=1e-3)
     better = replace(known, cost=0.5 * known.cost)
     assert _with_only(case, [case.fit(()), better, both], steps_of(PLAIN), both) is better
+
+
+@pytest.mark.parametrize("open_one", [True, False], ids=["open", "needless"])
+def test_what_took_another_s_place_is_asked_what_it_leaves_of_the_others(
+    monkeypatch: pytest.MonkeyPatch, open_one: bool
+) -> None:
+    """A bend in a lag's place took all of a scale found first, which stayed in the answer."""
+    case = rubbing_with_an_offset()
+    lag, bend, scale = RICHER, PLAIN, BY_NAME["deflection_scale"]
+
+    def taken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
+        if step.effect is not lag:
+            return step, current
+        effects = [bend if one is lag else one for one in current.effects]
+        return replace(step, effect=bend), replace(current, effects=tuple(effects))
+
+    def is_open(case: Case, effect: Effect, fitted: Fit) -> bool:
+        return open_one and effect is scale and lag not in fitted.effects
+
+    def needless(case: Case, current: Fit) -> Effect | None:
+        return scale if not open_one and scale in current.effects else None
+
+    monkeypatch.setattr(choose, "overtaken", taken)
+    monkeypatch.setattr(choose, "is_open", is_open)
+    monkeypatch.setattr(choose, "_needless", needless)
+    for name in ("plainer_on_all", "richer_on_all"):
+        monkeypatch.setattr(choose, name, lambda case, library, steps, fit: (steps, fit))
+    monkeypatch.setattr(choose, "_law_again", lambda case, s, library, steps, fit: (steps, fit))
+    for name in ("separated", "distinguished"):
+        monkeypatch.setattr(choose, name, lambda case, fit, step: (step, fit))
+    for name in ("switched", "same_in_a_limit"):
+        monkeypatch.setattr(choose, name, lambda case, library, fit, step: (step, fit))
+    monkeypatch.setattr(choose, "in_place_of_open", lambda case, steps, fit: (steps, fit))
+    monkeypatch.setattr(choose, "tried_again", lambda case, fit, step: step)
+    monkeypatch.setattr(choose, "yielding_reading", lambda case, fit: None)
+    current = replace(case.fit((lag,)), effects=(scale, lag))
+    steps, last = choose._looked_over(case, [], [case.fit(())], steps_of(scale, lag), current)
+    assert [step.effect for step in steps] == [bend]
+    assert set(last.effects) == {bend}

@@ -110,6 +110,7 @@ def _looked_over(
     case: Case, library: Sequence[Effect], stood: list[Fit], steps: list[Found], current: Fit
 ) -> tuple[list[Found], Fit]:
     """Return the steps and the fit, each effect looked at once more beside all the others."""
+    before = set(current.effects)
     if len(steps) > 1:
         steps, current = _law_again(case, stood[0], library, steps, current)
     steps, current = plainer_on_all(case, library, steps, current)
@@ -134,7 +135,14 @@ def _looked_over(
         one, current = distinguished(case, current, one)
         one, current = same_in_a_limit(case, library, current, one)
         last.append(one)
-    return last, current
+    # What took another's place may leave nothing to one that was found beside it.
+    rest = [step for step in last if not is_open(case, step.effect, current)]
+    if len(rest) == len(last) and set(current.effects) != before:
+        needless = _needless(case, current)
+        rest = [step for step in last if step.effect is not needless]
+    if len(rest) == len(last):
+        return last, current
+    return _looked_over(case, library, stood, rest, _with_only(case, stood, rest, current))
 
 
 def _with_only(case: Case, stood: Sequence[Fit], steps: Sequence[Found], current: Fit) -> Fit:
