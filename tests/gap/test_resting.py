@@ -183,5 +183,5 @@ def _missed(residual: Floats) -> float:
 def test_the_noise_of_what_drives_a_linkage_is_that_of_its_channel(tmp_path: Path) -> None:
     rig: Rig = nominal_rig(False)
     reader = Reader(rig, made(tmp_path, rig, {}, 31), "column", surface_points)
-    assert reader.pulled().noise == reader.heard("force")
-    assert reader.commanded().noise == reader.heard("computed")
+    assert reader.pulled().noise == reader.driving("force")
+    assert reader.commanded().noise == reader.driving("computed")

@@ -50,7 +50,7 @@ def test_coloured_noise_is_not_kept_as_a_part_of_the_motion(memory: float) -> No
 
 @given(memory=st.floats(0.0, 0.84), seed=st.integers(0, 50))
 def test_a_smoother_passes_what_is_slow_and_adds_nothing(memory: float, seed: int) -> None:
-    gain = Smoother.of(pushes(seed, frames=600), noise=Noise(1.0, memory)).gain
+    gain = Smoother.of(pushes(seed, frames=600), noise=Noise(0.01, memory)).gain
     assert gain[0] == 1.0
     assert np.all(np.diff(gain) <= 1e-12)
     assert gain[-1] >= 0.0
@@ -79,3 +79,10 @@ def test_a_servo_is_found_as_it_is_beside_coloured_noise_of_its_command() -> Non
         values = case.fit((BY_NAME["servo_delay"],)).values
         found.append([values["servo_delay.factor"], values["servo_delay.delay_s"]])
     assert np.mean(found, axis=0) == pytest.approx([1.0, 0.02], rel=0.03)
+
+
+def test_a_noise_as_large_as_the_signal_may_be_the_signal_and_lends_it_no_colour() -> None:
+    broad = Noise(1.0, 0.48).sample(2400, np.random.default_rng(1))
+    as_white = Smoother.of(broad, noise=Noise(1.0)).gain
+    assert np.array_equal(Smoother.of(broad, noise=Noise(1.0, 0.48)).gain, as_white)
+    assert np.array_equal(Smoother.of(broad).gain, as_white)

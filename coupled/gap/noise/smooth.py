@@ -26,6 +26,7 @@ from scipy.interpolate import CubicSpline
 from coupled.gap.noise.lines import Line, lines_in
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.quiet import noise_of_input
+from coupled.gap.thresholds import BROAD
 
 Floats = NDArray[np.float64]
 _REMEMBERED = 64  # signals whose smoother is known: those of one record, noise and all
@@ -54,7 +55,7 @@ class Smoother:
         `noise` has the colour of what is taken off; without it that is heard from the signal.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
-        return _known(whole, tuple(orders), None if noise is None else noise.memory)
+        return _known(whole, tuple(orders), noise)
 
     def smooth(self, signal: Floats) -> Floats:
         """Return a signal of the same length without its noise; zero phase.
@@ -78,22 +79,27 @@ class Smoother:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def _known(signal: bytes, orders: tuple[int, ...], memory: float | None) -> Smoother:
+def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoother:
     """Return the smoother of a signal; a diagnosis smooths each of them several times."""
     plain = np.frombuffer(signal)
     lines = tuple(lines_in(plain))
     reach = min(len(plain) - 1, 200)
     without = plain - sum(line.over(len(plain)) for line in lines)
-    colour = _colour(without) if memory is None else memory
-    gain = _gain(_lengthened(without, reach), orders, colour)
+    gain = _gain(_lengthened(without, reach), orders, _colour(without, noise))
     gain.flags.writeable = False
     return Smoother(gain, reach, lines)
 
 
-def _colour(signal: Floats) -> float:
-    """Return how a signal's noise correlates from frame to frame; 0 in a log that was filtered."""
-    heard = None if noise_of(signal).filtered else noise_of_input(signal)
-    return 0.0 if heard is None else heard.memory
+def _colour(signal: Floats, noise: Noise | None) -> float:
+    """Return how the noise to take off correlates from frame to frame, as given or as heard.
+
+    None in a log that was filtered, nor where it is a large part of the signal: its colour may then
+    be the signal's own.
+    """
+    if noise is None and not noise_of(signal).filtered:
+        noise = noise_of_input(signal)
+    clear = noise is not None and noise.rms <= BROAD * float(np.std(signal))
+    return noise.memory if noise is not None and clear else 0.0
 
 
 def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:

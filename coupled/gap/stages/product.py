@@ -103,7 +103,7 @@ class Product:
 
     @cached_property
     def _level(self) -> Noise:
-        return self.reading.driving("computed")
+        return self.reading.heard("computed")
 
     @cached_property
     def _gradients(self) -> tuple[Floats, Floats | None]:
