@@ -85,7 +85,7 @@ class Product:
 
     @cached_property
     def _smooth(self) -> Floats:
-        return smoothed(self._computed, self._level)
+        return smoothed(self._computed)
 
     @cached_property
     def _likely(self) -> Floats:
@@ -96,7 +96,7 @@ class Product:
         """
         rest = self._computed - self._smooth
         noise = self._level.sample(len(rest), np.random.default_rng(53))
-        alone = noise - Smoother.of(self._computed, noise=self._level).smooth(noise)
+        alone = noise - Smoother.of(self._computed).smooth(noise)
         power = float(rest @ rest)
         motion = max(0.0, 1.0 - float(alone @ alone) / power) if power > 0.0 else 0.0
         return self._smooth + motion * rest
