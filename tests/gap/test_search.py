@@ -244,17 +244,6 @@ def test_noise_is_the_least_that_a_rig_leaves(quiet: float, floor: float) -> Non
     assert again is None or again.gaps(rig)["linkage"] == pytest.approx(2.0 / floor, rel=0.05)
 
 
-def test_what_a_rig_measures_elsewhere_is_not_heard_as_quieter() -> None:
-    """With the play found the trim is elsewhere: the old place stood 16 floors off."""
-    rig: Rig = bench({})
-    first = output("airframe", 2.0)
-    elsewhere = replace(first, measured=first.measured + 1.0, floor=0.1)
-    case = Case(rig, "column", [first], refloored=lambda other: [elsewhere])
-    assert case.heard_anew(rig) is None
-    alike = Case(rig, "column", [first], refloored=lambda other: [replace(first, floor=0.1)])
-    assert alike.heard_anew(rig) is not None
-
-
 def test_a_contact_is_looked_for_at_lengths_that_a_fit_does_not_come_to() -> None:
     """A control that sticks elsewhere leaves as much for any short contact: no slope leads away."""
     rig = bench({"controls.column.loader.friction_N": 6.0})

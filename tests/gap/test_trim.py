@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop
 from coupled.gap.stages.surfaces import own_trim, surface_points
@@ -181,3 +183,15 @@ def test_a_mass_is_fitted_where_the_model_soon_ceases_to_trim(tmp_path: Path, ri
     assert found.values["mass.factor"] == pytest.approx(1.05, abs=2e-3)
     with pytest.raises(InputError, match="does not trim"):
         own_trim(real(weak, "mass", 1.15), "column")
+
+
+def test_where_a_surface_stands_in_trim_is_not_heard_as_quieter() -> None:
+    """With the play found the trim is elsewhere: the old place stood 16 floors off."""
+    rig, noise = nominal_rig(False), np.random.default_rng(2).normal(0.0, 2.0, 2400)
+    first = Output("airframe", TRIM, noise, lambda rig: np.zeros(2400), 1.0, 120.0)
+    elsewhere = replace(first, measured=noise + 1.0, floor=0.1)
+    assert Case(rig, "column", [first], refloored=lambda other: [elsewhere]).heard_anew(rig) is None
+    quieter = replace(first, floor=0.1)
+    alike = Case(rig, "column", [first], refloored=lambda other: [quieter]).heard_anew(rig)
+    assert alike is not None
+    assert alike.outputs[0].floor == 0.1
