@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -267,12 +267,19 @@ def test_a_late_force_takes_its_delay_off_the_damping() -> None:
     assert simulated(late, hand, 6.0) == pytest.approx(growth(late, hand), rel=0.005)
 
 
+# Five orthonormal axes, none along another's.
+AXES = np.linalg.qr(np.vander([0.1, 0.4, 0.5, 0.8, 1.1]))[0]
+
+
 @given(
     st.lists(st.floats(-1.0, 1.0), min_size=25, max_size=25),
     st.floats(-3.0, 3.0),
 )
+@example([0.0] * 23 + [1.0, 2.0**-23], 0.0)
 def test_the_exponential_of_a_matrix_is_that_of_scipy(entries: list[float], decades: float) -> None:
+    """Scipy takes a way of its own for a triangular matrix, which loses six digits where two
+    eigenvalues nearly meet: it is asked for the same matrix seen from turned axes."""
     matrix = np.reshape(entries, (5, 5)) * 10.0**decades - 10.0**decades * 5.0 * np.eye(5)
-    wanted = expm(matrix)
+    wanted = AXES.T @ expm(AXES @ matrix @ AXES.T) @ AXES
     scale = max(1.0, 10.0**decades) * float(np.max(np.abs(wanted)))
     assert exponential(matrix) == pytest.approx(wanted, abs=1e-11 * scale + 1e-300)
