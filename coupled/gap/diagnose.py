@@ -15,7 +15,7 @@ from functools import partial
 from coupled.errors import InputError
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.effects.library import library_of
-from coupled.gap.findings.answer import doubted, effects_of, settings_of, verdict_of
+from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.healthy import Baseline
@@ -115,7 +115,7 @@ def _diagnose(
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
     stages = judge.stages()
     effects = effects_of(case, choice, readers, stages)
-    if unsure := doubted(choice, effects):
+    if unsure := incredible(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
     last = choice.halves or choice.fit
     fitted = case.fit(last.effects, "fitted", last.values, descent=Descent("own"), near=last)

@@ -196,7 +196,7 @@ SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which 
 
 # Where a fit of a ripple starts (`ripples`).
 RIPPLE_LEAST = 1.5  # chosen: periods within the deflections met, fewer of which are a spring's law
-RIPPLE_PERIODS = 60.0  # chosen: the most of them
+RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: the most of them, and how many are tried
 
 # Fits of candidates that are finished (`candidates`).
 HARDLY = 1.05  # chosen: times the running friction, a breakaway where Coulomb's friction begins

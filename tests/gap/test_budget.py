@@ -13,9 +13,10 @@ from coupled.gap import diagnose as diagnosing
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.budget import NOISE, UNEXPLAINED, _Blocks, _Weights
-from coupled.gap.findings.credibility import Credibility, Regime, _size
+from coupled.gap.findings.credibility import Credibility
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import ChannelAgain, nearer
+from coupled.gap.findings.regimes import Regime, _size
 from coupled.rig.replay import replay_linkage
 from tests.support.gaps import made, nominal_rig
 

@@ -15,13 +15,10 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.answer import verdict_of
 from coupled.gap.findings.credibility import (
     Credibility,
-    Regime,
-    _Acts,
-    _regime,
-    _size,
     credibility,
     remainder,
 )
+from coupled.gap.findings.regimes import Acts, Regime, _regime, _size
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
 from coupled.gap.signals.output import Output
@@ -248,7 +245,7 @@ def parted(rng: np.random.Generator, acting: list[int], size: float = 1.0) -> Re
     left = 0.1 * rng.normal(size=20)[number] * action + 0.01 * rng.normal(size=1000)
     left += (size - 1.0) * np.where(time_s > 10.0, action, 0.0)
     output = SimpleNamespace(record=0, stretches=number)
-    acts = _Acts(cast(Output, output), cast(Record, {}), action, left)
+    acts = Acts(cast(Output, output), cast(Record, {}), action, left)
     return _regime("time_s", [(acts, time_s)], 0.0)
 
 

@@ -58,9 +58,8 @@ def verdict_of(
     if not choice.steps:
         # A floor that hides much of a stage lets nobody say whether it has a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
-    rivals = {step.effect.name: len(step.rivals) for step in choice.steps if step.rivals}
-    together = [one.probability * (1 + rivals[one.name]) for one in effects if one.name in rivals]
-    if rivals and not (held and sure and max(together) < CERTAIN):
+    rivals = {step.effect.name for step in choice.steps if step.rivals}
+    if rivals and not (held and sure and rivals <= incredible(choice, effects)):
         return "ambiguous"
     return "mostly" if left or rivals else "effect"
 
@@ -69,6 +68,12 @@ def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
     """Return the effects that are not certain, though no other rivals them."""
     alone = {step.effect.name for step in choice.steps if not step.rivals}
     return frozenset(e.name for e in effects if e.name in alone and e.probability < CERTAIN)
+
+
+def incredible(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
+    """Return the effects that are not certain, and no more so with all their rivals together."""
+    all_of = {step.effect.name: 1 + len(step.rivals) for step in choice.steps}
+    return frozenset(e.name for e in effects if e.probability * all_of[e.name] < CERTAIN)
 
 
 def _held(budget: StageBudget | None, effects: Collection[str]) -> float:

@@ -3,8 +3,9 @@
 Half of a record may hold too few breakaways to earn a law of friction its place, or leave open how
 a servo with a dead time is damped, or whether a bend has a loop; and a fit to it may end in a
 hollow. On all of it the richer law must do more, since it can bend farther: by `RICHER_GAIN` of dry
-friction, of which no law is exact, by `LEAST_GAIN` of a bend, and of a servo, which may be either,
-by `RIVAL_GAIN`. What a richer law could gain is foretold first (`laws`), which spares most fits.
+friction, of which no law is exact, and by `LEAST_GAIN` of a bend and of a servo. Of friction whose
+contact holds rigidly, by `RIVAL_GAIN`, as of two laws with as many numbers. What a richer law could
+gain is foretold first (`laws`), which spares most fits.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from coupled.gap.search.rivals import Found, weight
 from coupled.gap.search.shooting import shot
 from coupled.gap.thresholds import (
     BESIDE_ONE,
+    ELASTIC_SHARES,
     FORETOLD_LEAST,
     LEAST_GAIN,
     RICHER_GAIN,
@@ -50,7 +52,7 @@ def richer_on_all(
             effects = [law if one is step.effect else one for one in current.effects]
             fits = in_threads(partial(_fitted, case, effects), starts)
             fitted = min(fits, key=lambda one: one.cost, default=None)
-            if fitted is None or not _is_cause(case, law, step.effect, fitted):
+            if fitted is None or not _is_cause(case, law, step.effect, fitted, current):
                 continue
             more = likelier_by(case.outputs, fitted, current)
             if more >= least:
@@ -91,7 +93,8 @@ def plainer_on_all(
             fits = in_threads(partial(_fitted, case, effects), _each(current.values, sizes))
             fitted = min(fits, key=lambda one: one.cost)
             causes = may_be_causes(case, [(law, fitted)]) and not says_nothing(case, law, fitted)
-            if causes and likelier_by(case.outputs, current, fitted) < RIVAL_GAIN:
+            least = LEAST_GAIN if law.reserve else RIVAL_GAIN
+            if causes and likelier_by(case.outputs, current, fitted) < least:
                 found[i] = replace(step, effect=law, rivals=(), behind=())
                 current = fitted
                 break
@@ -110,6 +113,10 @@ def _richer(
         if law in current.effects:
             continue
         if law.alike is not None and law.alike.plainer == plain.name:
+            if _holds_rigidly(case, current):
+                begun = little_richer(case, law, plain, current)
+                yield law, RIVAL_GAIN, [case.but_for_contact(start) for start in begun]
+                continue
             gain = foretold(case, law, plain, current, "all")
             promising = gain is None or gain >= RICHER_GAIN
             starts = little_richer(case, law, plain, current) if promising else []
@@ -119,8 +126,17 @@ def _richer(
             if starts:
                 yield law, RICHER_GAIN, starts
         elif _holds(law, plain):
-            least = RIVAL_GAIN if law.reserve else LEAST_GAIN
-            yield law, least, _promising(case, law, plain, current)
+            yield law, LEAST_GAIN, _promising(case, law, plain, current)
+
+
+def _holds_rigidly(case: Case, current: Fit) -> bool:
+    """Tell whether a contact holds nearly all that friction takes before any of it slips.
+
+    A fit ends there where friction falls as it slips: the contact then does what a breakaway does,
+    with as many numbers, and must be sought anew beside one.
+    """
+    shares = (current.values.get(one.value_key(one.free[0]), 0.0) for one in case.contact[1:])
+    return any(share >= max(ELASTIC_SHARES) for share in shares)
 
 
 def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> Starts:
@@ -176,7 +192,13 @@ def _keys(effect: Effect) -> set[str]:
     return {p.key for p in effect.free}
 
 
-def _is_cause(case: Case, law: Effect, plain: Effect, fitted: Fit) -> bool:
-    """Tell whether a law says something by its fit, and that it is not the plainer one."""
-    silent = says_nothing(case, law, fitted) or may_be_plainer(case, law, fitted, plain)
+def _is_cause(case: Case, law: Effect, plain: Effect, fitted: Fit, current: Fit) -> bool:
+    """Tell whether a law says something by its fit, and that it is not the plainer one.
+
+    Where the plainer one's contact holds rigidly, likelihood alone says the latter: a breakaway and
+    how far it yields are hardly apart there, and the breakaway's interval is as wide.
+    """
+    silent = says_nothing(case, law, fitted)
+    if law.alike is None or not _holds_rigidly(case, current):
+        silent = silent or may_be_plainer(case, law, fitted, plain)
     return bool(may_be_causes(case, [(law, fitted)])) and not silent
