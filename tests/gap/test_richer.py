@@ -139,6 +139,23 @@ def test_a_servo_found_with_a_damping_that_is_open_is_one_with_a_dead_time(
     assert last.values["servo_delay.delay_s"] == pytest.approx(0.03, rel=0.1)
 
 
+def test_a_servo_with_a_dead_time_is_a_tuning_only_by_as_much_as_an_effect_gains(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By 5.4 and 5.6 two dead times of seed 2041 were named so, by the draw of the noise alone."""
+    case = linkage_of(tmp_path, {"servo_delay": {"delay_s": 0.03, "factor": 1.0}})
+    delayed = case.fit((DELAY,))
+    [least] = [
+        least for law, least, _ in richer._richer(case, EFFECTS, DELAY, delayed) if law is TUNING
+    ]
+    assert least == LEAST_GAIN
+    tuned = begun_at(case, Found(TUNING, 800.0, 0.97, ()), delay_s=0.03, damping_factor=0.97)
+    for more, named in ((LEAST_GAIN - 0.1, DELAY), (LEAST_GAIN + 0.1, TUNING)):
+        monkeypatch.setattr(richer, "likelier_by", lambda *_, more=more: more)
+        [one], _ = plainer_on_all(case, EFFECTS, [Found(TUNING, 800.0, 0.97, ())], tuned)
+        assert one.effect is named
+
+
 @pytest.mark.parametrize(("damping", "cause"), [(0.996, False), (1.019, False), (0.97, True)])
 def test_a_damping_within_what_a_setting_may_be_off_is_none(damping: float, cause: bool) -> None:
     """A dead time of 20 ms was named a tuning with a damping of 0.996."""

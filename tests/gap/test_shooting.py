@@ -13,7 +13,7 @@ import pytest
 
 from coupled.gap.effects.effect import possible
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.search import anew, choose
+from coupled.gap.search import anew, choose, richer
 from coupled.gap.search.anew import with_contact_anew
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent, End
@@ -24,6 +24,7 @@ from coupled.gap.search.rivals import Found
 from coupled.gap.search.shooting import screened_short, shot, shot_contact, shot_starts
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.thresholds import RIVAL_GAIN
 from tests.support import gaps
 
 PLAIN, LAW = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
@@ -189,3 +190,31 @@ def test_signatures_are_held_against_short_replays_with_the_contact_that_suits_t
         for start in one.starts:
             assert start[length] == pytest.approx(1e-4, rel=0.15)
             assert {one.effect.value_key(p) for p in one.effect.free} <= start.keys()
+
+
+@pytest.mark.parametrize(("share", "asked"), [(0.95, True), (0.9, True), (0.89, False)])
+def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_its_own(
+    share: float, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three breakaways of seeds 2040 and 2041 were read as friction of which 95 % is elastic."""
+    case, plain = stuck(42)
+    known = {**plain.values, "setting of the contact's share.": share}
+    rigid = replace(plain, values=known)
+    monkeypatch.setattr(richer, "foretold", lambda *_: 0.0)
+    monkeypatch.setattr(Case, "over_limit", lambda *_: set())
+    found = list(richer._richer(case, [PLAIN, LAW], PLAIN, rigid))
+    assert bool(found) is asked
+    for law, least, starts in found:
+        assert (law, least) == (LAW, RIVAL_GAIN)
+        assert starts
+        assert not any("contact" in key for start in starts for key in start)
+    # There the interval of a breakaway is as wide as its contact is unknown.
+    monkeypatch.setattr(richer, "may_be_plainer", lambda *_: True)
+    breaks = replace(plain, effects=(LAW,), values={f"{LAW.name}.{k}": v for k, v in TRUE.items()})
+    wide = {key: (0.5 * value, 1.5 * value) for key, value in breaks.values.items()}
+    breaks = replace(
+        breaks,
+        low={key: low for key, (low, _) in wide.items()},
+        high={key: high for key, (_, high) in wide.items()},
+    )
+    assert richer._is_cause(case, LAW, PLAIN, breaks, rigid) is asked

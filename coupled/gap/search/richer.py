@@ -113,18 +113,16 @@ def _richer(
         if law in current.effects:
             continue
         if law.alike is not None and law.alike.plainer == plain.name:
-            if _holds_rigidly(case, current):
-                begun = little_richer(case, law, plain, current)
-                yield law, RIVAL_GAIN, [case.but_for_contact(start) for start in begun]
-                continue
-            gain = foretold(case, law, plain, current, "all")
+            rigid = _holds_rigidly(case, current)
+            gain = None if rigid else foretold(case, law, plain, current, "all")
             promising = gain is None or gain >= RICHER_GAIN
             starts = little_richer(case, law, plain, current) if promising else []
+            starts = [case.but_for_contact(start) for start in starts] if rigid else starts
             # What is foretold is of a little breakaway, and one that opens a gap is none.
             if case.over_limit(current.rig) & {*law.shows_in}:
                 starts += shot(case, law, plain, current, "all")
             if starts:
-                yield law, RICHER_GAIN, starts
+                yield law, RIVAL_GAIN if rigid else RICHER_GAIN, starts
         elif _holds(law, plain):
             yield law, LEAST_GAIN, _promising(case, law, plain, current)
 
