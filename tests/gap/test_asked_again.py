@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS, library_of
-from coupled.gap.search import information, richer, screen, small
+from coupled.gap.search import contest, information, richer, screen, small
 from coupled.gap.search.anew import with_settings_anew
 from coupled.gap.search.candidates import _from_ends
 from coupled.gap.search.case import Case
@@ -24,7 +25,7 @@ from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import RICHER_GAIN, RIVAL_GAIN, SCREENED_MOST
+from coupled.gap.thresholds import LEAST_GAIN, RICHER_GAIN, SCREENED_MOST
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
@@ -91,6 +92,28 @@ def test_a_rival_beside_dry_friction_is_distinguished_by_all_of_the_record(
     assert (not one.rivals) == told
     assert (one.probability > 0.96) == told
     assert last.effects == (OFFSET,)
+
+
+def test_a_rival_that_all_of_the_record_refutes_need_be_no_cause_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A breakaway that was no cause on all of a record stayed a ripple's rival, less likely by 859.
+
+    It stays where that does not refute it.
+    """
+
+    def predict(apart: float, rig: Rig) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        loader = rig.controls["column"].loader
+        return np.asarray(loader.offset * FIRST + loader.bob_weight * (FIRST + SECOND * apart))
+
+    monkeypatch.setattr(contest, "may_be_causes", lambda *_: [])
+    for apart, stays in ((0.2, False), (0.0, True)):
+        output = Output("loader", "x", FIRST + NOISE, partial(predict, apart), 1.0, 120.0)
+        case = Case(bench({"friction_N": 2.0}), "column", [output])
+        rival = Candidate(197.0, WEIGHT, case.fit((WEIGHT,), "fitted"))
+        step = Found(OFFSET, 200.0, 0.95, (rival,))
+        one, _ = distinguished(case, case.fit((OFFSET,)), step)
+        assert bool(one.rivals) is stays
 
 
 def test_a_fit_starts_where_its_last_one_ended_too() -> None:
@@ -251,7 +274,7 @@ def test_a_servo_s_damping_is_asked_where_its_dead_time_was_found() -> None:
     known = {delay.value_key(p): 0.02 + k for k, p in enumerate(delay.free)}
     current = replace(current, values=known)
     [(law, least, starts)] = list(richer._richer(case, EFFECTS, delay, current))
-    assert (law, least) == (tuning, RIVAL_GAIN)
+    assert (law, least) == (tuning, LEAST_GAIN)
     asked = [[start[tuning.value_key(p)] for p in tuning.free] for start in starts]
     assert asked == [[0.02, 1.02, 0.8], [0.02, 1.02, 1.25]]
     assert not list(richer._richer(case, EFFECTS, tuning, replace(current, effects=(tuning,))))

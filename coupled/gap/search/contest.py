@@ -26,20 +26,34 @@ def contested(
 ) -> tuple[Fit, Fit] | None:
     """Return the fits of all of the record with an effect found and with another in its place.
 
-    The other is begun from each of the starts. Beside dry friction either may stand in a hollow, so
-    the one found is fitted again from where the other ended, and where the other is likelier, with
-    its contact sought anew. None where the other is no cause.
+    None where the other is no cause.
     """
-    effects = [other if one is effect else one for one in current.effects]
-    there = min((case.fit(effects, start=one) for one in starts), key=lambda one: one.cost)
+    there = _instead(case, current, effect, other, starts)
     if not may_be_causes(case, [(other, there)]) or says_nothing(case, other, there):
         return None
+    return _again(case, current, effect, there), there
+
+
+def _instead(
+    case: Case, current: Fit, effect: Effect, other: Effect, starts: Sequence[Mapping[str, float]]
+) -> Fit:
+    """Return the fit with another effect in place of one, begun from each of the starts."""
+    effects = [other if one is effect else one for one in current.effects]
+    return min((case.fit(effects, start=one) for one in starts), key=lambda one: one.cost)
+
+
+def _again(case: Case, current: Fit, effect: Effect, there: Fit) -> Fit:
+    """Return the fit of what was found, begun from where the other effect's ended, too.
+
+    Beside dry friction it may stand in a hollow. Where the other is likelier, the contact is sought
+    anew as well.
+    """
     start = {**there.values, **own_values(effect, current)}
     here = min(current, case.fit(current.effects, start=start), key=lambda one: one.cost)
     anew = case.but_for_contact(start)
     if anew != start and likelier_by(case.outputs, here, there) <= -RIVAL_GAIN:
         here = min(here, case.fit(current.effects, start=anew), key=lambda one: one.cost)
-    return here, there
+    return here
 
 
 def overtaken(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
@@ -108,7 +122,9 @@ def distinguished(case: Case, current: Fit, step: Found) -> tuple[Found, Fit]:
             own = own_values(rival.effect, rival.fit)
             starts = [{**current.values, **own}, {**current.values, **rival.fit.values}]
             starts.append(case.but_for_contact(starts[0]))
-            fits = contested(case, current, step.effect, rival.effect, starts)
+            # One that is no cause by all of the record is none of half of it, if it is less likely.
+            there = _instead(case, current, step.effect, rival.effect, starts)
+            fits = _again(case, current, step.effect, there), there
         if fits is None:
             left.append(rival)
             continue
