@@ -14,7 +14,7 @@ import pytest
 from coupled.gap.effects.effect import possible
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search import anew, choose, richer
-from coupled.gap.search.anew import with_contact_anew
+from coupled.gap.search.anew import with_contact_anew, with_settings_anew
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent, End
 from coupled.gap.search.fit import Fit
@@ -24,7 +24,7 @@ from coupled.gap.search.rivals import Found
 from coupled.gap.search.shooting import screened_short, shot, shot_contact, shot_starts
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import RIVAL_GAIN
+from coupled.gap.thresholds import FAR_BELOW_NOISE, RIVAL_GAIN
 from tests.support import gaps
 
 PLAIN, LAW = BY_NAME["coulomb_friction"], BY_NAME["stribeck_friction"]
@@ -218,3 +218,22 @@ def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_
         high={key: high for key, (_, high) in wide.items()},
     )
     assert richer._is_cause(case, LAW, PLAIN, breaks, rigid) is asked
+
+
+def test_a_setting_at_its_end_beside_friction_begins_anew_where_it_would_be_held_against_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A breakaway's fit stood in a hollow at 1.10 of 1.2 floors, and 16 fits sought a damping."""
+    case, _ = stuck(38)
+    hollow = case.fit((LAW,), start={f"{LAW.name}.friction_N": 1.0})
+    at_end = replace(hollow, at_bound=("setting of viscous_damping.factor",))
+    monkeypatch.setattr(Case, "over_limit", lambda *_: set())
+    monkeypatch.setattr(Case, "gaps", lambda *_: {"loader": FAR_BELOW_NOISE - 0.01})
+    assert with_settings_anew(case, at_end) is at_end
+    monkeypatch.setattr(Case, "gaps", lambda *_: {"loader": FAR_BELOW_NOISE})
+    filed = {key: value for key, value in case.neutral.items() if key in hollow.values}
+    within = replace(hollow, at_bound=(), values={**hollow.values, **filed})
+    assert with_settings_anew(case, within) is within  # no setting is at an end
+    found = with_settings_anew(case, at_end)
+    assert found.cost < 0.05 * hollow.cost
+    assert found.values[f"{LAW.name}.breakaway_N"] == pytest.approx(6.0, rel=0.02)

@@ -15,7 +15,7 @@ from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.shooting import shot_contact
-from coupled.gap.thresholds import BEGUN_AT, HIGHER, NEXT_TO
+from coupled.gap.thresholds import BEGUN_AT, FAR_BELOW_NOISE, HIGHER, NEXT_TO
 from coupled.parallel import in_threads
 
 
@@ -62,7 +62,9 @@ def with_settings_anew(case: Case, current: Fit) -> Fit:
     ours = [one for one in current.effects if one.free and shown & {*one.shows_in}]
     long = any(STAGE_OF[stage].flown for stage in shown) or any(one.dry for one in ours)
     long |= "loader" in shown and is_dry(case.nominal, case.control)
-    if not strained or (long and not case.over_limit(current.rig)):
+    rubs = "loader" in shown and (is_dry(case.nominal, case.control) or any(o.dry for o in ours))
+    asked = rubs and case.gaps(current.rig).get("loader", 0.0) >= FAR_BELOW_NOISE
+    if not strained or (long and not asked and not case.over_limit(current.rig)):
         return current
     filed = {key: value for key, value in current.values.items() if key not in ends}
     starts = [filed]
@@ -70,6 +72,8 @@ def with_settings_anew(case: Case, current: Fit) -> Fit:
         key, level = effect.value_key(effect.free[0]), effect.free[0]
         none = level.neutral(case.nominal, case.control)
         starts += [{**filed, key: none + times * (filed[key] - none)} for times in BEGUN_AT]
+    short = shot_contact(case, current) if rubs else None
+    starts += [] if short is None else [dict(short.values)]
     fits = in_threads(partial(_begun, case, current.effects), starts)
     return min([current, *fits], key=lambda one: one.cost)
 
