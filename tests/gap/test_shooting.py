@@ -224,8 +224,8 @@ def test_a_setting_at_its_end_beside_friction_begins_anew_where_it_would_be_held
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A breakaway's fit stood in a hollow at 1.10 of 1.2 floors, and 16 fits sought a damping."""
-    case, _ = stuck(38)
-    hollow = case.fit((LAW,), start={f"{LAW.name}.friction_N": 1.0})
+    case, _ = stuck(37)
+    hollow = case.fit((LAW,), start={f"{LAW.name}.breakaway_N": 9.0})
     at_end = replace(hollow, at_bound=("setting of viscous_damping.factor",))
     monkeypatch.setattr(Case, "over_limit", lambda *_: set())
     monkeypatch.setattr(Case, "gaps", lambda *_: {"loader": FAR_BELOW_NOISE - 0.01})
