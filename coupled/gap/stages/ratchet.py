@@ -18,12 +18,14 @@ force rests altogether it is held (`resting`), and does not tremble.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from coupled.gap.effects.settings import CONTACT, is_dry, most_yielding
 from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import PUSHED, RATCHET, WALKED, WALKED_BY, WALKED_N
+from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -36,10 +38,9 @@ def unratcheted(rig: Rig, control: ControlName, at: Driven, measured: Floats) ->
     `at` drives it with so many times a sample of the input's noise added; shapes (frames,).
     """
     loader = rig.controls[control].loader
-    plain = at(rig, 0.0)
     if loader.play == 0.0 and loader.bend_hysteresis_share == 0.0:
-        return plain
-    return _put_back(measured, plain, at(rig, 1.0), at(rig, -1.0))
+        return at(rig, 0.0)
+    return _put_back(measured, *in_threads(partial(at, rig), (0.0, 1.0, -1.0)))
 
 
 def unwalked(
@@ -49,10 +50,9 @@ def unwalked(
 
     The force holds so many `times` the noise that is passed.
     """
-    plain = at(rig, 0.0)
     if rig.controls[control].loader.friction_stiffness == 0.0 or not is_dry(rig, control):
-        return plain
-    return _put_back(measured, plain, at(rig, times), at(rig, -times))
+        return at(rig, 0.0)
+    return _put_back(measured, *in_threads(partial(at, rig), (0.0, times, -times)))
 
 
 def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
@@ -67,7 +67,7 @@ def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
     changes = {} if is_dry(rig, control) else {f"controls.{control}.loader.friction_N": level}
     key = f"controls.{control}.{CONTACT[0]}".format(d=unit_of(control))
     yields = rig.changed({**changes, key: level / length})
-    plain, up, down = (at(yields, times) for times in (0.0, 1.0, -1.0))
+    plain, up, down = in_threads(partial(at, yields), (0.0, 1.0, -1.0))
     shaken = np.sqrt(np.mean((0.5 * (up - down)) ** 2) + noise**2)
     walked = np.sqrt(np.mean((plain - 0.5 * (up + down)) ** 2))
     return bool(walked > WALKED * shaken)

@@ -117,7 +117,7 @@ class Reader(Reading):
         """
         base = predict(self.rig)
         own = left_noise(own, measured, without_echo(measured - base, echo), judged)
-        tries = [noisy(self.rig, k) - base for k in range(NOISE_TRIES)]
+        tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
         carried = float(np.sqrt(np.mean(np.square(tries))))
         floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
         made = self._output(stage, name, measured, predict, floor)

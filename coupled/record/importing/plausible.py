@@ -16,6 +16,7 @@ from coupled.units import POUND_N, PSF_Pa
 
 Floats = NDArray[np.float64]
 FAR_BEYOND = 3.0  # times the travel: no rig does that, so its unit is another
+TOGETHER = 0.6  # correlation of a force with a spring's, from which its size says its unit
 _D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
 # Beyond these no channel of a rig or a transport aircraft in normal flight goes.
@@ -113,10 +114,15 @@ def spikes(values: Floats) -> list[int]:
 
 
 def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float | None:
-    """Return the force over what gradient times deflection say, by least squares."""
+    """Return the force over what gradient times deflection say, by least squares.
+
+    None where the two hardly go together: a control that is moved fast is held by its inertia and
+    damping, whatever its gradient.
+    """
     expected = gradient * deflection
-    power = float(expected @ expected)
-    return float(force_N @ expected) / power if power > 0.0 else None
+    shared, power = float(force_N @ expected), float(expected @ expected)
+    together = abs(shared) >= TOGETHER * np.sqrt(float(force_N @ force_N) * power)
+    return shared / power if power > 0.0 and together else None
 
 
 def in_pounds(ratio: float) -> bool:

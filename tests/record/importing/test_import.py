@@ -263,6 +263,24 @@ def test_doubts_name_what_is_wrong(tmp_path: Path) -> None:
     ]
 
 
+def test_a_control_that_is_moved_fast_says_nothing_of_its_force_s_unit() -> None:
+    """A record of a healthy loader, shaken at 2 to 5 Hz, was refused as one in pounds.
+
+    A mass of 4 kg and a damping of 75 N·s/m on 400 N/m.
+    """
+    t = np.arange(0.0, 10.0, 1.0 / 120.0)
+    gradient = np.full(len(t), 400.0)
+    for slow, turns in ((True, 0.5), (False, 12.0)):
+        moved = 0.05 * np.sin(turns * t)
+        inertia = -4.0 * turns**2 * moved
+        force = 400.0 * moved + inertia + 75.0 * 0.05 * turns * np.cos(turns * t)
+        ratio = plausible.force_ratio(force, moved, gradient)
+        assert (ratio is not None) is slow
+        if ratio is not None:
+            assert ratio == pytest.approx(1.0, rel=0.03)
+            assert plausible.in_pounds(plausible.force_ratio(force / 4.448, moved, gradient) or 0.0)
+
+
 def test_a_force_in_pounds_is_seen_against_the_rig(tmp_path: Path) -> None:
     rig = read_rig(shipped_rigs()["report-column"])
     rate = rig.frame_rate
