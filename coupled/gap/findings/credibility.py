@@ -41,6 +41,7 @@ from coupled.gap.thresholds import (
     HOST_DRIFT,
     LEAST_REMAINDER,
     REMAINDER,
+    UNPROVEN,
 )
 from coupled.record.record import Record
 
@@ -97,9 +98,8 @@ class Credibility:
     @property
     def value(self) -> float:
         """A number from 1, as large everywhere and no function of a signal, to 0; smooth."""
-        apart = max(self.drift, self.unproven)
-        same = 1.0 / (1.0 + (apart / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
-        same *= 1.0 - self.curve
+        same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
+        same *= (1.0 - self.curve) / (1.0 + (self.unproven / UNPROVEN) ** 4)
         if self.exact:
             return same * (1.0 - self.remainder)
         if self.beside_flexible is None or self.against_flexible is None:
