@@ -218,6 +218,8 @@ def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_
         high={key: high for key, (_, high) in wide.items()},
     )
     assert richer._is_cause(case, LAW, PLAIN, breaks, rigid) is asked
+    corner = replace(breaks, values={**breaks.values, f"{LAW.name}.stribeck_{{d}}_per_s": 4e-4})
+    assert not richer._is_cause(case, LAW, PLAIN, corner, rigid)
 
 
 def test_a_setting_at_its_end_beside_friction_begins_anew_where_it_would_be_held_against_it(

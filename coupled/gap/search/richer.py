@@ -34,6 +34,7 @@ from coupled.gap.thresholds import (
     RICHER_STARTS,
     RIVAL_GAIN,
     SCREEN_SIZES,
+    SHAPES,
 )
 from coupled.parallel import in_threads
 
@@ -194,9 +195,14 @@ def _is_cause(case: Case, law: Effect, plain: Effect, fitted: Fit, current: Fit)
     """Tell whether a law says something by its fit, and that it is not the plainer one.
 
     Where the plainer one's contact holds rigidly, likelihood alone says the latter: a breakaway and
-    how far it yields are hardly apart there, and the breakaway's interval is as wide.
+    how far it yields are hardly apart there, and the breakaway's interval is as wide. One that
+    fades over less than the slowest speed that is tried is that contact's sharp corner.
     """
     silent = says_nothing(case, law, fitted)
-    if law.alike is None or not _holds_rigidly(case, current):
+    if law.alike is not None and _holds_rigidly(case, current):
+        slowest = min(SHAPES)
+        speeds = [(p, fitted.values[law.value_key(p)]) for p in law.free if p.shape]
+        silent = silent or any(value < slowest * p.starts[0] for p, value in speeds)
+    else:
         silent = silent or may_be_plainer(case, law, fitted, plain)
     return bool(may_be_causes(case, [(law, fitted)])) and not silent
