@@ -196,9 +196,10 @@ def test_air_that_is_known_by_a_late_motion_moved_before(tmp_path: Path) -> None
         (False, 1.0199, False, (1.0, 0.7, 1.4)),
         (False, 1.015, False, ()),
         (True, 1.02, True, (1.0,)),
-        (False, 1.02, True, ()),
+        (False, 1.02, True, (1.0,)),
+        (False, 1.015, True, ()),
     ],
-    ids=["a gap", "next to its end", "within", "a gap and friction", "friction alone"],
+    ids=["a gap", "next to its end", "within", "a gap and friction", "friction", "that within"],
 )
 def test_a_fit_with_a_setting_at_its_end_is_begun_anew(
     wide: bool,
