@@ -167,12 +167,12 @@ def test_a_small_hardening_is_not_taken_for_none(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("breakaway_N", "named"),
-    [(0.0, "coulomb_friction"), (0.12, "coulomb_friction"), (0.2, "stribeck_friction")],
+    [(0.0, "coulomb_friction"), (0.12, "stribeck_friction"), (0.2, "stribeck_friction")],
 )
 def test_a_faint_gap_names_the_law_of_dry_friction_that_it_shows(
     tmp_path: Path, breakaway_N: float, named: str
 ) -> None:
-    """Of a breakaway of twice the running friction nothing shows; of three times it, enough."""
+    """A breakaway of twice the running friction was read as a contact that holds rigidly."""
     running = {"friction_N": 0.06 if breakaway_N else 0.08}
     fading = {"breakaway_N": breakaway_N, "stribeck_{d}_per_s": 2e-3}
     law = {"stribeck_friction": running | fading} if breakaway_N else {"coulomb_friction": running}
