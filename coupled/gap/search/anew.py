@@ -53,18 +53,20 @@ def with_settings_anew(case: Case, current: Fit) -> Fit:
 
     The fit may have ended in a hollow, in which the setting makes up for an effect's number: that
     is tried at less and at more, too. Of friction and of flights, of which each fit takes long, it
-    is asked only where something is over its limit, and by its number as found.
+    is asked only where something is over its limit, and by its number as found; of friction also
+    where the setting would be held against an effect (`strained`), and begun by short replays, too.
     """
     ends = {one.value_key(p): (p.low, p.high) for one in case.known.values() for p in one.free}
     strained = {key for key in ends if key in current.values and _at_end(current, key, ends[key])}
     settings = (one for one in case.known.values() if strained & {*map(one.value_key, one.free)})
     shown = {stage for one in settings for stage in one.shows_in}
     ours = [one for one in current.effects if one.free and shown & {*one.shows_in}]
-    long = any(STAGE_OF[stage].flown for stage in shown) or any(one.dry for one in ours)
-    long |= "loader" in shown and is_dry(case.nominal, case.control)
+    if not strained:
+        return current
     rubs = "loader" in shown and (is_dry(case.nominal, case.control) or any(o.dry for o in ours))
+    long = rubs or any(STAGE_OF[stage].flown for stage in shown) or any(one.dry for one in ours)
     asked = rubs and case.gaps(current.rig).get("loader", 0.0) >= FAR_BELOW_NOISE
-    if not strained or (long and not asked and not case.over_limit(current.rig)):
+    if long and not asked and not case.over_limit(current.rig):
         return current
     filed = {key: value for key, value in current.values.items() if key not in ends}
     starts = [filed]
