@@ -77,3 +77,16 @@ def test_what_dry_friction_may_leave_is_none_of_an_effect_s(
     case = Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
     case = replace(case, nominal=bench({"friction_N": friction_N})) if friction_N else case
     assert _leaves_friction(case, OFFSET, case.fit(())) == left
+
+
+def test_the_other_effect_is_begun_from_each_start_and_the_least_fit_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    case = Case(bench(), "column", [Output("loader", "x", SHAPE, acting, 1.0, 120.0)])
+    current = case.fit((LAG,))
+    costs = {1.0: 30.0, 2.0: 10.0, 3.0: 20.0}
+    monkeypatch.setattr(
+        Case, "fit", lambda _, effects, start: replace(current, cost=costs[start["at"]])
+    )
+    starts = [{"at": at} for at in costs]
+    assert contest._instead(case, current, LAG, OFFSET, starts).cost == 10.0

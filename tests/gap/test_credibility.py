@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -12,9 +13,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from coupled.gap import diagnose as diagnosing
+from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
-from coupled.gap.findings.answer import verdict_of
+from coupled.gap.findings import credibility as credible
+from coupled.gap.findings.answer import incredible, verdict_of
 from coupled.gap.findings.credibility import (
     Credibility,
     credibility,
@@ -28,6 +32,7 @@ from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import DRIFT_CHANCE, REMAINDER
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
+from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import bench
 
 BOUND = 1.2
@@ -179,7 +184,9 @@ def test_what_explains_sensing_counts_though_that_has_no_gap_of_its_own() -> Non
 
 
 @pytest.mark.parametrize(("lag_s", "width_Pa"), [(0.03, 0.0), (0.0, 0.4)])
-def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -> None:
+def test_a_hysteresis_of_the_pressure_is_no_lag(
+    lag_s: float, width_Pa: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It moves as much at any rate: a lag for it is larger where the pressure goes slowly."""
     rng, frames, rate_Hz = np.random.default_rng(4), 6000, 120.0
     rates = np.repeat(rng.uniform(9.0, 14.0, 20) * np.tile([1.0, -1.0], 10), frames // 20)
@@ -198,6 +205,8 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(lag_s: float, width_Pa: float) -
     )
     found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
     assert found.value > 0.99 if lag_s else found.value < 0.1
+    monkeypatch.setattr(credible, "part_of_a_curve", lambda *_: 0.4)
+    assert credibility(lag, case, case.fit((lag,)), [record], 0.0).curve == 0.4
 
 
 @pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])
@@ -283,6 +292,32 @@ def test_the_error_of_a_size_is_the_jackknife_of_its_stretches() -> None:
     assert error == pytest.approx(math.sqrt(5.0 / 6.0 * float(np.sum((without - more) ** 2))))
     shares = np.array([np.sum(action[number == one] ** 2) for one in range(6)])
     assert held == pytest.approx(float(np.sum(shares) ** 2 / np.sum(shares**2)))
+
+
+@pytest.mark.parametrize(
+    ("probability", "rivals", "said"), [(0.05, 1, True), (0.48, 1, False), (0.5, 0, True)]
+)
+def test_what_is_not_certain_with_all_its_rivals_is_incredible(
+    probability: float, rivals: int, said: bool
+) -> None:
+    """A scale of the force at 0.05 beside a gradient as likely blamed sensing for the loader."""
+    effect: Any = SimpleNamespace(name="force_scale", stage="sensing")
+    choice: Any = SimpleNamespace(steps=(SimpleNamespace(effect=effect, rivals=("r",) * rivals),))
+    found = EffectResult("force_scale", "sensing", probability, ())
+    assert ("force_scale" in incredible(choice, [found])) is said
+
+
+def test_a_diagnosis_blames_no_stage_by_what_is_incredible(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = nominal_rig(False)
+    record = made(tmp_path, rig, {"deflection_scale": {"factor": 1.05}}, 31).between(0.0, 12.0)
+    guilty = [stage.name for stage in diagnose(rig, {"r": record}).stages if stage.guilty]
+    assert guilty == ["sensing"]
+    monkeypatch.setattr(diagnosing, "incredible", lambda *_: frozenset({"deflection_scale"}))
+    guilty = [stage.name for stage in diagnose(rig, {"r": record}).stages if stage.guilty]
+    assert guilty
+    assert "sensing" not in guilty
 
 
 FILED_N = 2.0
