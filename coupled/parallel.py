@@ -65,11 +65,17 @@ _team: ContextVar[_Team] = ContextVar("_team", default=_ALONE)
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """Let `in_threads` use so many threads within; 0 is one a core."""
+    """Let `in_threads` use so many threads within; 0 is one a core.
+
+    Linear algebra has one within: its matrices are small here, and threads of its own would take
+    turns with these. So an answer does not depend on how many cores it was given either.
+    """
+    limits = importlib.import_module("threadpoolctl").threadpool_limits  # takes 20 ms to load
     most = cores(count)
     before = _team.set(_Team(most, threading.Semaphore(most - 1)))
     try:
-        yield
+        with limits(1, "blas"):
+            yield
     finally:
         _team.reset(before)
 

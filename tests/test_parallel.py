@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 import time
 
+import numpy as np
 import pytest
 
 from coupled.parallel import HaltedError, go_on, in_threads, threads
@@ -126,3 +128,17 @@ def test_an_interruption_halts_the_helpers() -> None:
     with threads(2), pytest.raises(KeyboardInterrupt):
         in_threads(one, range(2))
     assert halted.wait(10.0)
+
+
+def test_linear_algebra_has_one_thread_within_and_its_own_again_after() -> None:
+    """Its threads took as much processor time again from those of a diagnosis."""
+    np.linalg.qr(np.eye(3))  # what is not loaded has no threads
+    info = importlib.import_module("threadpoolctl").threadpool_info
+
+    def counts() -> list[int]:
+        return [pool["num_threads"] for pool in info() if pool["user_api"] == "blas"]
+
+    before = counts()
+    with threads(2):
+        assert set(counts()) == {1}
+    assert counts() == before
