@@ -14,7 +14,9 @@ is held against that model: one number that leaves no more than a hundred free o
 what imitates another leaves more. What comes from outside, as a gust, is no law of those signals,
 and is not held so.
 
-Drift counts whatever remains; the free model by how surely more remains than noise and the right
+A friction that is nowhere above the filed one is, with a damping beside it, a mere curve of the
+speed (`part_of_a_curve`). Drift counts whatever remains, and that a size is hardly known where much
+does; the free model by how surely more remains than noise and the right
 physics may leave, and how much of the gap that is (`remainder`). Both go into one
 smooth number, and that into the probability.
 """
@@ -89,8 +91,8 @@ class Credibility:
     def unproven(self) -> float:
         """How far the sizes of halves may be apart, where what remains says that they might be.
 
-        By the halves that are known best: a size that none of them says to a third is not shown to
-        be the same.
+        By the halves that are known best: a size that none of them says to a quarter is not shown
+        to be the same.
         """
         errors = (math.hypot(one.low_error, one.high_error) for one in self.regimes)
         return self.remainder * min(errors, default=0.0)
