@@ -14,15 +14,13 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import (
-    FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
 )
-from concurrent.futures import wait as wait_for
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -167,22 +165,55 @@ def as_done(
     wanted. What a call raises is raised here. An interruption is met within a fraction of a
     second, however long a call takes.
     """
-    waiting: set[Future[T]] = set()
+    if isinstance(pool, Here):
+        for arguments in calls:
+            yield work(*arguments)
+        return
+    todo, done, waiting = SimpleQueue[Sequence[Any] | None](), SimpleQueue[Future[T]](), 0
 
-    def done(patience_s: float) -> Iterator[T]:
-        for future in wait_for(waiting, patience_s, FIRST_COMPLETED).done:
-            waiting.remove(future)
-            yield future.result()
+    def finished(patience_s: float) -> Iterator[T]:
+        nonlocal waiting
+        with suppress(Empty):
+            while True:
+                future = done.get(timeout=patience_s)
+                waiting, patience_s = waiting - 1, 0.0
+                yield future.result()
 
-    for arguments in calls:
-        with nullcontext() if isinstance(pool, Here) else _uninterrupted():
+    try:
+        threading.Thread(target=_hand_over, args=(pool, work, todo, done), daemon=True).start()
+        for arguments in calls:
+            todo.put(arguments)
+            waiting += 1
+            yield from finished(0.0)
+            while waiting >= ahead:
+                yield from finished(_ATTENTIVE_s)
+        while waiting:
+            yield from finished(_ATTENTIVE_s)
+    finally:
+        todo.put(None)
+
+
+def _hand_over(
+    pool: Executor,
+    work: Callable[..., T],
+    todo: SimpleQueue[Sequence[Any] | None],
+    done: SimpleQueue[Future[T]],
+) -> None:
+    """Give an executor its work, in a thread of its own.
+
+    Interruptions reach the main thread only. One that came there while a lock of the executor's
+    is held would leave it locked, and the threads that end the executor would wait for it for
+    ever. A worker that is begun here never gets one either.
+    """
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    while (arguments := todo.get()) is not None:
+        try:
             future = pool.submit(work, *arguments)
-        waiting.add(future)
-        yield from done(0.0)
-        while len(waiting) >= ahead:
-            yield from done(_ATTENTIVE_s)
-    while waiting:
-        yield from done(_ATTENTIVE_s)
+        except Exception as error:  # the workers died, or the cluster went
+            future = Future()
+            future.set_exception(error)
+        future.add_done_callback(done.put)
 
 
 def cores(workers: int) -> int:
@@ -226,19 +257,6 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
         ours.close()
         alive.close()
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Hold an interruption back; a worker that is begun meanwhile never gets one."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker(alive: Connection) -> None:

@@ -7,9 +7,14 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from queue import SimpleQueue
+from types import FrameType
+from typing import Any
 
 import pytest
 
@@ -108,6 +113,74 @@ def test_workers_that_are_busy_are_not_waited_for() -> None:
             began = time.monotonic()
             raise KeyboardInterrupt
     assert time.monotonic() - began < HELD_s / 2
+
+
+class OneThread(Executor):
+    """An executor of one thread, which ends with this process even where it cannot end itself."""
+
+    def __init__(self) -> None:
+        self.jobs = SimpleQueue[Any]()
+        self.thread = threading.Thread(target=self.work, daemon=True)
+        self.thread.start()
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.jobs.put((future, fn, args))
+        return future
+
+    def work(self) -> None:
+        while (job := self.jobs.get()) is not None:
+            future, fn, args = job
+            future.set_result(fn(*args))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self.jobs.put(None)
+        self.thread.join(HELD_s)
+        assert not self.thread.is_alive()
+
+
+def interrupted_at(step: int) -> int:
+    """Interrupt work at a step of what the standard library does for it in this thread.
+
+    Returns how many steps there were. Fails where the executor does not end.
+    """
+    seen = 0
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal seen
+        if not frame.f_code.co_filename.endswith(("parallel.py", "_base.py", "threading.py")):
+            return None
+        frame.f_trace_opcodes = True
+        if event == "opcode":
+            seen += 1
+            if seen == step:
+                sys.settrace(None)
+                signal.raise_signal(signal.SIGINT)
+        return trace
+
+    before = sys.gettrace()
+    with OneThread() as pool, contextlib.suppress(KeyboardInterrupt):
+        made = as_done(pool, slowly, [(job,) for job in range(4)], 2)
+        next(made)
+        try:
+            sys.settrace(trace)
+            list(made)
+        finally:
+            sys.settrace(before)
+    return seen
+
+
+def slowly(job: int) -> int:
+    time.sleep(0.002)
+    return job
+
+
+def test_an_interruption_leaves_no_lock_of_the_executor_held() -> None:
+    """Wherever it comes: one that is held for ever keeps a command from ending."""
+    step = 1
+    while interrupted_at(step) >= step:
+        step += 7
+    assert step > 50
 
 
 def test_each_job_is_done_once_and_few_wait() -> None:

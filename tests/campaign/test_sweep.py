@@ -25,7 +25,7 @@ from coupled.plots.campaign import draw_sweep
 from coupled.plots.saving import save
 from tests.support.cluster import cluster
 from tests.support.commands import coupled, files
-from tests.support.processes import begun, ended, kill
+from tests.support.processes import PATIENCE_s, begun, ended, kill
 from tests.support.sweeps import BEND, GRID, flown, plan_of, rows_in, write_sweep
 
 DRAW = f"""
@@ -131,7 +131,7 @@ def test_workers_end_with_an_interrupted_sweep_and_what_is_flown_is_kept(
 ) -> None:
     process = begun_sweep(folder, workers=2)
     os.kill(process.pid, how)
-    assert process.wait(timeout=30) != 0
+    assert process.wait(PATIENCE_s) != 0
     ended(process)
     journal = (folder / "o" / JOURNAL).read_text()
     assert journal.endswith("\n")
@@ -190,7 +190,7 @@ def test_a_sweep_in_as_few_words(folder: Path) -> None:
 def test_an_interrupted_sweep_says_that_it_goes_on(folder: Path) -> None:
     process = begun_sweep(folder, workers=1)
     os.killpg(process.pid, signal.SIGINT)
-    assert process.wait(timeout=30) == 130
+    assert process.wait(PATIENCE_s) == 130
     kept = [json.loads(line) for line in (folder / "o" / JOURNAL).read_text().splitlines()[1:]]
     assert {row["ended_early"] for row in kept} == {""}
 
