@@ -20,9 +20,10 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice
 from coupled.gap.search.contest import in_place_of_open
 from coupled.gap.search.fit import Fit
-from coupled.gap.search.gain import Candidate
-from coupled.gap.search.richer import plainer_on_all, richer_on_all
+from coupled.gap.search.gain import Candidate, likelier_by
+from coupled.gap.search.richer import plainer_on_all, richer_on_all, with_richer_rivals
 from coupled.gap.search.rivals import Found
+from coupled.gap.search.score import Try, scored
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -94,20 +95,22 @@ def test_a_richer_law_is_fitted_only_where_something_is_foretold(
 ) -> None:
     case = linkage_of(tmp_path, {"bend": {"bend_{d}_per_N": 1e-4}})
     current = case.fit((BEND,))
-    monkeypatch.setattr(richer, "foretold", lambda *_: 0.9)
+    tries = [Try(0.9, {**current.values, "x": float(k)}) for k in range(3)]
+    monkeypatch.setattr(richer, "scored", lambda *_: tries)
     assert all(not starts for _, _, starts in richer._richer(case, EFFECTS, BEND, current))
-    monkeypatch.setattr(richer, "foretold", lambda *_: 1.1)
+    tries = [replace(one, gain=1.0 + one.start["x"]) for one in tries]
     asked = {
         law.name: (least, starts)
         for law, least, starts in richer._richer(case, EFFECTS, BEND, current)
     }
     assert set(asked) == {"stiffening_bend", "bend_hysteresis", "structural_mode"}
-    assert all(least == LEAST_GAIN and len(starts) == 2 for least, starts in asked.values())
+    for least, starts in asked.values():
+        assert least == LEAST_GAIN
+        assert [start["x"] for start in starts] == [2.0, 1.0]  # where most is foretold
     key = BEND.value_key(BEND.free[0])
     for law in (STIFFENING, LOOP, MODE):
-        assert all(
-            start[law.value_key(law.free[0])] == current.values[key] for start in asked[law.name][1]
-        )
+        begun = richer._begun(law, BEND, current)
+        assert all(one[law.value_key(law.free[0])] == current.values[key] for one in begun)
 
 
 def test_a_limit_is_tried_over_three_decades() -> None:
@@ -154,6 +157,55 @@ def test_a_servo_with_a_dead_time_is_a_tuning_only_by_as_much_as_an_effect_gains
         monkeypatch.setattr(richer, "likelier_by", lambda *_, more=more: more)
         [one], _ = plainer_on_all(case, EFFECTS, [Found(TUNING, 800.0, 0.97, ())], tuned)
         assert one.effect is named
+
+
+def test_what_a_damping_gains_is_foretold_and_its_fit_begins_there(tmp_path: Path) -> None:
+    """By the fit's own slopes 0.04 was foretold of a damping that gained 14.7 (seed 2042)."""
+    tuned = {"servo_tuning": {"delay_s": 0.02, "factor": 1.22, "damping_factor": 0.93}}
+    case = linkage_of(tmp_path, tuned)
+    delayed = case.fit((DELAY,))
+    tries = richer._begun(TUNING, DELAY, delayed)
+    slower, faster = scored(case, TUNING, DELAY, delayed, tries)
+    assert faster.gain == 0.0  # the damping is less than the filed one
+    assert faster.start == tries[1]
+    here = case.fit((TUNING,), start=tries[0])
+    there = case.fit((TUNING,), start=slower.start)
+    gained = likelier_by(case.outputs, there, delayed)
+    assert slower.gain == pytest.approx(gained, rel=0.25)
+    assert gained >= likelier_by(case.outputs, here, delayed) - 0.5
+    assert slower.start["servo_tuning.damping_factor"] == pytest.approx(0.93, abs=0.06)
+
+
+def test_where_a_fit_has_no_slopes_all_tries_may_gain(tmp_path: Path) -> None:
+    case = linkage_of(tmp_path, {"servo_delay": {"delay_s": 0.03, "factor": 1.0}})
+    delayed = case.fit((DELAY,))
+    tries = richer._begun(TUNING, DELAY, delayed)
+    for fit in (replace(delayed, slopes={}), replace(delayed, high=delayed.low)):
+        assert [one.gain for one in scored(case, TUNING, DELAY, fit, tries)] == [np.inf, np.inf]
+
+
+@pytest.mark.parametrize(("gain", "told"), [(3.9, False), (4.1, True)])
+def test_a_damping_that_the_record_leaves_open_is_a_rival_of_the_dead_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gain: float, told: bool
+) -> None:
+    """Of four blind records in which it gained 4 to 8 two had one, and the noise drew two."""
+    case = linkage_of(tmp_path, {"servo_delay": {"delay_s": 0.03, "factor": 1.0}})
+    delayed = case.fit((DELAY,))
+    monkeypatch.setattr(richer, "scored", lambda *_: [Try(9.0, {})])
+    monkeypatch.setattr(richer, "_is_cause", lambda *_: True)
+    monkeypatch.setattr(richer, "likelier_by", lambda *_: gain)
+    [one] = with_richer_rivals(case, EFFECTS, [Found(DELAY, 800.0, 0.97, ())], delayed)
+    assert one.effect is DELAY
+    assert [rival.effect for rival in one.rivals] == ([TUNING] if told else [])
+    assert one.probability == pytest.approx(1.0 / (1.0 / 0.97 + told))
+    # A bend that stiffens has one number more, one with a loop or a mode has two.
+    bent = replace(delayed, effects=(BEND,))
+    monkeypatch.setattr(richer, "_promising", lambda *_: [{}])
+    [one] = with_richer_rivals(case, EFFECTS, [Found(BEND, 800.0, 0.97, ())], bent)
+    assert [rival.effect for rival in one.rivals] == ([STIFFENING] if told else [])
+    # Nor is one told beside a rival that there is already.
+    known = Found(BEND, 800.0, 0.5, (Candidate(798.0, MODE, bent),))
+    assert with_richer_rivals(case, EFFECTS, [known], bent) == [known]
 
 
 @pytest.mark.parametrize(("damping", "cause"), [(0.996, False), (1.019, False), (0.97, True)])

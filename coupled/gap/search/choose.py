@@ -24,7 +24,7 @@ from coupled.gap.search.gain import Candidate, ranked_by_gain
 from coupled.gap.search.information import is_open, may_be_plainer, shape_is_open
 from coupled.gap.search.intwo import in_two
 from coupled.gap.search.onelaw import same_in_a_limit
-from coupled.gap.search.richer import plainer_on_all, richer_on_all
+from coupled.gap.search.richer import plainer_on_all, richer_on_all, with_richer_rivals
 from coupled.gap.search.rivals import Found, found_by, separated, tried_again
 from coupled.gap.search.small import beside_a_larger, shown_by_mark, strained, taken_by_switch
 from coupled.gap.search.twolaws import plain_reading, read_even, yielding_reading
@@ -141,7 +141,7 @@ def _looked_over(
         needless = _needless(case, current)
         rest = [step for step in last if step.effect is not needless]
     if len(rest) == len(last):
-        return last, current
+        return with_richer_rivals(case, library, last, current), current
     return _looked_over(case, library, stood, rest, _with_only(case, stood, rest, current))
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.gap.effects.effect import Effect, possible, value_of
 from coupled.gap.search.case import Case
@@ -20,6 +21,7 @@ from coupled.gap.signals.output import Output, Part, memory
 from coupled.gap.thresholds import HARDLY, RICHER, SHAPES, SIMPLER_GAIN
 from coupled.parallel import go_on
 
+Floats = NDArray[np.float64]
 Starts = list[dict[str, float]]
 Fits = Sequence[tuple[Effect, Fit]]
 
@@ -134,10 +136,10 @@ def foretold(
     tried. All of that goes along, by its slopes. None where that cannot be foretold.
     """
     tries = little_richer(case, law, plain, fitted) if tries is None else tries
-    keys, slope = _slope_of(plain, fitted)
+    keys, slope = slope_of(plain, fitted)
     if slope is None or not tries:
         return None
-    ours = _of_a_slope(case, fitted, keys)
+    ours = of_a_slope(case, fitted, keys)
     rows = np.concatenate([output.rows(part) for output in ours])
     now = np.concatenate([output.residual(fitted.rig, wide=True) for output in ours])
     if len(now) != len(slope.left):
@@ -152,9 +154,7 @@ def foretold(
             return None
         go_on()
         there = np.concatenate([output.residual(rig, wide=True) for output in ours])
-        turn = (there - now)[rows]
-        turn -= base @ (base.T @ turn)
-        less, power = -float(left @ turn), float(turn @ turn)
+        less, power, _ = turned(left, base, (there - now)[rows])
         if law.even is None:  # no breakaway is under the running friction
             less = max(less, 0.0)
         most = max(most, 0.5 * less * less / power if power > 0.0 else 0.0)
@@ -162,13 +162,23 @@ def foretold(
     return most / (float(np.mean(left**2)) * memories)
 
 
-def _slope_of(plain: Effect, fitted: Fit) -> tuple[tuple[str, ...], Slope | None]:
+def turned(left: Floats, base: Floats, turn: Floats) -> tuple[float, float, Floats]:
+    """Return by how much a residual's turn goes against it, its own square, and what goes along.
+
+    But for what goes along with the slopes of other numbers, which `base` spans.
+    """
+    along = base.T @ turn
+    own = turn - base @ along
+    return -float(left @ own), float(own @ own), along
+
+
+def slope_of(plain: Effect, fitted: Fit) -> tuple[tuple[str, ...], Slope | None]:
     """Return the numbers that were fitted with a law's level, and how the residual goes by them."""
     key = plain.value_key(plain.free[0])
     return next((each for each in fitted.slopes.items() if key in each[0]), ((), None))
 
 
-def _of_a_slope(case: Case, fitted: Fit, keys: Sequence[str]) -> list[Output]:
+def of_a_slope(case: Case, fitted: Fit, keys: Sequence[str]) -> list[Output]:
     """Return the outputs by which numbers were fitted together."""
     every = (*fitted.effects, *case.nuisances(fitted.effects))
     together = [one for one in every if any(one.value_key(p) in keys for p in one.free)]

@@ -5,7 +5,7 @@ a servo with a dead time is damped, or whether a bend has a loop; and a fit to i
 hollow. On all of it the richer law must do more, since it can bend farther: by `RICHER_GAIN` of dry
 friction, of which no law is exact, and by `LEAST_GAIN` of a bend and of a servo. Of friction whose
 contact holds rigidly, by `RIVAL_GAIN`, as of two laws with as many numbers. What a richer law could
-gain is foretold first (`laws`), which spares most fits.
+gain is foretold first (`laws`, `score`), which spares most fits.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-
-import numpy as np
 
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.candidates import may_be_causes
@@ -24,6 +22,7 @@ from coupled.gap.search.gain import Candidate, likelier_by
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import Starts, foretold, little_richer
 from coupled.gap.search.rivals import Found, weight
+from coupled.gap.search.score import begins_at_one, scored
 from coupled.gap.search.shooting import shot
 from coupled.gap.thresholds import (
     BESIDE_ONE,
@@ -72,6 +71,35 @@ def richer_on_all(
         found[i] = replace(step, effect=best.effect, probability=sure, rivals=rivals, behind=())
         current = best.fit
     return found, current
+
+
+def with_richer_rivals(
+    case: Case, library: Sequence[Effect], steps: Sequence[Found], current: Fit
+) -> list[Found]:
+    """Return the steps, each with the richer law that all of the record does not tell from it.
+
+    A law with one number more is named from `LEAST_GAIN` on, and no rival under `RIVAL_GAIN`. What
+    lies between is the draw of the noise as often as not, so that the answer gives both.
+    """
+    found = list[Found]()
+    for step in steps:
+        rivals = list(step.rivals)
+        for law in library if not rivals else ():
+            if law in current.effects or not _holds(law, step.effect):
+                continue
+            if len(law.free) != len(step.effect.free) + 1:
+                continue
+            effects = [law if one is step.effect else one for one in current.effects]
+            starts = _promising(case, law, step.effect, current)
+            fits = [case.fit(effects, start=start) for start in starts]
+            fitted = min(fits, key=lambda one: one.cost, default=None)
+            if fitted is None or not _is_cause(case, law, step.effect, fitted, current):
+                continue
+            if likelier_by(case.outputs, fitted, current) >= RIVAL_GAIN:
+                rivals.append(Candidate(step.gain, law, fitted))
+        odds = 1.0 / step.probability + len(rivals) - len(step.rivals)
+        found.append(replace(step, probability=1.0 / odds, rivals=tuple(rivals)))
+    return found
 
 
 def plainer_on_all(
@@ -140,11 +168,9 @@ def _holds_rigidly(case: Case, current: Fit) -> bool:
 
 def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> Starts:
     """Return where fits of a richer law begin: where most is foretold, and not too little."""
-    starts = _begun(law, plain, current)
-    each = [foretold(case, law, plain, current, "all", [start]) for start in starts]
-    gains = [np.inf if gain is None else gain for gain in each]
-    best = sorted(range(len(starts)), key=lambda k: -gains[k])[:RICHER_STARTS]
-    return [starts[k] for k in best if gains[k] >= FORETOLD_LEAST]
+    tries = scored(case, law, plain, current, _begun(law, plain, current))
+    best = sorted(tries, key=lambda one: -one.gain)[:RICHER_STARTS]
+    return [one.start for one in best if one.gain >= FORETOLD_LEAST]
 
 
 def _begun(law: Effect, plain: Effect, current: Fit) -> Starts:
@@ -168,7 +194,7 @@ def _sizes(number: Parameter) -> list[float]:
 
     A factor that begins at 1 is tried beside that: nothing is foretold of what changes nothing.
     """
-    if number.mode == "factor" and number.starts == (1.0,):
+    if begins_at_one(number):
         return list(BESIDE_ONE)
     if not number.inverse:
         return list(number.starts)
