@@ -274,9 +274,9 @@ def test_a_servo_s_damping_is_asked_where_its_dead_time_was_found() -> None:
     current = replace(case.fit(()), effects=(delay,))
     known = {delay.value_key(p): 0.02 + k for k, p in enumerate(delay.free)}
     current = replace(current, values=known)
-    [(law, least, starts)] = list(richer._richer(case, EFFECTS, delay, current))
+    [(law, least, tries)] = list(richer._richer(case, EFFECTS, delay, current))
     assert (law, least) == (tuning, LEAST_GAIN)
-    asked = [[start[tuning.value_key(p)] for p in tuning.free] for start in starts]
+    asked = [[one.start[tuning.value_key(p)] for p in tuning.free] for one in tries]
     assert asked == [[0.02, 1.02, 0.8], [0.02, 1.02, 1.25]]
     assert not list(richer._richer(case, EFFECTS, tuning, replace(current, effects=(tuning,))))
 

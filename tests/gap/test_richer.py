@@ -97,11 +97,11 @@ def test_a_richer_law_is_fitted_only_where_something_is_foretold(
     current = case.fit((BEND,))
     tries = [Try(0.9, {**current.values, "x": float(k)}) for k in range(3)]
     monkeypatch.setattr(richer, "scored", lambda *_: tries)
-    assert all(not starts for _, _, starts in richer._richer(case, EFFECTS, BEND, current))
+    assert all(not asked for _, _, asked in richer._richer(case, EFFECTS, BEND, current))
     tries = [replace(one, gain=1.0 + one.start["x"]) for one in tries]
     asked = {
-        law.name: (least, starts)
-        for law, least, starts in richer._richer(case, EFFECTS, BEND, current)
+        law.name: (least, [one.start for one in best])
+        for law, least, best in richer._richer(case, EFFECTS, BEND, current)
     }
     assert set(asked) == {"stiffening_bend", "bend_hysteresis", "structural_mode"}
     for least, starts in asked.values():
@@ -174,6 +174,26 @@ def test_what_a_damping_gains_is_foretold_and_its_fit_begins_there(tmp_path: Pat
     assert slower.gain == pytest.approx(gained, rel=0.25)
     assert gained >= likelier_by(case.outputs, here, delayed) - 0.5
     assert slower.start["servo_tuning.damping_factor"] == pytest.approx(0.93, abs=0.06)
+    assert slower.most == slower.gain
+    # A bend's laws curve, so that no more is asked of what is foretold than where to begin.
+    bends = [BEND.value_key(BEND.free[0]), LOOP.value_key(LOOP.free[0])]
+    bent = case.fit((BEND,), start={bends[0]: 1e-4})
+    looped = scored(case, LOOP, BEND, bent, richer._begun(LOOP, BEND, bent))
+    assert all(one.most == np.inf for one in looped)
+
+
+@pytest.mark.parametrize(("most", "named"), [(7.9, DELAY), (8.1, TUNING)])
+def test_a_damping_that_gains_more_than_slopes_foretell_gains_no_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: float, named: Effect
+) -> None:
+    """A dead time of 20 ms was one of 8 ms by half the frequency: 6.2 foretold, 8.6 gained."""
+    case = linkage_of(tmp_path, {"servo_delay": {"delay_s": 0.03, "factor": 1.0}})
+    delayed = case.fit((DELAY,))
+    monkeypatch.setattr(richer, "scored", lambda *_: [Try(9.0, {}, most)])
+    monkeypatch.setattr(richer, "_is_cause", lambda *_: True)
+    monkeypatch.setattr(richer, "likelier_by", lambda *_: 8.6)
+    [one], _ = richer_on_all(case, EFFECTS, [Found(DELAY, 800.0, 0.97, ())], delayed)
+    assert one.effect is named
 
 
 def test_where_a_fit_has_no_slopes_all_tries_may_gain(tmp_path: Path) -> None:
@@ -200,7 +220,7 @@ def test_a_damping_that_the_record_leaves_open_is_a_rival_of_the_dead_time(
     assert one.probability == pytest.approx(1.0 / (1.0 / 0.97 + told))
     # A bend that stiffens has one number more, one with a loop or a mode has two.
     bent = replace(delayed, effects=(BEND,))
-    monkeypatch.setattr(richer, "_promising", lambda *_: [{}])
+    monkeypatch.setattr(richer, "_promising", lambda *_: [Try(9.0, {})])
     [one] = with_richer_rivals(case, EFFECTS, [Found(BEND, 800.0, 0.97, ())], bent)
     assert [rival.effect for rival in one.rivals] == ([STIFFENING] if told else [])
     # Nor is one told beside a rival that there is already.
@@ -298,7 +318,7 @@ def test_of_several_richer_laws_the_likeliest_is_named_and_what_is_near_it_a_riv
     case = Case(bench(), "column", [Output("linkage", "x", NOISE, lambda _: 0.0 * NOISE, 1.0, 120)])
     current = replace(case.fit(()), effects=(BEND,))
     gains = {STIFFENING: 20.0, LOOP: 31.0, MODE: 29.0}
-    nowhere = list[dict[str, float]]([{}])
+    nowhere = [Try(np.inf, {})]
     asked = [(law, LEAST_GAIN, nowhere) for law in gains]
     monkeypatch.setattr(richer, "_richer", lambda *_: iter(asked))
     monkeypatch.setattr(richer, "_is_cause", lambda *_: True)

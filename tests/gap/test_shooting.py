@@ -207,7 +207,7 @@ def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_
     for law, least, starts in found:
         assert (law, least) == (LAW, RIVAL_GAIN)
         assert starts
-        assert not any("contact" in key for start in starts for key in start)
+        assert not any("contact" in key for one in starts for key in one.start)
     # There the interval of a breakaway is as wide as its contact is unknown.
     monkeypatch.setattr(richer, "may_be_plainer", lambda *_: True)
     breaks = replace(plain, effects=(LAW,), values={f"{LAW.name}.{k}": v for k, v in TRUE.items()})

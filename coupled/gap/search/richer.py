@@ -14,6 +14,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
@@ -22,7 +24,7 @@ from coupled.gap.search.gain import Candidate, likelier_by
 from coupled.gap.search.information import may_be_plainer, says_nothing
 from coupled.gap.search.laws import Starts, foretold, little_richer
 from coupled.gap.search.rivals import Found, weight
-from coupled.gap.search.score import begins_at_one, scored
+from coupled.gap.search.score import Try, begins_at_one, scored
 from coupled.gap.search.shooting import shot
 from coupled.gap.thresholds import (
     BESIDE_ONE,
@@ -48,15 +50,10 @@ def richer_on_all(
     found = list(steps)
     for i, step in enumerate(steps):
         asked = list[Candidate]()
-        for law, least, starts in _richer(case, library, step.effect, current):
-            effects = [law if one is step.effect else one for one in current.effects]
-            fits = in_threads(partial(_fitted, case, effects), starts)
-            fitted = min(fits, key=lambda one: one.cost, default=None)
-            if fitted is None or not _is_cause(case, law, step.effect, fitted, current):
-                continue
-            more = likelier_by(case.outputs, fitted, current)
-            if more >= least:
-                asked.append(Candidate(more, law, fitted))
+        for law, least, tries in _richer(case, library, step.effect, current):
+            one = _asked(case, law, step.effect, tries, current)
+            if one is not None and one.gain >= least:
+                asked.append(one)
         if not asked:
             continue
         best = max(asked, key=lambda one: one.gain)
@@ -89,17 +86,28 @@ def with_richer_rivals(
                 continue
             if len(law.free) != len(step.effect.free) + 1:
                 continue
-            effects = [law if one is step.effect else one for one in current.effects]
-            starts = _promising(case, law, step.effect, current)
-            fits = [case.fit(effects, start=start) for start in starts]
-            fitted = min(fits, key=lambda one: one.cost, default=None)
-            if fitted is None or not _is_cause(case, law, step.effect, fitted, current):
-                continue
-            if likelier_by(case.outputs, fitted, current) >= RIVAL_GAIN:
-                rivals.append(Candidate(step.gain, law, fitted))
+            tries = _promising(case, law, step.effect, current)
+            asked = _asked(case, law, step.effect, tries, current)
+            if asked is not None and asked.gain >= RIVAL_GAIN:
+                rivals.append(replace(asked, gain=step.gain))
         odds = 1.0 / step.probability + len(rivals) - len(step.rivals)
         found.append(replace(step, probability=1.0 / odds, rivals=tuple(rivals)))
     return found
+
+
+def _asked(
+    case: Case, law: Effect, plain: Effect, tries: Sequence[Try], current: Fit
+) -> Candidate | None:
+    """Return a richer law's fit in place of the plainer one's, and by how much it is likelier.
+
+    None where nothing is to be tried, or where it is no cause.
+    """
+    effects = [law if one is plain else one for one in current.effects]
+    fits = in_threads(partial(_fitted, case, effects), [one.start for one in tries])
+    both = min(zip(fits, tries, strict=True), key=lambda one: one[0].cost, default=None)
+    if both is None or not _is_cause(case, law, plain, both[0], current):
+        return None
+    return Candidate(min(likelier_by(case.outputs, both[0], current), both[1].most), law, both[0])
 
 
 def plainer_on_all(
@@ -136,7 +144,7 @@ def _fitted(case: Case, effects: Sequence[Effect], start: Mapping[str, float]) -
 
 def _richer(
     case: Case, library: Sequence[Effect], plain: Effect, current: Fit
-) -> Iterator[tuple[Effect, float, Starts]]:
+) -> Iterator[tuple[Effect, float, list[Try]]]:
     """Yield the laws richer than one, by how much they must be likelier, and where fits start."""
     for law in library:
         if law in current.effects:
@@ -151,7 +159,8 @@ def _richer(
             if case.over_limit(current.rig) & {*law.shows_in}:
                 starts += shot(case, law, plain, current, "all")
             if starts:
-                yield law, RIVAL_GAIN if rigid else RICHER_GAIN, starts
+                tries = [Try(np.inf, start) for start in starts]
+                yield law, RIVAL_GAIN if rigid else RICHER_GAIN, tries
         elif _holds(law, plain):
             yield law, LEAST_GAIN, _promising(case, law, plain, current)
 
@@ -166,11 +175,11 @@ def _holds_rigidly(case: Case, current: Fit) -> bool:
     return any(share >= max(ELASTIC_SHARES) for share in shares)
 
 
-def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> Starts:
+def _promising(case: Case, law: Effect, plain: Effect, current: Fit) -> list[Try]:
     """Return where fits of a richer law begin: where most is foretold, and not too little."""
     tries = scored(case, law, plain, current, _begun(law, plain, current))
     best = sorted(tries, key=lambda one: -one.gain)[:RICHER_STARTS]
-    return [one.start for one in best if one.gain >= FORETOLD_LEAST]
+    return [one for one in best if one.gain >= FORETOLD_LEAST]
 
 
 def _begun(law: Effect, plain: Effect, current: Fit) -> Starts:

@@ -26,10 +26,15 @@ SLOPE_SHARE = 0.05  # chosen: of an interval, over which slopes are taken anew
 
 @dataclass(frozen=True)
 class Try:
-    """Where a fit of a richer law may begin, and the log-likelihood that it is foretold to gain."""
+    """Where a fit of a richer law may begin, and the log-likelihood that it is foretold to gain.
+
+    `most` is what it may be said to gain, where its slopes go as far as the law: a fit that gains
+    more than they foretell has gone along a valley, where the model's own error is as large.
+    """
 
     gain: float
     start: dict[str, float]
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,8 @@ def scored(case: Case, law: Effect, plain: Effect, fitted: Fit, tries: Starts) -
         gain = 0.5 * less * less / power / unit if part > 0.0 else 0.0
         back = np.linalg.lstsq(mixing, part * along + base.T @ left, rcond=None)[0]
         moved = {renamed.get(key, key): -float(b) for key, b in zip(numbers, back, strict=True)}
-        found.append(Try(gain, _moved(law, plain, start, moved, part)))
+        begun = _moved(law, plain, start, moved, part)
+        found.append(Try(gain, begun, np.inf if begun == start else gain))
     return found
 
 
