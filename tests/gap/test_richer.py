@@ -208,7 +208,7 @@ def test_where_a_fit_has_no_slopes_all_tries_may_gain(tmp_path: Path) -> None:
 def test_a_damping_that_the_record_leaves_open_is_a_rival_of_the_dead_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gain: float, told: bool
 ) -> None:
-    """Of four blind records in which it gained 4 to 8 two had one, and the noise drew two."""
+    """Of five blind records in which it gained 4 to 8 two had one, and the noise drew three."""
     case = linkage_of(tmp_path, {"servo_delay": {"delay_s": 0.03, "factor": 1.0}})
     delayed = case.fit((DELAY,))
     monkeypatch.setattr(richer, "scored", lambda *_: [Try(9.0, {})])
