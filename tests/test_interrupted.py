@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
 from queue import SimpleQueue
 from types import FrameType
@@ -181,6 +181,26 @@ def test_an_interruption_leaves_no_lock_of_the_executor_held() -> None:
     while interrupted_at(step) >= step:
         step += 7
     assert step > 50
+
+
+class Gone(OneThread):
+    """An executor whose workers have died."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        raise BrokenExecutor("no worker is left")
+
+
+@pytest.mark.parametrize("kind", [OneThread, Gone])
+def test_no_thread_is_left_of_the_work(kind: type[OneThread]) -> None:
+    """And workers that died are said to have where their work is waited for."""
+    before = threading.active_count()
+    with kind() as pool:
+        ends = contextlib.nullcontext() if kind is OneThread else pytest.raises(BrokenExecutor)
+        with ends:
+            assert sorted(as_done(pool, slowly, [(1,), (2,)], 2)) == [1, 2]
+    began = time.monotonic()
+    while threading.active_count() > before:
+        assert time.monotonic() - began < HELD_s
 
 
 def test_each_job_is_done_once_and_few_wait() -> None:

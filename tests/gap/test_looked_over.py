@@ -137,7 +137,13 @@ def test_what_took_another_s_place_is_asked_what_it_leaves_of_the_others(
     monkeypatch.setattr(choose, "in_place_of_open", lambda case, steps, fit: (steps, fit))
     monkeypatch.setattr(choose, "tried_again", lambda case, fit, step: step)
     monkeypatch.setattr(choose, "yielding_reading", lambda case, fit: None)
+    rival = Candidate(1.0, BY_NAME["force_offset"], case.fit(()))
+    monkeypatch.setattr(
+        choose,
+        "with_richer_rivals",
+        lambda case, library, steps, fit: [replace(one, rivals=(rival,)) for one in steps],
+    )
     current = replace(case.fit((lag,)), effects=(scale, lag))
     steps, last = choose._looked_over(case, [], [case.fit(())], steps_of(scale, lag), current)
-    assert [step.effect for step in steps] == [bend]
+    assert [(step.effect, step.rivals) for step in steps] == [(bend, (rival,))]
     assert set(last.effects) == {bend}
