@@ -13,14 +13,8 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-)
-from contextlib import contextmanager, suppress
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -173,11 +167,13 @@ def as_done(
 
     def finished(patience_s: float) -> Iterator[T]:
         nonlocal waiting
-        with suppress(Empty):
-            while True:
+        while True:
+            try:
                 future = done.get(timeout=patience_s)
-                waiting, patience_s = waiting - 1, 0.0
-                yield future.result()
+            except Empty:
+                return
+            waiting, patience_s = waiting - 1, 0.0
+            yield future.result()  # whatever the work raises, be it Empty too
 
     try:
         threading.Thread(target=_hand_over, args=(pool, work, todo, done), daemon=True).start()

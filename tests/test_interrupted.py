@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import Any
 
@@ -131,7 +131,10 @@ class OneThread(Executor):
     def work(self) -> None:
         while (job := self.jobs.get()) is not None:
             future, fn, args = job
-            future.set_result(fn(*args))
+            try:
+                future.set_result(fn(*args))
+            except Empty as error:
+                future.set_exception(error)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         self.jobs.put(None)
@@ -199,6 +202,16 @@ def test_no_thread_is_left_of_the_work(kind: type[OneThread]) -> None:
     began = time.monotonic()
     while threading.active_count() > before:
         assert time.monotonic() - began < HELD_s
+
+
+def test_what_the_work_raises_is_raised_whatever_it_is() -> None:
+    """A queue that was empty within the work was taken for one in which no work is done yet."""
+
+    def empty(_: int) -> int:
+        raise Empty
+
+    with OneThread() as pool, pytest.raises(Empty):
+        list(as_done(pool, empty, [(1,)], 2))
 
 
 def test_each_job_is_done_once_and_few_wait() -> None:
