@@ -120,11 +120,6 @@ def test_a_library_has_one_home(library: str, home: str) -> None:
     assert all(user == home or (home[-1] == "/" and user.startswith(home)) for user in users)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_no_module_grows_past_reading(path: Path) -> None:
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
-
-
 def test_nothing_silences_a_warning_or_a_type() -> None:
     for path in [*SOURCES, *Path(__file__).parent.rglob("*.py")]:
         if path == Path(__file__):
