@@ -13,9 +13,11 @@ from coupled.flight.conditions import Conditions
 from coupled.flight.event import Event
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
-from coupled.flight.pilot import Step
+from coupled.flight.pilot import Pilot, Step
 from coupled.record.record import Record
+from coupled.resources import shipped_rigs
 from coupled.rig.packing import pack
+from coupled.rig.rigfile import read_rig
 from coupled.rig.serving import LED, check_led, lead, led, noted, service_channels, services_of
 from coupled.schema import build
 from tests.support.rigs import bench
@@ -36,8 +38,12 @@ def flown(
     force_N: float = 20.0,
     seconds: float = 4.0,
     rig: dict[str, Any] | None = None,
+    pilot: Pilot | None = None,
 ) -> Record:
-    """Return a bench's record under a force from 0.5 s on, with services and what leads them."""
+    """Return a bench's record with services, the events that lead them, and a pilot.
+
+    Unless given, the pilot pulls with a force from 0.5 s on.
+    """
     given = {f"{PLACE}.services.{key}": value for key, value in (services or {}).items()}
     whole = bench({**STRAIGHT, **given, **(rig or {})})
     found = {
@@ -45,7 +51,7 @@ def flown(
         for name, keys in (events or {}).items()
     }
     at = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[PRESSURE])
-    pull = Step(force_N=force_N, start_s=0.5)
+    pull = pilot or Step(force_N=force_N, start_s=0.5)
     conditions = Conditions(event=found)
     return fly(Manoeuvre(whole, {"column": pull}, seconds, bench=at, conditions=conditions))
 
@@ -158,6 +164,15 @@ def test_two_sides_share_the_force_and_the_surface() -> None:
     )
 
 
+def test_the_other_sides_spring_acts_about_the_trim() -> None:
+    """m₂·y'' + c₂·y' + G₂·(y − x₀) = F_l: trimmed and hands off, both sides rest at x₀."""
+    trim = {"trim": {"service": "trim_m", "to": 0.03, "over_s": 0.5, "at_s": 0.5}}
+    record = flown(OTHER, trim, 0.0, seconds=5.0)
+    assert at(record, "computed_m", 4.9) == pytest.approx(0.03, rel=1e-3)
+    assert at(record, "other_m", 4.9) == pytest.approx(0.03, rel=1e-3)
+    assert at(record, "link_force_N", 4.9) == pytest.approx(0.0, abs=0.02)
+
+
 def test_a_jam_of_the_other_side_is_broken_by_the_disconnect_and_half_the_surface_is_left() -> None:
     """Held at 0: F = (G + k)·x until the link carries 60 N; then G·x, and half of the surface."""
     jam = {"jam": {"service": "other_jammed", "at_s": 0.1}}
@@ -252,6 +267,34 @@ def test_a_soft_stop_is_a_second_spring_and_damps_on_the_way_out() -> None:
     assert damped["column_computed_m"].max() < record_max(flown(services, force_N=40.0))
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_soft_stop_does_not_damp_the_way_back(side: float) -> None:
+    """Let go in the stop: m·x'' + c·x' + G·x + k·(x − s) = 0, without the stop's own damping.
+
+    From rest the solution is x = x_e + (x_0 − x_e)·exp(−a·t)·(cos(w·t) + (a/w)·sin(w·t)), with
+    x_e = k·s/(G + k), a = c/(2m) and w² = (G + k)/m − a², as long as x > s.
+    """
+    mass, damping, stiffness, begins = 4.0, 150.0, 3000.0, 0.02
+    services = {
+        "soft_stop_m": begins,
+        "soft_stop_stiffness_N_per_m": stiffness,
+        "soft_stop_damping_N_s_per_m": 400.0,
+    }
+    let_go = Step(force_N=side * 60.0, start_s=0.5, duration_s=3.0, rise_s=0.0)
+    record = flown(services, pilot=let_go)
+    start = (60.0 + stiffness * begins) / (G + stiffness)
+    centre = stiffness * begins / (G + stiffness)
+    a = damping / (2.0 * mass)
+    w = math.sqrt((G + stiffness) / mass - a * a)
+    t = np.arange(0.0, 0.05, 0.01)
+    wave = np.exp(-a * t) * (np.cos(w * t) + a / w * np.sin(w * t))
+    wanted = centre + (start - centre) * wave
+    assert np.all(wanted > begins)
+    rows = np.searchsorted(record.time_s, 3.5 - 1e-9) + np.arange(len(t))
+    found = side * record["column_computed_m"][rows]
+    assert found == pytest.approx(wanted, abs=0.01 * (start - begins))
+
+
 def record_max(record: Record) -> float:
     return float(record["column_computed_m"].max())
 
@@ -268,6 +311,23 @@ def test_hinge_moments_stiffen_with_pressure_and_an_envelope_pushes_back() -> No
         for force in (20.0, -20.0):
             record = flown(given, force_N=force)
             assert at(record, "computed_m", 3.9) == pytest.approx((force + added) / G, rel=1e-3)
+
+
+def test_the_hinge_moment_follows_the_change_of_the_angle_of_attack() -> None:
+    """−q̄·h_α·(α − α₀): none in trim, whatever α₀ is, and held over each frame of the flight."""
+    share = 0.02
+    rig = read_rig(shipped_rigs()["t37"])
+    rig = rig.changed({f"{PLACE}.services.hinge_alpha_N_per_Pa_rad": share})
+    record = fly(Manoeuvre(rig, {"column": Step(force_N=40.0, start_s=0.5)}, 2.0))
+    alpha, pressure_Pa = record["alpha_rad"], record["dynamic_pressure_Pa"]
+    assert abs(alpha[0]) > 0.01
+    wanted = -share * pressure_Pa * (alpha - alpha[0])
+    force = record["column_service_force_N"]
+    at_rest = record.time_s < 0.45
+    assert np.all(np.abs(force[at_rest]) < 0.01 * np.max(np.abs(wanted)))
+    assert np.max(np.abs(wanted)) > 5.0
+    # A row holds the force over the frame before it.
+    assert force[1:] == pytest.approx(wanted[:-1], abs=1e-9)
 
 
 def test_a_feel_that_fails_leaves_its_share_of_the_gradient() -> None:
