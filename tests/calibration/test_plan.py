@@ -22,7 +22,7 @@ from coupled.calibration.plan import (
 from coupled.errors import InputError
 from coupled.resources import shipped_rigs
 from coupled.rig.rigfile import read_rig
-from tests.support.readings import K, report_rig, with_errors
+from tests.support.readings import S1, S3, K, report_rig, with_errors
 from tests.support.rigs import bench as bench_rig
 
 USUAL = usual_instruments("column")
@@ -62,6 +62,35 @@ def test_the_promised_error_is_the_one_that_comes() -> None:
         found.append(errors_in_variables(r, USUAL).line.bend.value)
     assert promised.bend == pytest.approx(K, rel=1e-3)
     assert np.std(found) / K == pytest.approx(promised.error, rel=0.09)
+
+
+def test_the_promised_error_of_the_estimate_is_the_one_that_comes() -> None:
+    """δ̂/δ = (S₁/Ŝ₁)·(1 − K·G) + K̂·G·S₃/Ŝ₃, of 300 fits to readings with a poor spring scale.
+
+    An interval of 95 % is ±1.96 standard deviations, which 300 fits give to 4 %.
+    """
+    tools, stiffest = replace(USUAL, scale=10.0), 2189.1
+    design = 8 * stations(report_rig(), "column", 5, 5)
+    promised = deflection_needs(report_rig(), "column", design, tools, looks=1)
+    delta = np.array([s.deflection for s in design])
+    force = np.array([s.force for s in design])
+    rng = np.random.default_rng(12)
+    ratios = []
+    for _ in range(300):
+        found = errors_in_variables(with_errors(delta, force, tools, rng), tools)
+        seen = S1 / found.line.s1.value * (1.0 - K * stiffest)
+        ratios.append(seen + found.line.bend.value * stiffest * S3 / found.s3.value)
+    assert promised.half_width == pytest.approx(1.96 * np.std(ratios), rel=0.12)
+
+
+def test_a_poor_spring_scale_costs_the_estimate_nothing() -> None:
+    """δ̂ = (v₁ + (K̂·Ŝ₁/Ŝ₃)·v₃)/Ŝ₁: v₁, v₃ and the ruler give K̂·Ŝ₁/Ŝ₃ without the spring scale."""
+    design = 8 * stations(report_rig(), "column", 5, 5)
+    widths = [
+        deflection_needs(report_rig(), "column", design, replace(USUAL, scale=scale_N)).half_width
+        for scale_N in (3.0, 30.0)
+    ]
+    assert widths[1] == pytest.approx(widths[0], rel=0.01)
 
 
 def test_the_fewest_readings_reach_what_is_wanted_and_no_grid_does_better() -> None:

@@ -72,6 +72,41 @@ def test_the_indices_of_ishigamis_function_are_known() -> None:
         assert index.points == 1024
 
 
+def independent_points(rng: np.random.Generator, samples: int) -> Floats:
+    """Return points as `design` has them, of independent draws in place of a Sobol sequence."""
+    a, b = rng.random((2, samples, 3))
+    mixed = np.repeat(a[None], 3, axis=0)
+    for i in range(3):
+        mixed[i, :, i] = b[:, i]
+    return np.concatenate((a, b, *mixed))
+
+
+def test_an_interval_is_of_95_percent() -> None:
+    """Half an interval is 1.96 standard deviations of the index over independent samples.
+
+    An interval of 90 % would be 1.64 of them. A thousand samples of 256 points each give the
+    standard deviation to 2 %.
+    """
+
+    def figure(points: Floats) -> Floats:
+        x, y, z = np.moveaxis(points, -1, 0)
+        return np.asarray(x + 0.5 * y + 0.3 * x * z)
+
+    rng, samples = np.random.default_rng(1), 256
+    found = [
+        sobol(figure(independent_points(rng, samples)).reshape(5, samples)) for _ in range(1000)
+    ]
+    deviation = np.std(found, axis=0)
+    halves = []
+    for _ in range(8):
+        table = table_of(figure(independent_points(rng, samples)))
+        indices = sensitivity(table, NAMES, ["f"], samples)
+        shares = [[index.first, index.total] for index in indices]
+        halves.append([[0.5 * (s.high - s.low) for s in pair if s is not None] for pair in shares])
+    ratio = np.mean(halves, axis=0).T / deviation
+    assert np.mean(ratio) == pytest.approx(1.96, rel=0.07)
+
+
 def test_the_indices_are_those_of_scipy() -> None:
     values = ishigami(design(256, 3, 1)).reshape(5, 256)
     blocks = {"f_A": values[:1], "f_B": values[1:2], "f_AB": values[2:, None, :]}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from coupled.api.rigs import load_rig
 from coupled.live.service import LEAST_N, Adaptation, BendEstimator, ServiceBend
@@ -39,6 +40,50 @@ def test_the_interval_holds_k_as_often_as_it_says() -> None:
         assert found.bend is not None and found.error is not None
         held += abs(found.bend - K) < 1.96 * found.error
     assert 88 <= held <= 100  # 95 % of 100, within 3 standard deviations
+
+
+def correlated(count: int, memory: float, random: np.random.Generator) -> np.ndarray:
+    """Return noise of unit variance whose neighbours correlate by `memory`."""
+    white = np.sqrt(1.0 - memory**2) * random.standard_normal(count)
+    white[0] /= np.sqrt(1.0 - memory**2)
+    return lfilter([1.0], [1.0, -memory], white)
+
+
+def test_the_interval_holds_k_where_the_noise_is_correlated() -> None:
+    """The variance is (1 + ρ)/(1 − ρ) times that of white noise; without that factor, 59 % hold K."""
+    memory, count, frames = 0.7, 100, 1800
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(frames))
+    held = 0
+    for seed in range(count):
+        noise = 1e-4 * correlated(frames, memory, np.random.default_rng(seed))
+        estimator = BendEstimator(COLUMN, FRAME_s)
+        for f, off in zip(force.tolist(), noise.tolist(), strict=True):
+            estimator.look(f, 0.0, K * f + off)
+        found = estimator.now
+        assert found.bend is not None and found.error is not None
+        held += abs(found.bend - K) < 1.96 * found.error
+    assert 88 <= held <= 100  # 95 % of 100, within 3 standard deviations
+
+
+@pytest.mark.parametrize(
+    ("times", "noise_m", "alarm"),
+    [
+        (1.02, 1e-6, False),  # 2 % off, by far more than four standard errors
+        (1.10, 5e-3, False),  # 10 % off, within four standard errors
+        (1.10, 1e-6, True),
+        (0.90, 1e-6, True),
+    ],
+)
+def test_an_alarm_needs_four_standard_errors_and_5_percent(
+    times: float, noise_m: float, alarm: bool
+) -> None:
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(1200))
+    found = seen(times * K, force, noise_m, 4)
+    assert found.bend is not None and found.error is not None
+    certain = abs(found.bend - K) > 4.0 * found.error
+    large = abs(found.bend - K) > 0.05 * K
+    assert (certain, large) == (noise_m < 1e-3, times != 1.02)
+    assert found.alarm == alarm
 
 
 def test_a_hand_that_does_too_little_teaches_nothing() -> None:
