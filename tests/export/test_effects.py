@@ -13,6 +13,8 @@ from coupled.export.beside import beside
 from coupled.export.control import control_system
 from coupled.export.keys import EXPORTED, REFUSED, WITHOUT_EFFECT, check_keys
 from coupled.export.write import DEFLECTION, FORCE, LOSS
+from coupled.flight.manoeuvre import Configuration, Manoeuvre
+from coupled.flight.pilot import Step
 from coupled.flight.runfile import read_run
 from coupled.resources import shipped_rigs
 from coupled.rig import parameters
@@ -207,15 +209,35 @@ def test_what_is_left_out_is_said() -> None:
     assert left.startswith("noise: ")
 
 
-def test_controls_of_one_structure_bend_each_other() -> None:
-    """The wheel's force bends at the column, as in our own flight of it."""
+def joined_controls() -> Manoeuvre:
+    """Return six seconds of three controls, of which two bend each other."""
     case, *_ = read_run("three-controls")
     joined = {
         "structure.column_by_wheel_m_per_N": 2e-5,
         "structure.wheel_by_column_rad_per_N": 1e-4,
         "structure.assumed.column_by_wheel_m_per_N": 2e-5,
     }
-    case = replace(case, rig=case.rig.changed(joined), duration_s=6.0)
+    return replace(case, rig=case.rig.changed(joined), duration_s=6.0)
+
+
+def test_a_rigid_structure_does_not_bend_by_another_controls_force() -> None:
+    """δ_i = x_i + Σ K_ij·F_j with every K_ij = 0: a column that nobody holds stays at δ = δc."""
+    pull = Step(force_N=15.0, start_s=0.5)
+    case = replace(joined_controls(), pilots={"wheel": pull}, duration_s=3.0)
+    configurations: tuple[Configuration, ...] = ("uncompensated", "rigid")
+    deflections = {}
+    for configuration in configurations:
+        _, alone, _ = both(case, configuration)
+        assert np.max(alone["wheel_force_N"]) == pytest.approx(15.0)
+        bent = alone["column_deflection_m"] - alone["column_computed_m"]
+        deflections[configuration] = bent[alone.time_s > 2.0]
+    assert deflections["uncompensated"] == pytest.approx(2e-5 * 15.0, rel=0.01)
+    assert np.max(np.abs(deflections["rigid"])) < 1e-6
+
+
+def test_controls_of_one_structure_bend_each_other() -> None:
+    """The wheel's force bends at the column, as in our own flight of it."""
+    case = joined_controls()
     ours, alone, _ = both(case)
     bent = ours["column_deflection_m"][ours.time_s > 4.0]
     assert np.ptp(bent) > 3e-4

@@ -72,6 +72,33 @@ def test_a_breakaway_above_friction_holds_longer_than_it_rubs() -> None:
     assert np.max(np.abs(alone["column_deflection_m"] - ours["column_deflection_m"])) < 0.0018
 
 
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_friction_falls_with_the_square_of_the_speed(share: float) -> None:
+    """Sliding evenly at v, F − G·δc − c·v = F_c + (F_s − F_c)·exp(−(v/v_s)²)."""
+    running_N, breakaway_N, fades_m_per_s = 3.0, 9.0, 0.1
+    gradient, damping = 2000.0, 150.0
+    changes = {
+        "loader.friction_N": running_N,
+        "loader.breakaway_N": breakaway_N,
+        "loader.stribeck_rate_m_per_s": fades_m_per_s,
+        "loader.damping_N_s_per_m": damping,
+        "schedule.total_gradient_N_per_m": [gradient, gradient],
+        "schedule.dynamic_pressure_Pa": [0.0, 4000.0],
+    }
+    rig = bench({f"controls.column.{key}": value for key, value in changes.items()})
+    speed = share * fades_m_per_s
+    seconds = 0.15 / speed
+    pull = forces([0.0, seconds], [0.0, gradient * speed * seconds])
+    _, alone, _ = both(on_bench(rig, pull, seconds), "uncompensated")
+    even = alone.time_s > 0.7 * seconds
+    computed = alone["column_computed_m"][even]
+    found = np.polyfit(alone.time_s[even], computed, 1)[0]
+    assert found == pytest.approx(speed, rel=0.01)
+    friction = alone["column_force_N"][even] - gradient * computed - damping * found
+    wanted = running_N + (breakaway_N - running_N) * np.exp(-(share**2))
+    assert np.mean(friction) == pytest.approx(wanted, abs=0.15)
+
+
 def test_a_breakout_holds_neutral_and_then_follows_its_line() -> None:
     """F = F_BO + G·δ, however slowly; below F_BO the grip moves by the bend alone."""
     rig = bench({"controls.column.loader.breakout_N": 9.0})
