@@ -95,6 +95,8 @@ def _say(made: Export, folder: Path, others: list[str]) -> None:
         print_whole(out, table)
     for line in made.left:
         err.print(f"[yellow]left out:[/] {escape(line)}", soft_wrap=True)
+    for line in made.scripted:
+        err.print(f"[yellow]by the scripts only:[/] {escape(line)}", soft_wrap=True)
     for line in others:
         err.print(f"[yellow]no script:[/] {escape(line)}", soft_wrap=True)
     if made.said:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from coupled.errors import InputError
+from coupled.flight.altered import ALTERATIONS
 from coupled.record.channels import unit_of
 from coupled.rig.parameters import (
     Calibration,
@@ -72,9 +73,9 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     ),
     Flight: frozenset(
         (
-            *("model", "altitude", "calibrated_airspeed", "flight_path", "trim", "properties"),
-            *("direct_controls", "steps_per_frame", "elevator_effectiveness", "pitch_damping"),
-            *("pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
+            *("model", "folder", "altitude", "calibrated_airspeed", "flight_path", "trim"),
+            *("properties", "direct_controls", "steps_per_frame", "elevator_effectiveness"),
+            *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
         )
     ),
 }
@@ -178,6 +179,26 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
             problem = f"is not exported, nor left out in silence: leave it at {default!r}"
             raise InputError(file, dotted, problem)
     return left
+
+
+def only_scripted(rig: Rig) -> list[str]:
+    """Return what of a rig's aircraft only the scripts set, a line each with its key and why.
+
+    Flown without a script, as in FlightGear, the exported aircraft is without it.
+    """
+    flight = rig.flight
+    if flight is None:
+        return []
+    found = [
+        f"flight.properties: {name} = {value:g}, set before the trim"
+        for name, value in flight.properties.items()
+    ]
+    for alteration in ALTERATIONS:
+        factor = alteration.factor(flight)
+        if alteration.about_trim and factor != 1.0:
+            name = alteration.part.name
+            found.append(f"flight.{name} = {factor:g}: it counts about the place in trim")
+    return found
 
 
 def approximated(rig: Rig) -> list[str]:

@@ -44,13 +44,6 @@ def model_name(flight: Flight | None) -> str:
     return "bench" if flight is None else flight.model
 
 
-def altered(flight: Flight | None) -> list[str]:
-    """Return the names of the factors on the aerodynamics that a rig has."""
-    if flight is None:
-        return []
-    return [a.part.name for a in ALTERATIONS if a.factor(flight) != 1.0]
-
-
 def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> Files:
     """Return an aircraft's files by their places in the exported folder.
 

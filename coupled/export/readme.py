@@ -8,6 +8,7 @@ from coupled.export.beside import Beside
 from coupled.export.keys import approximated
 from coupled.export.model import model_name
 from coupled.export.system import System
+from coupled.flight.altered import ALTERATIONS
 from coupled.record.channels import SURFACES
 from coupled.rig.rig import Rig
 
@@ -26,13 +27,18 @@ def readme_text(
     scripts: Sequence[str],
     flights: Sequence[Beside],
     left: Sequence[str],
+    scripted: Sequence[str],
 ) -> str:
-    """Return the README's text; `rate_Hz` is JSBSim's, `flights` those held against our own."""
+    """Return the README's text.
+
+    `rate_Hz` is JSBSim's, `flights` are those held against our own, `left` is what of the rig is
+    left out, `scripted` what of it only the scripts set.
+    """
     name = model_name(rig.flight)
     parts = [
         f"# {name} with the control loader of `{rig.name}`",
         f"Made by `coupled export`: the JSBSim model {name}, its files as they are but for a line"
-        " that includes each `Systems/coupled-….xml`, and in newtons the rig's"
+        f" that includes each `Systems/coupled-….xml`{_changed(rig)}, and in newtons the rig's"
         f" {', '.join(systems)}.",
         _flying(rig, name, rate_Hz, substeps, scripts),
         _HAND.format(control=next(iter(systems)), command=_command(systems)),
@@ -44,9 +50,27 @@ def readme_text(
     if about:
         lines = [f"- {one}" for one in about]
         parts.append("## Approximated\n\nThe errors above have it in them.\n\n" + "\n".join(lines))
+    if scripted:
+        head = "## Set by the scripts only\n\nFlown without a script, the aircraft is without it.\n"
+        parts.append("\n".join([head, *(f"- {one}" for one in scripted)]))
     if left:
         parts.append("## Left out\n\n" + "\n".join(f"- {one}" for one in left))
     return "\n\n".join(parts) + "\n"
+
+
+def _changed(rig: Rig) -> str:
+    """Return what else of the model's files is changed, as it stands in a sentence."""
+    flight = rig.flight
+    if flight is None:
+        return ""
+    changes = list[str]()
+    if flight.cg_aft != 0.0:
+        changes.append(f"a centre of gravity {flight.cg_aft:g} m further aft")
+    if flight.fuel != 1.0:
+        changes.append(f"{flight.fuel:g} times the fuel")
+    factors = [(a.part.name, a.factor(flight)) for a in ALTERATIONS]
+    changes += [f"{name} times {factor:g}" for name, factor in factors if factor != 1.0]
+    return f", for {', '.join(changes)}" if changes else ""
 
 
 def _command(systems: Mapping[str, System]) -> str:

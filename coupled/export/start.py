@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from coupled.export.host import BENCH_PRESSURE
-from coupled.export.model import Files, altered
+from coupled.export.load import POINT, TANKS
+from coupled.export.model import Files
 from coupled.export.script import Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
@@ -21,9 +22,7 @@ from coupled.rig.parameters import Flight
 from coupled.units import KNOT_m_per_s
 
 _LEVERS = re.compile(r"fcs/(mixture|advance)-cmd-norm(\[\d+\])?").fullmatch
-_TANKS = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
 _THROTTLES = re.compile(r"fcs/throttle-cmd-norm(\[\d+\])?").fullmatch
-_POINT = "metrics/aero-rp-x-in"
 
 
 def initial_conditions(manoeuvre: Manoeuvre, alpha_rad: float | None) -> str:
@@ -43,9 +42,13 @@ def initial_conditions(manoeuvre: Manoeuvre, alpha_rad: float | None) -> str:
     return "\n".join([*head, *lines, "</initialize>", ""])
 
 
-def add_start(script: Script, manoeuvre: Manoeuvre, files: Files) -> float | None:
-    """Add what an aircraft is set to before its trim, and in it; `files` are its own.
+def add_start(
+    script: Script, manoeuvre: Manoeuvre, exported: Flight | None, files: Files
+) -> float | None:
+    """Add what an aircraft is set to before its trim, and in it.
 
+    `exported` is the section of the rig that was exported, whose load the aircraft has; `files`
+    are the aircraft's own.
     Return the angle of attack at the start, rad, where JSBSim does not find it itself.
     Raises InputError.
     """
@@ -63,10 +66,10 @@ def add_start(script: Script, manoeuvre: Manoeuvre, files: Files) -> float | Non
     names = airframe.names()
     script.before["propulsion/set-running"] = -1.0
     script.before |= dict.fromkeys(filter(_LEVERS, names), 1.0)
-    if flight.cg_aft != 0.0:
-        script.before[_POINT] = airframe.lever(_POINT).read()
-    if flight.fuel != 1.0:
-        tanks = filter(_TANKS, names)
+    if exported is None or flight.cg_aft != exported.cg_aft:
+        script.before[POINT] = airframe.lever(POINT).read()
+    if exported is None or flight.fuel != exported.fuel:
+        tanks = filter(TANKS, names)
         script.before |= {name: airframe.lever(name).read() for name in tanks}
     script.before |= flight.properties
     _add_factors(script, flight)
@@ -77,17 +80,12 @@ def add_start(script: Script, manoeuvre: Manoeuvre, files: Files) -> float | Non
 
 
 def _add_factors(script: Script, flight: Flight) -> None:
-    """Add the factors on the aerodynamics, of which some count from the trim on."""
+    """Add the factors on the aerodynamics that count from the trim on; the model has the others."""
     for alteration in ALTERATIONS:
         part, factor = alteration.part, alteration.factor(flight)
-        if part.name not in altered(flight):
-            continue
-        values: dict[str, float | str] = {part.factor: factor, part.rest: 1.0 - factor}
-        if alteration.about_trim:
-            held = {part.held(name): name for name in part.properties}
-            script.started |= {**held, **values}
-        else:
-            script.before |= {name: float(value) for name, value in values.items()}
+        if factor != 1.0 and alteration.about_trim:
+            script.started |= {part.held(name): name for name in part.properties}
+            script.started |= {part.factor: factor, part.rest: 1.0 - factor}
 
 
 def _add_newton(script: Script, airframe: JSBSimAirframe, names: list[str], files: Files) -> None:

@@ -13,7 +13,8 @@ from coupled.export.alone import PROGRAM, fly_alone
 from coupled.export.befalling import add_conditions
 from coupled.export.beside import Beside, alone_record, beside, properties
 from coupled.export.control import control_system
-from coupled.export.keys import check_keys
+from coupled.export.keys import check_keys, only_scripted
+from coupled.export.load import check_load, set_load
 from coupled.export.model import Files, model_files, model_name
 from coupled.export.readme import readme_text
 from coupled.export.script import Script, lead_pilots
@@ -43,7 +44,7 @@ class Export:
     """What an export made: its files by place, its loader's steps in a run, its errors.
 
     `beside` are the flights held against our own, `left` what of the rig is left out and why,
-    `said` what JSBSim said as it loaded and flew them.
+    `scripted` what of it only the scripts set, `said` what JSBSim said as it loaded and flew them.
     """
 
     rig: Rig
@@ -51,6 +52,7 @@ class Export:
     substeps: int
     beside: tuple[Beside, ...] = ()
     left: tuple[str, ...] = ()
+    scripted: tuple[str, ...] = ()
     said: str = ""
 
     @property
@@ -84,12 +86,16 @@ def export(
     export cannot express, naming the key.
     """
     left = check_keys(rig, file)
+    scripted = only_scripted(rig)
     substeps = math.ceil(rate_Hz / step_rate(rig) - 1e-9)
     if not 1 <= substeps <= MOST_SUBSTEPS:
         problem = f"asks for {substeps} loader steps in a step of JSBSim at {step_rate(rig):g} Hz"
         raise InputError(file, "--loader-rate-Hz", f"{problem}; 1 to {MOST_SUBSTEPS} can be had")
     systems = {str(name): control_system(rig, name, substeps) for name in rig.controls}
     files = rig_files(rig, systems, file)
+    with tempfile.TemporaryDirectory(prefix="coupled-") as temporary:
+        put(files, Path(temporary))
+        check_load(Path(temporary), rig, file)
     flown: list[tuple[Manoeuvre, Configuration, str, Record]] = []
     jobs = [(run.manoeuvre, each) for run in runs for each in run.configurations]
     for done, (manoeuvre, configuration) in enumerate(jobs):
@@ -115,9 +121,10 @@ def export(
                 alone, now = fly_exported(Path(temporary), name, manoeuvre, record)
                 said = said or now
                 found.append(beside(manoeuvre, configuration, record, alone))
-    made = Export(rig, files, substeps, tuple(found), tuple(left), said)
+    made = Export(rig, files, substeps, tuple(found), tuple(left), tuple(scripted), said)
     scripts = [f"scripts/{name}.xml" for _, _, name, _ in flown]
-    text = readme_text(rig, systems, substeps, step_rate(rig), scripts, made.beside, made.left)
+    flights = (made.beside, made.left, made.scripted)
+    text = readme_text(rig, systems, substeps, step_rate(rig), scripts, *flights)
     files[PurePosixPath("README.md")] = text.encode()
     return made
 
@@ -134,9 +141,9 @@ def fly_exported(
 
 
 def rig_files(rig: Rig, systems: dict[str, System], file: object = "rig") -> Files:
-    """Return the aircraft with a rig's systems, by place in the exported folder."""
+    """Return the aircraft with a rig's systems and its load, by place in the exported folder."""
     names = [f"coupled-{name}" for name in systems]
-    files = model_files(rig.flight, names, file)
+    files = set_load(model_files(rig.flight, names, file), rig.flight, file)
     folder = PurePosixPath("aircraft", model_name(rig.flight), "Systems")
     for name, system in systems.items():
         head = [
@@ -169,7 +176,7 @@ def run_files(
     """
     script = Script()
     script.notes += [f"{manoeuvre.label}, {configuration}", "", *manoeuvre.card.strip().split("\n")]
-    alpha_rad = add_start(script, manoeuvre, files)
+    alpha_rad = add_start(script, manoeuvre, rig.flight, files)
     script.started |= switches(rig, configuration)
     lead_pilots(script, manoeuvre, record)
     add_conditions(script, manoeuvre)

@@ -50,7 +50,7 @@ def correlated(count: int, memory: float, random: np.random.Generator) -> np.nda
 
 
 def test_the_interval_holds_k_where_the_noise_is_correlated() -> None:
-    """The variance is (1 + ρ)/(1 − ρ) times that of white noise; without that factor, 59 % hold K."""
+    """The variance is (1 + ρ)/(1 − ρ) times that of white noise; without it 59 % would hold K."""
     memory, count, frames = 0.7, 100, 1800
     force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(frames))
     held = 0

@@ -1,0 +1,164 @@
+"""The load and the factors of a rig's aircraft, written into the files of its exported model.
+
+In flight, `flight/loading` moves the centre of gravity and fills the tanks of a loaded model, and
+`flight/altered` sets the factors on its aerodynamics. The exported aircraft has to be the same in
+JSBSim and in FlightGear, with a script and without, so the numbers are written into its files:
+
+    cg_aft              the aerodynamic reference point, moved forward: metrics, location AERORP
+    fuel                the contents of each tank, times the factor
+    pitch_damping, …    the factors that count from zero, where the model's aerodynamics have them
+
+A factor about the trim (`elevator_effectiveness`) needs the place of the surface in trim, which no
+file can hold: a script sets it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from coupled.errors import InputError
+from coupled.export.model import Files, model_name
+from coupled.flight.aircraft import make_aircraft
+from coupled.flight.altered import ALTERATIONS, UNALTERED
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+from coupled.rig.rig import Rig
+from coupled.units import FOOT_m, INCH_m
+
+POINT = "metrics/aero-rp-x-in"
+TANKS = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
+_UNITS_m = {"IN": INCH_m, "FT": FOOT_m, "M": 1.0}  # of a location; JSBSim takes no other
+_REACHED = 1e-6  # relative: JSBSim's own factors between units have seven digits
+
+
+def set_load(files: Files, flight: Flight | None, file: object) -> Files:
+    """Return an exported aircraft's files with the rig's load and factors in them.
+
+    `file` is the rig's, named in faults. Raises InputError where the model has no place for one.
+    """
+    if flight is None:
+        return files
+    name = model_name(flight)
+    main = PurePosixPath("aircraft", name, f"{name}.xml")
+    found = dict(files)
+    if flight.cg_aft != 0.0:
+        place = _section(found, main, "metrics")
+        found[place] = _with_point(found[place], flight, file)
+    if flight.fuel != 1.0:
+        place = _section(found, main, "propulsion")
+        found[place] = _with_contents(found[place], flight.fuel)
+    found[main] = _with_factors(found[main], flight)
+    return found
+
+
+def check_load(folder: Path, rig: Rig, file: object) -> None:
+    """Load an exported aircraft by JSBSim, and hold its load against that of our own flight.
+
+    `folder` holds the export. Raises InputError where they differ, and where the rig's own aircraft
+    does not take the load, as more fuel than its tanks hold.
+    """
+    flight = rig.flight
+    if flight is None or (flight.cg_aft == 0.0 and flight.fuel == 1.0):
+        return
+    plain = {a.part.name: UNALTERED[a.part.name] for a in ALTERATIONS}
+    plain |= {"cg_aft": 0.0, "fuel": 1.0}
+    exported = flight.model_copy(update={**plain, "folder": str(folder / "aircraft")})
+    frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
+    ours, alone = (
+        make_aircraft(each, frame_s, controls, [aircraft_folder()], file)
+        for each in (flight, exported)
+    )
+    for name in (POINT, *filter(TANKS, ours.names())):
+        wanted, found = ours.lever(name).read(), alone.lever(name).read()
+        if not math.isclose(wanted, found, rel_tol=_REACHED, abs_tol=_REACHED):
+            key = "cg_aft_m" if name == POINT else "fuel"
+            problem = f"{flight.model} as exported has {name} = {found:.8g}, not {wanted:.8g}"
+            remedy = "put the load into the model's own file, and leave the key out"
+            raise InputError(file, f"flight.{key}", f"{problem}; {remedy}")
+
+
+def _section(files: Files, main: PurePosixPath, name: str) -> PurePosixPath:
+    """Return the file that a section of the model is in: the model's, or one that it names."""
+    section = ElementTree.fromstring(files[main]).find(name)
+    own = "" if section is None else section.get("file", "").removesuffix(".xml")
+    place = main.parent / f"{own}.xml"
+    return place if own and place in files else main
+
+
+def _with_point(text: bytes, flight: Flight, file: object) -> bytes:
+    """Return a file whose aerodynamic reference point lies further forward, by `cg_aft`."""
+    for number in _numbers(text, "location", "x"):
+        unit = number.within.get("unit", "IN")
+        if number.within.get("name") == "AERORP" and unit in _UNITS_m:
+            return number.replaced(text, number.value - flight.cg_aft / _UNITS_m[unit])
+    problem = f"{flight.model} has no location AERORP in {', '.join(_UNITS_m)} that could be moved"
+    raise InputError(file, "flight.cg_aft_m", f"{problem}; leave it at 0")
+
+
+def _with_contents(text: bytes, share: float) -> bytes:
+    """Return a file whose tanks hold so many times as much."""
+    for number in reversed(_numbers(text, "tank", "contents")):
+        text = number.replaced(text, share * number.value)
+    return text
+
+
+def _with_factors(text: bytes, flight: Flight) -> bytes:
+    """Return a model with the factors that count from zero (`modelfile` declares them)."""
+    for alteration in ALTERATIONS:
+        part, factor = alteration.part, alteration.factor(flight)
+        if alteration.about_trim or factor == 1.0:
+            continue
+        for name, neutral, value in ((part.factor, 1, factor), (part.rest, 0, 1.0 - factor)):
+            declared = f'<property value="{neutral}">{name}</property>'
+            assert declared.encode() in text, name
+            stated = f'<property value="{value!r}">{name}</property>'
+            text = text.replace(declared.encode(), stated.encode())
+    return text
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number in an XML file: the bytes that it takes, and the attributes of what it is within."""
+
+    value: float
+    start: int
+    end: int
+    within: Mapping[str, str]
+
+    def replaced(self, text: bytes, value: float) -> bytes:
+        """Return the file with another number in its place, and nothing else changed."""
+        return text[: self.start] + repr(value).encode() + text[self.end :]
+
+
+def _numbers(text: bytes, within: str, tag: str) -> list[_Number]:
+    """Return the numbers of all elements `tag` directly within elements `within`, in order."""
+    stack, said, found = list[tuple[str, dict[str, str]]](), list[str](), list[_Number]()
+    begin = 0
+    parser = expat.ParserCreate()
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        stack.append((name, attributes))
+        said.clear()
+
+    def characters(more: str) -> None:
+        nonlocal begin
+        begin = begin if said else parser.CurrentByteIndex
+        said.append(more)
+
+    def end(_: str) -> None:
+        if [name for name, _ in stack[-2:]] == [within, tag] and said:
+            attributes = stack[-2][1]
+            found.append(_Number(float("".join(said)), begin, parser.CurrentByteIndex, attributes))
+        stack.pop()
+        said.clear()
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = characters
+    parser.Parse(text, True)
+    return found
