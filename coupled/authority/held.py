@@ -26,7 +26,7 @@ def by_the_statics(
 ) -> tuple[float, float]:
     """Return the share of the command that is lost, and force felt over specified, at rest."""
     others = {
-        str(name): float(np.mean(record[channel(name, "force")][held]))
+        str(name): float(np.mean(record[channel(name, "hand_force")][held]))
         for name in rig.controls
         if name != control and not rig.structure.stands_apart
     }

@@ -53,6 +53,24 @@ def test_the_surface_loses_what_the_host_does_not_know(
     assert found.loss == pytest.approx(found.loss_closed_form, abs=3e-3)
 
 
+def test_a_gauge_that_is_off_at_another_control_bends_nothing() -> None:
+    """The structure bends by the hand's force; the host has K̂_ij times what the gauge reads."""
+    scale = 1.2
+    table = {**TERMS, "reciprocal": True, "assumed": TERMS}
+    rig = coupled.load_rig("t37").changed(
+        {"structure": table, "controls.wheel.sensing.force_scale": scale}
+    )
+    pilots = {name: coupled.Step(force_N=FORCES[name]) for name in FORCES}
+    manoeuvre = coupled.Manoeuvre(rig, pilots, duration_s=2.5).configured("compensated")
+    found = judge(manoeuvre, "compensated", record := fly(manoeuvre))
+    held = (record.time_s > 1.5) & (record.time_s < 2.4)
+    deflection = float(np.mean(record["column_deflection_m"][held]))
+    wanted = BETWEEN * FORCES["wheel"] * (1.0 - scale) / deflection
+    assert abs(wanted) > 0.002
+    assert found.loss_closed_form == pytest.approx(wanted, abs=2e-4)
+    assert found.loss == pytest.approx(wanted, abs=3e-3)
+
+
 def test_the_feel_keeps_the_shift_that_no_gradient_can_make_good() -> None:
     """F = G·(δ − K_cw·F_w): with all corrections on, the hand feels a shifted neutral."""
     rig, manoeuvre, record = flown("compensated", TERMS)

@@ -73,6 +73,27 @@ def test_a_gust_is_one_minus_cosine_of_its_velocity(tmp_path: Path) -> None:
     assert 0.4 * 3.0 / 154.0 < lifted < 3.0 / 154.0
 
 
+def test_a_gust_has_the_earths_axes_and_not_the_bodys(tmp_path: Path) -> None:
+    """Met in a descent, nose down, a gust straight up has no part along the flight."""
+    gust = "[gust]\nat_s = 0.5\nrise_s = 0.2\nhold_s = 5.0\nup_m_per_s = 5.0\n"
+    descent = scenario(tmp_path, gust, rig="t37", extra=AIR, duration=1.5)
+    rig = descent.rig.changed({"flight.flight_path_rad": -0.1})
+    record = fly(replace(descent, rig=rig))
+    assert record["pitch_rad"].max() < -0.04
+    north, east, down = (record[name][-1] * FOOT_m for name in AIR)
+    assert (north, east, down) == pytest.approx((0.0, 0.0, -5.0), abs=0.05)
+
+
+@pytest.mark.parametrize(("model", "number"), [("milspec", 3.0), ("tustin", 4.0)])
+def test_turbulence_is_of_the_model_that_is_named(
+    tmp_path: Path, model: str, number: float
+) -> None:
+    """By JSBSim's FGWinds: 3 is ttMilspec, 4 is ttTustin."""
+    table = f'[turbulence]\nmodel = "{model}"\nwind_at_6m_m_per_s = 5.0\nseverity = 3\n'
+    record = flown(tmp_path, table, extra=["atmosphere/turb-type"], duration=0.2)
+    assert record["atmosphere/turb-type"][-1] == number
+
+
 @pytest.mark.parametrize("model", ["milspec", "tustin"])
 def test_turbulence_comes_from_the_seed_and_grows_with_the_wind(tmp_path: Path, model: str) -> None:
     def air(wind: float, seed: int) -> np.ndarray:
@@ -86,6 +107,8 @@ def test_turbulence_comes_from_the_seed_and_grows_with_the_wind(tmp_path: Path, 
     assert not np.array_equal(one, other)
     # MIL-F-8785C below 1000 ft: σ_w = 0.1 of the wind at 20 ft, so it doubles with it.
     assert np.std(double[:, 2]) == pytest.approx(2.0 * np.std(one[:, 2]), rel=0.02)
+    # 20 s are some 15 lengths of the spectrum, so that their rms is known to a third.
+    assert np.std(one[:, 2]) * FOOT_m == pytest.approx(0.1 * 5.0, rel=0.5)
 
 
 def test_a_trim_that_runs_away_is_held_by_as_much_column(tmp_path: Path) -> None:

@@ -74,6 +74,17 @@ def test_a_trim_moves_the_neutral_and_the_breakout_with_it() -> None:
     assert at(free, "computed_m", 5.9) == pytest.approx(0.03, abs=1e-6)
 
 
+def test_a_service_is_led_from_where_it_stands() -> None:
+    """Trimmed to 0.04 m at once, and from there to 0.02 m evenly over 1 s."""
+    events = {
+        "there": {"service": "trim_m", "to": 0.04, "at_s": 0.5},
+        "back": {"service": "trim_m", "to": 0.02, "at_s": 2.0, "over_s": 1.0},
+    }
+    record = flown({}, events, 0.0)
+    found = [at(record, "trim_m", time_s) for time_s in (1.9, 2.25, 2.5, 2.75, 3.5)]
+    assert found == pytest.approx([0.04, 0.035, 0.03, 0.025, 0.02], abs=3e-4)
+
+
 @pytest.mark.parametrize("multiplier", ["hybrid", "digital"])
 def test_f_mod_acts_about_the_trim(multiplier: str) -> None:
     rig = {f"{PLACE}.schedule.total_gradient_N_per_m": [1000.0, 1000.0], "multiplier": multiplier}
