@@ -73,3 +73,20 @@ def test_a_control_by_itself_has_both_forces() -> None:
     response = run_control(rig, "column", np.full(50 * rig.substeps + 1, 20.0), np.full(50, 3e3))
     np.testing.assert_allclose(response.hand_force, 20.0, rtol=1e-12)
     np.testing.assert_allclose(response.force, 22.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_feel_of_a_bent_column_is_that_past_its_breakout(side: float) -> None:
+    """F − F_BO = G·(δ − K·F), so (F − F_BO)/(G·δ) = 1 − K·F/δ, with a pull and with a push."""
+    breakout_N = 9.0
+    rig = bench({"breakout_N": breakout_N, "controls.column.compensation.deflection": False})
+    rig = rig.changed({"controls.column.compensation.gradient": False})
+    clamp = Clamp(deflection_m=side * PULL_m, start_s=0.5)
+    found = fly_and_judge(Manoeuvre(rig, {"column": clamp}, 5.0, bench=STATIC)).outcome
+    force_N = (breakout_N + G_STIFF * PULL_m) / (1.0 + K_REPORT * G_STIFF)
+    wanted = 1.0 - K_REPORT * force_N / PULL_m
+    assert found.felt_ratio_closed_form == pytest.approx(wanted, abs=1e-5)
+    assert found.felt_ratio == pytest.approx(wanted, abs=1e-4)
+    assert found.force_N == pytest.approx(force_N, rel=1e-4)
+    assert found.loss == pytest.approx(K_REPORT * force_N / PULL_m, abs=1e-4)
+    assert found.hand_travel_norm == pytest.approx(side * PULL_m / 0.1778, rel=1e-3)

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from coupled.authority.maps import FELT, envelope, feel, loss_maps
+from coupled.authority.maps import FELT, Feel, envelope, feel, loss_maps
 from coupled.cli import app
+from coupled.flight.loop import fly
+from coupled.flight.manoeuvre import Manoeuvre, configure
+from coupled.flight.pilot import Step
 from coupled.record.csvfile import read_columns
 from coupled.resources import find, shipped_rigs
+from coupled.rig.equations import specified_gradient
+from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from tests.support.commands import coupled
+from tests.support.readings import report_rig
 from tests.support.rigs import G_STIFF, K_REPORT, bench
 
 
@@ -47,6 +53,49 @@ def test_stick_force_is_as_specified_with_and_without_compensation(rig: str) -> 
         # Stable in speed. The 737's knot is less than the bend moves within the breakout.
         rests = rig == "737" and name == "compensated"
         assert np.all(np.isnan(found.per_knot_N[name]) if rests else found.per_knot_N[name] > 0.0)
+
+
+def felt(rig: Rig) -> Feel:
+    found = feel(rig, Path("rig.toml"), lambda *_: None)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def plain() -> Feel:
+    """Return the stick forces of the report's column, without bob weight and breakout."""
+    return felt(report_rig())
+
+
+def test_a_bob_weight_adds_itself_less_what_the_host_makes_of_its_bend(plain: Feel) -> None:
+    """F = G·δ̂ + b·(1 − K̂·G) where δ̂ = δc + K̂·F; G·δ̂ + b where the host adds nothing.
+
+    Forces are past the breakout, so that a breakout changes none.
+    """
+    weight_N, loader = 40.0, "controls.column.loader"
+    changes = {f"{loader}.bob_weight_N_per_g": weight_N, f"{loader}.breakout_N": 6.0}
+    rig = report_rig()
+    found = felt(rig.changed(changes))
+    column = rig.controls["column"]
+    gradient = specified_gradient(column.schedule, plain.pressure_Pa)
+    spared = {"compensated": column.compensation.bend * gradient}
+    for name in FELT:
+        wanted = weight_N * (1.0 - spared.get(name, 0.0 * gradient))
+        assert found.per_g_N[name] - plain.per_g_N[name] == pytest.approx(wanted, rel=1e-4)
+        assert found.per_knot_N[name] == pytest.approx(plain.per_knot_N[name], rel=1e-4)
+
+
+def test_a_force_per_g_is_what_a_flown_pull_takes(plain: Feel) -> None:
+    """A pull and a push of 3 N on the rigid column: half their difference at its greatest."""
+    force_N, at = 3.0, len(plain.pressure_Pa) // 2
+    speed = {"flight.calibrated_airspeed_m_per_s": float(plain.calibrated_airspeed_m_per_s[at])}
+    rig = configure(report_rig(), "rigid").changed(speed)
+    pull, push = (
+        fly(Manoeuvre(rig, {"column": Step(force_N=side * force_N, start_s=0.5)}, 3.5))
+        for side in (1.0, -1.0)
+    )
+    load = 0.5 * (pull["load_factor"] - push["load_factor"])
+    assert plain.per_g_N["rigid"][at] == pytest.approx(force_N / np.max(load), rel=0.02)
 
 
 def test_a_bench_has_no_stick_force_per_g(tmp_path: Path) -> None:
