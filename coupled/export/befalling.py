@@ -10,7 +10,8 @@ from coupled.errors import InputError
 from coupled.export.script import Floats, Move, Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
-from coupled.flight.event import Event
+from coupled.flight.event import OFF, PICK, Event
+from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.weather import Gust, Turbulence
 from coupled.flight.wind import Wind
@@ -93,14 +94,16 @@ def _add_event(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
         move = Move(*_shares(event, manoeuvre), to=event.to)
         script.moved.setdefault(event.of_model, []).append(move)
     elif event.engine_out is not None:
+        # A turbine has no magnetos and a piston engine no cut-off: JSBSim ends a script that sets
+        # what is not there.
+        airframe = make_airframe(manoeuvre)
+        assert isinstance(airframe, JSBSimAirframe)
         number = f"[{event.engine_out}]" if event.engine_out else ""
-        values = {
-            "propulsion/active_engine": float(event.engine_out),
-            "propulsion/cutoff_cmd": 1.0,
-            "propulsion/magneto_cmd": 0.0,
-            f"propulsion/engine{number}/set-running": 0.0,
-        }
-        script.at.append((event.at, values))
+        off = {name: value for name, value in OFF.items() if airframe.has(name)}
+        picked = {PICK: float(event.engine_out)}
+        script.at.append(
+            (event.at, {**picked, **off, f"propulsion/engine{number}/set-running": 0.0})
+        )
 
 
 def _shares(event: Event, manoeuvre: Manoeuvre) -> tuple[Floats, Floats]:

@@ -66,9 +66,12 @@ class Script:
         lines.append(f'  <use aircraft="{aircraft}" initialize="{start}"/>')
         lines.append(f'  <run start="0" end="{end_s!r}" dt="{dt_s!r}">')
         lines += [f'    <property value="{v!r}">{p}</property>' for p, v in self.before.items()]
-        sets = {"simulation/do_simple_trim": 1.0} if self.trims else {}
+        # JSBSim works out all values of an event before it sets one of them. What reads the trim
+        # has to stand in an event after that of the trim.
+        if self.trims:
+            lines += _event("trim", [_set("simulation/do_simple_trim", 1.0)])
         kept = {start: name for name, start in begun.items()}
-        lines += _event("start", [_set(p, v) for p, v in {**sets, **self.started, **kept}.items()])
+        lines += _event("start", [_set(p, v) for p, v in {**self.started, **kept}.items()])
         for at, values in self.at:
             shown = [_set(p, v) for p, v in values.items()]
             lines += _event(f"at {at:g} s", shown, at + 0.5 * dt_s)

@@ -20,8 +20,8 @@ from coupled.schema import Section, named, quantity
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
 _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 # Fuel cut and magnetos off, for the engine that JSBSim has picked; −1 picks all.
-_OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
-_PICK = "propulsion/active_engine"
+OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
+PICK = "propulsion/active_engine"
 
 
 class Event(Section):
@@ -140,9 +140,9 @@ def _engine(aircraft: Aircraft, event: Event, file: object, place: str) -> Move 
     running = f"propulsion/engine{number}/set-running"
     if not aircraft.has(running):
         raise InputError(file, f"{place}.engine_out", "there is no such engine; the first is 0")
-    pick = aircraft.lever(_PICK, file, place)
+    pick = aircraft.lever(PICK, file, place)
     levers = [
-        (aircraft.lever(name, file, place), to) for name, to in _OFF.items() if aircraft.has(name)
+        (aircraft.lever(name, file, place), to) for name, to in OFF.items() if aircraft.has(name)
     ]
     levers.append((aircraft.lever(running, file, place), 0.0))
 
