@@ -32,6 +32,14 @@ BEFALLS: dict[str, tuple[str, dict[str, float], dict[str, Any], str, float, floa
         0.3,
         0.01,
     ),
+    "turbulence near the ground": (
+        "t37",
+        {"flight.altitude_m": 200.0},
+        {"turbulence": {"wind_at_6m_m_per_s": 8.0}},
+        "load_factor",
+        0.1,
+        0.02,
+    ),
     "a trim that runs away": (
         "t37",
         {"flight.elevator_effectiveness": 1.5},

@@ -46,7 +46,7 @@ def correlated(count: int, memory: float, random: np.random.Generator) -> np.nda
     """Return noise of unit variance whose neighbours correlate by `memory`."""
     white = np.sqrt(1.0 - memory**2) * random.standard_normal(count)
     white[0] /= np.sqrt(1.0 - memory**2)
-    return lfilter([1.0], [1.0, -memory], white)
+    return np.asarray(lfilter([1.0], [1.0, -memory], white))
 
 
 def test_the_interval_holds_k_where_the_noise_is_correlated() -> None:
