@@ -91,11 +91,13 @@ def live(
 ) -> None:
     """Fly in real time, with a loader, a hand and views attached; q or Ctrl-C ends it.
 
-    The record has the format of `coupled fly`, whole up to the frame at which it ended.
+    The record has the format of `coupled fly`, whole up to the frame at which it ended. It grows
+    on disk while the flight goes on, so that a computer that fails leaves all but the last second.
     """
     from coupled.live.attach import open_link, rig_live, run_live
     from coupled.live.host import Plan
     from coupled.live.keys import Keys
+    from coupled.live.recording import Recording, recording_path
     from coupled.live.safety import Limits
     from coupled.live.session import fly_live
     from coupled.record.record import check_suffix, manifest_path, write_record
@@ -111,9 +113,10 @@ def live(
     path = output or Path("out") / f"{flown.name}.csv"
     check_suffix(path)
     inputs = _inputs(flown)
-    for target in (path, manifest_path(path)):
+    growing = recording_path(path)
+    for target in dict.fromkeys((path, manifest_path(path), growing, manifest_path(growing))):
         check_target(target, inputs)
-    check_json(json_file, [*inputs, path, manifest_path(path)])
+    check_json(json_file, [*inputs, path, manifest_path(path), growing, manifest_path(growing)])
     say_stale(flown.rig)
     limits = Limits(_positive("--force-limit", force_limit), _positive("--rate-limit", rate_limit))
     warn = _Warner()
@@ -122,6 +125,7 @@ def live(
         ending.callback(keys.close)
         watchers: list[Watcher] = [keys]
         watchers += _views(flightgear, xplane)
+        watchers.append(recording := Recording(path, warn))
         page = _page(flown, bind, port, ending) if dashboard else None
         if page is not None:
             watchers.append(page)
@@ -140,9 +144,13 @@ def live(
         if len(flight.record) < 2:
             err.print("[yellow]ended before two frames were flown: there is no record[/]")
             raise typer.Exit(1)
-        with Outputs() as outputs:
-            write_record(flight.record, outputs.at(path))
-            keep_json(flight.record.manifest["live"], json_file, outputs)
+        try:
+            with Outputs() as outputs:
+                write_record(flight.record, outputs.at(path))
+                keep_json(flight.record.manifest["live"], json_file, outputs)
+        except InputError as error:
+            raise recording.instead_of(error) from None
+        recording.forget()
         if json_file != "-":
             _print(flight, path)
         print_json(flight.record.manifest["live"], json_file)

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 from coupled.live.link import Measured, Order, Sample
 from coupled.live.roundtrip import RoundTrips
 from coupled.live.transport import Given, Transport
-from coupled.live.udp import reaches
+from coupled.live.udp import MOST_PACKETS, reaches
 from coupled.rig.rig import Rig
 
 EXTERNAL = 0xAF
@@ -91,6 +91,10 @@ class _Cls2Sim:
         """Return the load that the host makes for the loader, N."""
         raise NotImplementedError
 
+    def ordered_gradient(self, i: int) -> float:
+        """Return 0: what is ordered of the loader's spring is in its load."""
+        return 0.0
+
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
         """Send the orders of a frame."""
         raise NotImplementedError
@@ -115,7 +119,9 @@ class External(_Cls2Sim):
 
     def _drain(self) -> Sample | None:
         found = None
-        while packet := self._wire.receive():
+        for _ in range(MOST_PACKETS):
+            if (packet := self._wire.receive()) is None:
+                break
             if len(packet) != POSITIONS.size:
                 self.dropped["wrong length"] += 1
                 continue
@@ -125,8 +131,8 @@ class External(_Cls2Sim):
                 continue
             shares = [2.0 * positions[AXES.index(name)] - 1.0 for name in self._controls]
             places = [self._place(i, share) for i, share in enumerate(shares)]
-            found = self._sample([Measured(*one) for one in zip(self._loads, places, strict=True)])
-            self._asked = -math.inf
+            measured = [Measured(*one) for one in zip(self._loads, places, strict=True)]
+            found = self._sample(measured) or found
         return found
 
     def own_load(self, i: int, computed: float) -> float:
@@ -171,8 +177,12 @@ class Version2(_Cls2Sim):
         """Return 0: the loader has its own spring, which is scaled."""
         return 0.0
 
+    def ordered_gradient(self, i: int) -> float:
+        """Return G_B: the scale orders the whole gradient, N/d."""
+        return self._basic[i]
+
     def _drain(self) -> Sample | None:
-        self._bytes += self._wire.receive()
+        self._bytes += self._wire.receive() or b""
         found = None
         while self._due:
             kind, i = self._due[0]

@@ -45,22 +45,28 @@ class Transport:
         if self._stream:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
+        self.closed = False  # by the other end of a stream
 
     def send(self, packet: bytes) -> None:
         """Send; a wire that takes none drops it."""
         with contextlib.suppress(OSError):
             self._socket.send(packet)
 
-    def receive(self) -> bytes:
-        """Return a datagram, or what came of the stream; nothing where nothing did."""
+    def receive(self) -> bytes | None:
+        """Return a datagram, which may be empty, or bytes of the stream; None if none came."""
+        if self.closed:
+            return None
         try:
-            return self._socket.recv(4096)
+            packet = self._socket.recv(4096)
         except OSError:
-            return b""
+            return None
+        self.closed = self._stream and not packet
+        return None if self.closed else packet
 
     def wait(self, seconds: float) -> None:
         """Wait until something comes, so long at most."""
-        select.select([self._socket], [], [], max(0.0, seconds))
+        # A stream that was closed is always readable: to select it would not wait.
+        select.select([] if self.closed else [self._socket], [], [], max(0.0, seconds))
 
     def close(self) -> None:
         """Close it."""

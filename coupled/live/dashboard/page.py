@@ -8,7 +8,6 @@ import json
 import multiprocessing
 import secrets
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -131,7 +130,7 @@ class Page:
             "calibrated": {name: one.calibrated for name, one in host.service.items()},
             "adapt": host.plan.adapt,
             "services": host.services(),
-            "happened": {key: value[-8:] for key, value in asdict(host.happened).items()},
+            "happened": {key: value[-8:] for key, value in vars(host.happened).items()},
         }
         self.board_memory.say(self._state)
 
