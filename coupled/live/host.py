@@ -248,7 +248,8 @@ class Host:
             attached.order(self.aboard.controls, row)
             validity = attached.validity()
             self.rows.loader_time_s[k] = attached.time_s
-        self.rows.validity[k] = SWITCHED if validity == FRESH and self.switches.differs else validity
+        switched = validity == FRESH and self.switches.differs
+        self.rows.validity[k] = SWITCHED if switched else validity
         for i, (name, at) in enumerate(zip(self.names, self._columns, strict=True)):
             if name in self.service:
                 new = attached is None or attached.measured_now(i)
