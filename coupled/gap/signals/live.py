@@ -122,9 +122,9 @@ def live_of(record: Record) -> Live | None:
         name: clock.resampled(record[name], sampled, heard) for name in present if name in record
     }
     quiet = max(_runs(heard, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0))
+    assumed = settings.assumed()
     words = _words(frame_s, sampled, bridged, validity, other, clock)
-    said = (*words, *settings.words)
-    return Live(judged, starts, quiet, signals, settings.assumed(), said)
+    return Live(judged, starts, quiet, signals, assumed, (*words, *map(_in_words, assumed.items())))
 
 
 def judged_part(record: Record, file: object) -> Record:
@@ -244,8 +244,8 @@ class _Clock:
         rows = np.flatnonzero(sampled)
         if len(rows) < 4:
             return signal
-        rising = np.concatenate(([True], np.diff(self.at[rows]) > LEAST_STEP))
-        rows = rows[rising]
+        before = np.maximum.accumulate(self.at[rows])[:-1]
+        rows = rows[np.concatenate(([True], self.at[rows][1:] > before + LEAST_STEP))]
         moved = np.abs(self.at[rows] - rows).max() > LEAST_STEP
         if heard.all() and len(rows) == len(signal) and not moved:
             return signal
@@ -268,7 +268,6 @@ class _Settings:
         self._events = [event for event in events if event[0] <= self._time[-1]]
         self._first = _first_settings(record)
         self.known = bool(events)
-        self.words: list[str] = []
 
     def _rows(self, control: str, what: str) -> Floats | None:
         """Return a setting's value at each row; None where its first one is not known."""
@@ -306,12 +305,16 @@ class _Settings:
             used = Assumed(*(bend * on - bend[0] * on[0] for on in (estimate, gradient)))
             if used.estimate.any() or used.gradient.any():
                 found[control] = used
-                self.words.append(
-                    f"The {control}'s K̂ or corrections changed in flight (K̂ from {bend.min():.4g}"
-                    f" to {bend.max():.4g} {unit_of(control)}/N): each row is replayed with its"
-                    " own."
-                )
         return found
+
+
+def _in_words(one: tuple[str, Assumed]) -> str:
+    """Return by how much a control's K̂ changed in flight."""
+    control, used = one
+    least = min(float(used.estimate.min()), float(used.gradient.min()))
+    most = max(float(used.estimate.max()), float(used.gradient.max()))
+    span = f"{least:+.3g} to {most:+.3g} {unit_of(control)}/N"
+    return f"The {control}'s K̂ in use changed by {span} in flight: each row has its own."
 
 
 def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, str, str, float]]:

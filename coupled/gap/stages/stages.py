@@ -168,21 +168,19 @@ class Reader(Reading):
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = self._restarts(round(RESTART_s * self.rig.frame_rate))
-        drifts, assumed = self._drifts(gradient), self.assumed()
-        own_starts = every if drifts else self._restarts()
+        own_starts = every if (drifts := self._drifts(gradient)) else self._restarts()
 
         def driven(f: Floats, seen: Floats, starts: Mask = own_starts) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start."""
             nodes = Nodes(f)
             misread = computed - seen
-            restarts = bool(starts.any())
-            rate = rate_of(seen, self.rig.frame_rate) if restarts else seen
+            rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
                 scale, hum = sensed.scale(len(seen)), sensed.hum(computed)
                 still = rate
-                if restarts and isinstance(hum, np.ndarray):
+                if rate is not seen and isinstance(hum, np.ndarray):
                     still = rate - rate_of(hum, self.rig.frame_rate)
                 restart = (starts, (seen - hum) / scale, still / scale)
                 pull = sensed.force_on_nodes(nodes.of(rig), f)
@@ -190,9 +188,8 @@ class Reader(Reading):
                     pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
-                more = None if assumed is None else assumed.gradient
-                host = Hosted(services(self), self.missed.under(rig, self.control), more)
-                driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
+                made_by = (second, restart, self._hosted(rig))
+                driven_by = (pull, gradient, misread + hum, load_of(rig), *made_by)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
             return at
@@ -228,6 +225,12 @@ class Reader(Reading):
         if not walks:
             return [whole]
         return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
+
+    def _hosted(self, rig: Rig) -> Hosted:
+        """Return what the record holds of the host's work."""
+        assumed = self.assumed()
+        more = None if assumed is None else assumed.gradient
+        return Hosted(services(self), self.missed.under(rig, self.control), more)
 
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay starts as measured, and those `every` so many."""
