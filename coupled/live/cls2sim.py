@@ -59,7 +59,7 @@ class _Cls2Sim:
         self._controls = [str(control) for control in rig.controls]
         self._travels = [control.travel for control in rig.controls.values()]
         self._reaches = reaches(rig)
-        self._asked = -math.inf
+        self._asked = -math.inf  # when the host last asked, s
 
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest sample since the last call, waiting for one so long at most."""
@@ -85,7 +85,8 @@ class _Cls2Sim:
                 finite = math.isfinite(one.force) and math.isfinite(one.computed)
                 self.dropped["out of range" if finite else "not a number"] += 1
                 return None
-        return Sample(tuple(measured))
+        came_s = self._wire.came_s
+        return Sample(tuple(measured), came_s if math.isfinite(came_s) else self._asked)
 
     def own_load(self, i: int, computed: float) -> float:
         """Return the load that the host makes for the loader, N."""
@@ -151,6 +152,7 @@ class External(_Cls2Sim):
             wanted = -sign * order.force * self._given.counts_per_N
             counts[AXES.index(name)] = round(min(max(wanted, -MOST_COUNTS), MOST_COUNTS))
             self._loads[i] = order.force
+        self._asked = time.monotonic()
         self._wire.send(FORCES.pack(EXTERNAL, *counts))
 
 

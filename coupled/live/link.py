@@ -24,11 +24,12 @@ class Measured(NamedTuple):
 class Sample(NamedTuple):
     """What a loader measured at one time, a control each, in the rig's order.
 
-    `time_s` is that time by the loader's own clock; NaN on a wire that does not give it.
+    `time_s` is that time by the loader's own clock. On a wire that does not give it, it is when the
+    host's system took the answer in, or where the system does not tell, when the host asked.
     """
 
     controls: tuple[Measured, ...]
-    time_s: float = math.nan
+    time_s: float
 
 
 class Order(NamedTuple):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import select
 import socket
 from dataclasses import dataclass
 
 from coupled.errors import InputError
+from coupled.live.roundtrip import ask_for_stamps, receive
 from coupled.live.udp import resolved
 
 
@@ -46,6 +48,8 @@ class Transport:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
         self.closed = False  # by the other end of a stream
+        self._stamped = ask_for_stamps(self._socket)
+        self.came_s = math.nan  # when the system took in what was received last; NaN if unknown
 
     def send(self, packet: bytes) -> None:
         """Send; a wire that takes none drops it."""
@@ -57,9 +61,10 @@ class Transport:
         if self.closed:
             return None
         try:
-            packet = self._socket.recv(4096)
+            packet, _, came_ns = receive(self._socket, 4096, self._stamped)
         except OSError:
             return None
+        self.came_s = 1e-9 * came_ns if self._stamped else math.nan
         self.closed = self._stream and not packet
         return None if self.closed else packet
 
