@@ -43,7 +43,6 @@ WRITE = struct.Struct("<3iH")
 SCALES = (20, 999)
 AXES = ("column", "wheel", "pedals")  # elevator, aileron, rudder: bits 0x01 and 0x02 of v2
 MOST_COUNTS = 2**31 - 1
-ASK_AGAIN_s = 0.1
 
 
 class _Cls2Sim:
@@ -74,10 +73,13 @@ class _Cls2Sim:
     def _drain(self) -> Sample | None:
         raise NotImplementedError
 
+    def _sign(self, i: int) -> float:
+        """Return −1 for a control whose axis counts the other way, positions and forces alike."""
+        return -1.0 if self._controls[i] in self._given.turn else 1.0
+
     def _place(self, i: int, share: float) -> float:
         """Return δc of control i in d, from its position as a share of the travel, −1 to 1."""
-        sign = -1.0 if self._controls[i] in self._given.turn else 1.0
-        return sign * share * self._travels[i]
+        return self._sign(i) * share * self._travels[i]
 
     def _sample(self, measured: Sequence[Measured]) -> Sample | None:
         for one, reach in zip(measured, self._reaches, strict=True):
@@ -148,8 +150,7 @@ class External(_Cls2Sim):
         """Send the load of each axis: it pushes back, so against the deflection."""
         counts = [0, 0, 0, 0]
         for i, (name, order) in enumerate(zip(self._controls, orders, strict=True)):
-            sign = -1.0 if name in self._given.turn else 1.0
-            wanted = -sign * order.force * self._given.counts_per_N
+            wanted = -self._sign(i) * order.force * self._given.counts_per_N
             counts[AXES.index(name)] = round(min(max(wanted, -MOST_COUNTS), MOST_COUNTS))
             self._loads[i] = order.force
         self._asked = time.monotonic()
@@ -208,16 +209,18 @@ class Version2(_Cls2Sim):
 
     def _measured(self, i: int) -> Measured:
         counts, share = self._read[i]
-        force = counts / self._given.counts_per_N
+        force = self._sign(i) * counts / self._given.counts_per_N
         return Measured(force, self._place(i, share) if abs(share) <= 1.05 else math.nan)
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Ask for force and position, and set the scale where it has changed."""
-        now = time.monotonic()
-        if self._due and now - self._asked < ASK_AGAIN_s:
-            return  # what was asked for last is not answered yet
-        self._due.clear()
-        self._asked, self._bytes = now, b""
+        """Ask for force and position, and set the scale where it has changed.
+
+        Answers do not say what they answer: they come in the order of the questions, however late.
+        So nothing more is asked for while an answer is due.
+        """
+        if self._due:
+            return
+        self._asked = time.monotonic()
         for i, order in enumerate(orders):
             share = (self._basic[i] + order.gradient) / self._given.profile
             scale = round(min(max(self._given.scale * share, SCALES[0]), SCALES[1]))

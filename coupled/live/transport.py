@@ -18,7 +18,7 @@ class Given:
     """What a user has to say of a loader, for which no source has it.
 
     counts_per_N  the protocol's number for a newton; negative where it counts the other way
-    turn          the controls whose position counts the other way
+    turn          the controls whose axis counts the other way: positions and forces
     profile       gradient of the loader's own force profile, N/d, at `scale`; v2 only
     """
 

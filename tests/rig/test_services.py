@@ -13,7 +13,8 @@ from coupled.flight.conditions import Conditions
 from coupled.flight.event import Event
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
-from coupled.flight.pilot import Step
+from coupled.flight.pilot import ForceTable, Step
+from coupled.flight.pilot.base import Pilot
 from coupled.record.record import Record
 from coupled.rig.packing import pack
 from coupled.rig.serving import LED, check_led, lead, led, noted, service_channels, services_of
@@ -33,11 +34,14 @@ STRAIGHT = {
 def flown(
     services: dict[str, float] | None = None,
     events: dict[str, dict[str, Any]] | None = None,
-    force_N: float = 20.0,
+    force_N: float | Pilot = 20.0,
     seconds: float = 4.0,
     rig: dict[str, Any] | None = None,
 ) -> Record:
-    """Return a bench's record under a force from 0.5 s on, with services and what leads them."""
+    """Return a bench's record, with services and what leads them.
+
+    The force is held from 0.5 s on, or a pilot's.
+    """
     given = {f"{PLACE}.services.{key}": value for key, value in (services or {}).items()}
     whole = bench({**STRAIGHT, **given, **(rig or {})})
     found = {
@@ -45,7 +49,7 @@ def flown(
         for name, keys in (events or {}).items()
     }
     at = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[PRESSURE])
-    pull = Step(force_N=force_N, start_s=0.5)
+    pull = Step(force_N=force_N, start_s=0.5) if isinstance(force_N, float) else force_N
     conditions = Conditions(event=found)
     return fly(Manoeuvre(whole, {"column": pull}, seconds, bench=at, conditions=conditions))
 
@@ -121,6 +125,19 @@ def test_an_autopilot_lets_go_of_a_hand_that_holds_on() -> None:
     assert at(record, "autopilot", 1.7) == 0.0
     assert at(record, "computed_m", 5.9) == pytest.approx(60.0 / G, rel=1e-3)
     assert at(flown(held, events, 45.0), "autopilot", 3.9) == 1.0
+
+
+def test_a_hand_that_lets_go_in_between_has_to_hold_for_the_whole_time_again() -> None:
+    """Of 1 s that an override takes: 0.7 s, a pause, 0.7 s do not; 1.2 s at a stretch do."""
+    held = {**DRIVEN, "override_time_s": 1.0}
+    events = {"engage": {"service": "autopilot", "at_s": 0.1}}
+    times = [0.0, 0.5, 0.51, 1.2, 1.21, 1.7, 1.71, 2.4, 2.41, 5.0]
+    forces = [0.0, 0.0, 60.0, 60.0, 0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
+    twice = ForceTable(time_s=times, force_N=forces)
+    assert at(flown(held, events, twice), "autopilot", 3.9) == 1.0
+    times, forces = [0.0, 0.5, 0.51, 1.71, 1.72, 5.0], [0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
+    once = ForceTable(time_s=times, force_N=forces)
+    assert at(flown(held, events, once), "autopilot", 3.9) == 0.0
 
 
 def test_an_autopilot_engages_where_the_control_is() -> None:
