@@ -1,7 +1,8 @@
 """Live flights with a loader that is not this package's: it dies, loses answers, or softens.
 
 Its physics and its end of the protocol are its own (`tests/data/cases/live-clients/loader.py`). The
-flights are in real time, so these tests are slow.
+flights are in lock-step, so that a busy machine loses no more samples than the loader is told to;
+what real time adds, samples at uneven times, is in `tests/gap/test_live_record.py`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import pytest
 from coupled.api.gaps import diagnose
 from coupled.api.rigs import load_rig
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.live import attached
 from coupled.live.hands import LiveHand
 from coupled.live.host import Plan
 from coupled.live.link import RUN, Order, WATCHDOG_s
@@ -44,24 +46,26 @@ def loader(*words: str) -> Iterator[int]:
 
 
 def flown(seconds: float, *words: str, adapt: bool = False) -> Record:
-    """Return the record of a flight in real time with the loader."""
-    with loader(*words) as port:
-        link = UdpLink("127.0.0.1", port, RIG)
+    """Return the record of a flight with the loader."""
+    with loader("--lockstep", *words) as port:
+        link = UdpLink("127.0.0.1", port, RIG, lockstep=True)
         manoeuvre = Manoeuvre(RIG, {"column": LiveHand()}, seconds)
-        return fly_live(manoeuvre, Plan(link=link, adapt=adapt)).record
+        return fly_live(manoeuvre, Plan(paced=False, link=link, adapt=adapt)).record
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seconds", "words", "said"),
     [
-        (20.0, ("--die", "12"), "in which the loader sent no new sample"),
+        (60.0, ("--die", "12"), "in which the loader sent no new sample"),
         (30.0, ("--drop", "0.02"), "samples did not come"),
     ],
 )
 def test_a_healthy_loader_that_dies_or_loses_answers_has_no_gap(
-    seconds: float, words: tuple[str, ...], said: str
+    seconds: float, words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(attached, "WATCHDOG_s", 0.03)  # of real time: an answer is waited for
+    monkeypatch.setattr(attached, "GONE_s", 1.0)
     record = flown(seconds, *words)
     found = diagnose(RIG, record)
     assert found.verdict == "no_gap", found.summary

@@ -1,11 +1,11 @@
-"""A loader of the open protocol in real time, of its own physics and with its own clock.
+"""A loader of the open protocol, of its own physics and with its own clock.
 
     python loader.py [--port PORT] [--drop SHARE] [--die SECONDS] [--soften SECONDS FACTOR]
 
 It is a column of 4 kg in front of a structure of 9.136e-5 m/N, moved by a sum of sines. It prints
 the port that it took, a free one for 0. `--drop` loses so many of its answers, `--die` ends it
 without a word, `--soften` multiplies its structure's K from then on, and `--seconds` ends it; times
-are those of its own clock.
+are those of its own clock. That is real time, or with `--lockstep` a frame an order.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import time
 import zlib
 
 HEADER, STATE, ORDER = struct.Struct("<4sBBBBIIIQ"), struct.Struct("<3f"), struct.Struct("<7f")
+FRAME_s = 1.0 / 120.0
 STEP_s, MASS_kg, DAMPING, BASIC_N_per_m, BEND_m_per_N = 1.0 / 2400.0, 4.0, 75.0, 560.4, 9.136e-5
 SERVO_rad_per_s, SERVO_RATIO = 2.0 * math.pi * 18.0, 0.7
 TONES_Hz, FORCE_N, RESTS_s, SILENT_s = (0.13, 0.29, 0.53, 0.97, 1.7), 12.0, 2.0, 0.1
@@ -78,8 +79,9 @@ def serve(words: argparse.Namespace) -> None:
     while time.perf_counter() - begun < words.seconds:
         select.select([wire], [], [], 0.0005)
         if started is not None:
-            column.run(now := time.perf_counter() - started)
-            if now > words.die:
+            now = time.perf_counter() - started
+            column.run(column.time_s if words.lockstep else now)
+            if column.time_s > words.die:
                 return
             if now - heard > SILENT_s:
                 session, column.gradient = None, 0.0
@@ -96,6 +98,8 @@ def serve(words: argparse.Namespace) -> None:
         started = time.perf_counter() if started is None else started
         heard = time.perf_counter() - started
         column.gradient = ORDER.unpack_from(packet, HEADER.size)[0]
+        if words.lockstep:
+            column.run(column.time_s + FRAME_s - 0.5 * STEP_s)
         if noise.random() < words.drop:
             continue
         sent += 1
@@ -107,6 +111,7 @@ def serve(words: argparse.Namespace) -> None:
 if __name__ == "__main__":
     asked = argparse.ArgumentParser()
     asked.add_argument("--port", type=int, default=0)
+    asked.add_argument("--lockstep", action="store_true")
     for option, usual in (("--drop", 0.0), ("--die", 1e9), ("--seconds", 100.0)):
         asked.add_argument(option, type=float, default=usual)
     asked.add_argument("--soften", nargs=2, type=float, default=(1e9, 1.0))
