@@ -118,8 +118,7 @@ def _so_far(
     """
     data, noise = flown
     if noise is None:
-        rows = data[first:last].copy(), None
-        return _flown(manoeuvre, channels, rows, beside, None, first)
+        return _flown(manoeuvre, channels, (data[first:last].copy(), None), beside, None, first)
     span = 3 + math.ceil(max(abs(frames) for frames in lateness(manoeuvre.rig).values()))
     begin = max(0, first - span)
     rows = data[begin:last].copy(), noise[begin:last]

@@ -262,7 +262,7 @@ class Host:
     ) -> None:
         estimator = self.service[name]
         alarmed = estimator.now.alarm
-        found = estimator.look(force, computed, deflection, new)
+        found = estimator.look(force, computed, deflection, fresh=new)
         if found.alarm and not alarmed and found.bend is not None:
             self.happened.alarms.append((self.time_s, name, found.bend))
             self.plan.warn(f"K of the {name} is no longer the calibrated one")

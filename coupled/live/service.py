@@ -80,7 +80,7 @@ class BendEstimator:
         self.now = ServiceBend(None, None, 0.0, True, False)
 
     def look(
-        self, force: float, computed: float, deflection: float, fresh: bool = True
+        self, force: float, computed: float, deflection: float, *, fresh: bool = True
     ) -> ServiceBend:
         """Take a frame's F in N, δc and δ in d, and return the estimate.
 

@@ -128,7 +128,7 @@ def test_spells_of_an_older_record_are_known_by_its_manifest() -> None:
 
 @pytest.mark.parametrize("factor", [0.0, 1e-3, 1000.0])
 def test_a_clock_in_another_unit_is_not_used_and_that_is_said(factor: float) -> None:
-    record = made(factor * np.arange(ROWS) / RATE_Hz)
+    record = made(np.asarray(factor * np.arange(ROWS) / RATE_Hz, dtype=np.float64))
     live = judged_of(record)
     assert np.array_equal(live.signals[FORCE], record[FORCE])
     assert "clock" in live.left_out[0]
@@ -215,6 +215,6 @@ def test_a_host_that_was_switched_in_flight_has_no_gap() -> None:
     found = diagnose(load_rig("report-column"), flight.record)
     gaps = {stage.name: stage.gap for stage in found.stages}
     assert found.verdict == "no_gap", gaps
-    assert gaps["compensation"] < 0.1
+    assert (gaps["compensation"] or 0.0) < 0.1
     assert "K̂ in use changed" in found.summary
     assert found.as_dict()["left_out"]

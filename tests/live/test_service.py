@@ -74,15 +74,15 @@ def test_a_sample_that_is_repeated_teaches_nothing() -> None:
     force, computed = moved(2400)
     deflection = servoed(computed) + K * force
     estimator = BendEstimator(COLUMN, FRAME_s)
-    for sample in zip(force[:1500], computed, deflection, strict=False):
-        estimator.look(*map(float, sample))
+    for f, c, d in zip(force[:1500], computed, deflection, strict=False):
+        estimator.look(float(f), float(c), float(d))
     before = estimator.now
     for _ in range(500):  # the loader is lost: its last sample is repeated
-        estimator.look(*map(float, sample), fresh=False)
+        estimator.look(float(f), float(c), float(d), fresh=False)
     assert estimator.now.bend == before.bend
     assert estimator.now.frozen
-    for sample in zip(force[2000:], computed[2000:], deflection[2000:], strict=True):
-        estimator.look(*map(float, sample))
+    for f, c, d in zip(force[2000:], computed[2000:], deflection[2000:], strict=True):
+        estimator.look(float(f), float(c), float(d))
     assert not estimator.now.frozen
     assert estimator.now.bend == pytest.approx(K, rel=2e-3)
 
