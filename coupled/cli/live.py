@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from coupled.live.dashboard.page import Page
     from coupled.live.hands import Wishes
     from coupled.live.host import Watcher
+    from coupled.live.recording import Recording
     from coupled.live.session import LiveFlight
 
 _EXAMPLES = (
@@ -91,14 +92,16 @@ def live(
 ) -> None:
     """Fly in real time, with a loader, a hand and views attached; q or Ctrl-C ends it.
 
-    The record has the format of `coupled fly`, whole up to the frame at which it ended.
+    The record has the format of `coupled fly`, whole up to the frame at which it ended. It grows
+    on disk while the flight goes on, so that a computer that fails leaves all but the last second.
     """
     from coupled.live.attach import open_link, rig_live, run_live
     from coupled.live.host import Plan
     from coupled.live.keys import Keys
+    from coupled.live.recording import Recording
     from coupled.live.safety import Limits
     from coupled.live.session import fly_live
-    from coupled.record.record import check_suffix, manifest_path, write_record
+    from coupled.record.record import write_record
 
     if bool(run) == bool(rig):
         raise InputError("coupled live", "", "give a run, or --rig RIG, one of the two")
@@ -109,11 +112,7 @@ def live(
         raise InputError("--hand", "page", "needs --dashboard")
     flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)
     path = output or Path("out") / f"{flown.name}.csv"
-    check_suffix(path)
-    inputs = _inputs(flown)
-    for target in (path, manifest_path(path)):
-        check_target(target, inputs)
-    check_json(json_file, [*inputs, path, manifest_path(path)])
+    _check_targets(flown, path, json_file)
     say_stale(flown.rig)
     limits = Limits(_positive("--force-limit", force_limit), _positive("--rate-limit", rate_limit))
     warn = _Warner()
@@ -122,6 +121,7 @@ def live(
         ending.callback(keys.close)
         watchers: list[Watcher] = [keys]
         watchers += _views(flightgear, xplane)
+        watchers.append(recording := Recording(path, warn))
         page = _page(flown, bind, port, ending) if dashboard else None
         if page is not None:
             watchers.append(page)
@@ -137,12 +137,7 @@ def live(
             save=lambda record: write_record(record, _so_far(path)),
         )
         flight = fly_live(flown, plan)
-        if len(flight.record) < 2:
-            err.print("[yellow]ended before two frames were flown: there is no record[/]")
-            raise typer.Exit(1)
-        with Outputs() as outputs:
-            write_record(flight.record, outputs.at(path))
-            keep_json(flight.record.manifest["live"], json_file, outputs)
+        _write(flight, path, json_file, recording)
         if json_file != "-":
             _print(flight, path)
         print_json(flight.record.manifest["live"], json_file)
@@ -163,6 +158,35 @@ class _Warner:
         err.print(f"[yellow]{escape(text)}[/]", soft_wrap=True)
         if self.page is not None:
             self.page.warn(text)
+
+
+def _check_targets(flown: Manoeuvre, path: Path, json_file: str) -> None:
+    """Refuse files that could not be written, before the flight that they are to hold."""
+    from coupled.live.recording import recording_path
+    from coupled.record.record import check_suffix, manifest_path
+
+    check_suffix(path)
+    inputs, growing = _inputs(flown), recording_path(path)
+    targets = list(dict.fromkeys((path, manifest_path(path), growing, manifest_path(growing))))
+    for target in targets:
+        check_target(target, inputs)
+    check_json(json_file, [*inputs, *targets])
+
+
+def _write(flight: LiveFlight, path: Path, json_file: str, recording: Recording) -> None:
+    """Write the whole record in place of the one that grew while it was flown."""
+    from coupled.record.record import write_record
+
+    if len(flight.record) < 2:
+        err.print("[yellow]ended before two frames were flown: there is no record[/]")
+        raise typer.Exit(1)
+    try:
+        with Outputs() as outputs:
+            write_record(flight.record, outputs.at(path))
+            keep_json(flight.record.manifest["live"], json_file, outputs)
+    except InputError as error:
+        raise recording.instead_of(error) from None
+    recording.forget()
 
 
 def _so_far(path: Path) -> Path:

@@ -26,7 +26,7 @@ class Aboard:
     script    the hands' force in N and held deflection on all nodes, shape (n, 2, nodes)
     data      the record, shape (frames, channels); rows to come hold noise
     hands     what each pilot's hand is, by the control
-    so_far    the record of so many frames, while the flight goes on
+    so_far    the record from one frame up to another, while the flight goes on
     """
 
     manoeuvre: Manoeuvre
@@ -36,7 +36,7 @@ class Aboard:
     script: Floats
     data: Floats
     hands: dict[str, Hand]
-    so_far: Callable[[int], Record]
+    so_far: Callable[[int, int], Record]
 
 
 class Companion(Protocol):

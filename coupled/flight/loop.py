@@ -7,6 +7,7 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -108,11 +109,21 @@ def _so_far(
     channels: tuple[str, ...],
     flown: tuple[Floats, Floats | None],
     beside: tuple[Served, Sequence[tuple[float, ...]]],
-    rows: int,
+    first: int,
+    last: int,
 ) -> Record:
-    """Return the record of the first rows of a flight that goes on."""
+    """Return the record from frame `first` to before `last` of a flight that goes on.
+
+    A channel that is stamped early needs rows that are still to come: the record ends before.
+    """
     data, noise = flown
-    return _flown(manoeuvre, channels, (data[:rows].copy(), noise), beside, None)
+    if noise is None:
+        return _flown(manoeuvre, channels, (data[first:last].copy(), None), beside, None, first)
+    span = 3 + math.ceil(max(abs(frames) for frames in lateness(manoeuvre.rig).values()))
+    begin = max(0, first - span)
+    rows = data[begin:last].copy(), noise[begin:last]
+    record = _flown(manoeuvre, channels, rows, beside, None, begin)
+    return record.rows(first - begin, max(first, last - span) - begin)
 
 
 def _flown(
@@ -121,17 +132,22 @@ def _flown(
     flown: tuple[Floats, Floats | None],
     beside: tuple[Served, Sequence[tuple[float, ...]]],
     ended: EndedEarly | None,
+    first: int = 0,
 ) -> Record:
-    """Return the record of the frames flown, with their noise, up to the first without a number."""
+    """Return the record of the frames flown, with their noise, up to the first without a number.
+
+    Its first row is frame `first`.
+    """
     (data, noise), (served, extra), properties = flown, beside, manoeuvre.record_properties
     data, ended = _finite(data, manoeuvre.rig.frame_rate, ended)
     if noise is not None:
         stamp(manoeuvre.rig, channels, data, noise[: len(data)])
-    more, data = served.beside(data)
+    more, data = served.beside(data, first)
     channels = (*channels, *more)
     if properties:
         channels = (*channels, *properties)
-        data = np.column_stack((data, np.reshape(extra[: len(data)], (len(data), -1))))
+        own = extra[first : first + len(data)]
+        data = np.column_stack((data, np.reshape(own, (len(data), -1))))
     return Record(channels, data, manifest(manoeuvre, channels, data, ended))
 
 

@@ -57,14 +57,15 @@ class Served:
 
         return served
 
-    def beside(self, data: Floats) -> tuple[tuple[str, ...], Floats]:
-        """Return the services' channels, and a record's rows with them behind.
+    def beside(self, data: Floats, first: int = 0) -> tuple[tuple[str, ...], Floats]:
+        """Return the services' channels, and a record's rows from frame `first` with them behind.
 
-        Of a control that has none those are left out, unless one of them was led.
+        Of a control that has none those are left out, unless one of them was led by then.
         """
-        rows = self._rows[: len(data)]
+        flown = self._rows[: first + len(data)]
+        rows = flown[first:]
         kept = [
-            name in self._always or bool(rows[:, i, _RESTING].any())
+            name in self._always or bool(flown[:, i, _RESTING].any())
             for i, name in enumerate(self._which)
         ]
         names = [name for name, has in zip(self._which, kept, strict=True) if has]

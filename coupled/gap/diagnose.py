@@ -27,6 +27,7 @@ from coupled.gap.search.descent import Descent
 from coupled.gap.search.search import search
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
+from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
 from coupled.gap.stages.imposed import under_motion
@@ -74,6 +75,8 @@ def _diagnose(
         case = Case(rig, control, well.outputs)
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
+    live = [one for one in map(live_of, records.values()) if one is not None]
+    records = {file: judged_part(record, file) for file, record in records.items()}
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
@@ -144,6 +147,7 @@ def _diagnose(
         choice=choice,
         baseline=baseline,
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
+        left_out=tuple(dict.fromkeys(words for one in live for words in one.left_out)),
     )
 
 

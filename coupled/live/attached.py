@@ -12,9 +12,9 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.flight.companion import Aboard
-from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, WATCHDOG_s
-from coupled.live.safety import Fade, Limiter, Limits
-from coupled.record.channels import channel
+from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, Sample, WATCHDOG_s
+from coupled.live.safety import Fade, Limiter, Limits, Plausibility
+from coupled.record.channels import FADED, FRESH, LOST, REPEATED, channel
 from coupled.rig.placed import Placed
 
 ANSWER_s = 10.0  # how long the host waits for a loader's first answer
@@ -26,10 +26,15 @@ _IDLE = Order(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass
 class Losses:
-    """When a loader was not heard: from when to when, s; and frames without a new packet."""
+    """When a loader could not be used, each from when to when, s.
+
+    `spells` are without an answer, `stale_frames` counts the frames without a new sample, and
+    `implausible` are those in which what a control measured could not be true, and why.
+    """
 
     spells: list[list[float | None]] = field(default_factory=list)
     stale_frames: int = 0
+    implausible: list[dict[str, Any]] = field(default_factory=list)
 
 
 class Attached:
@@ -46,7 +51,13 @@ class Attached:
         self._rig = rig = aboard.manoeuvre.rig
         self.link, self._aboard, self._paced, self._warn = link, aboard, paced, warn
         self.frame_s = 1.0 / rig.frame_rate
-        self._limiters = [Limiter(limits, c.travel, self.frame_s) for c in rig.controls.values()]
+        controls = list(rig.controls.values())
+        self._limiters = [
+            Limiter(limits, control.travel, self.frame_s, link.ordered_gradient(i))
+            for i, control in enumerate(controls)
+        ]
+        self._plausible = [Plausibility(c, self.frame_s, link.measures_force) for c in controls]
+        self._faults: list[dict[str, Any] | None] = [None] * len(controls)
         self._fade = Fade(limits.fade_s, self.frame_s)
         names, at = list(rig.controls), aboard.channels.index
         self._force_at = [at(channel(name, "modifying_force")) for name in names]
@@ -55,6 +66,9 @@ class Attached:
         self._measured: tuple[Measured, ...] = (Measured(0.0, 0.0, 0.0),) * len(names)
         self._orders = (_IDLE,) * len(names)
         self._seen = 0.0
+        self._fresh = False  # the last look brought a new sample
+        self._measures = [False] * len(names)  # whether δ of each control came with it
+        self.time_s = math.nan  # of the last sample, by the loader's clock
         self.lost = False
         self.losses = Losses()
 
@@ -71,7 +85,7 @@ class Attached:
             if time.monotonic() - begun > ANSWER_s:
                 problem = f"does not answer within {ANSWER_s:g} s; start the loader first"
                 raise InputError(self.link.name, "", problem)
-        self._take(sample.controls)
+        self._take(sample)
         self._check_rest()
         controls = self._aboard.controls.copy()
         row = np.zeros((1, len(self._aboard.channels)))
@@ -109,14 +123,18 @@ class Attached:
         """Take the loader's newest sample; return why the flight is to end, if it is."""
         sample = self.link.receive(0.0 if self._paced else WATCHDOG_s)
         now = time.monotonic()
+        self._fresh = sample is not None
         if sample is not None:
-            self._take(sample.controls)
+            self._take(sample)
+            self._judge(sample, time_s)
             if self.lost:
                 self.lost = False
                 self.losses.spells[-1][1] = time_s
                 self._warn("the loader answers again: its forces come back")
         else:
             self.losses.stale_frames += 1
+            for plausible in self._plausible:
+                plausible.miss()
             if not self.lost and now - self._seen > WATCHDOG_s:
                 self.lost = True
                 self.losses.spells.append([time_s, None])
@@ -126,13 +144,45 @@ class Attached:
         self._put(self._aboard.controls)
         return ""
 
-    def _take(self, measured: tuple[Measured, ...]) -> None:
+    def _take(self, sample: Sample) -> None:
         """Take what was measured; where δ was not, the last one stands."""
-        self._seen = time.monotonic()
+        self._seen, self.time_s = time.monotonic(), sample.time_s
+        self._measures = [math.isfinite(now.deflection) for now in sample.controls]
         self._measured = tuple(
-            now if math.isfinite(now.deflection) else now._replace(deflection=last.deflection)
-            for now, last in zip(measured, self._measured, strict=True)
+            now if known else now._replace(deflection=last.deflection)
+            for now, last, known in zip(
+                sample.controls, self._measured, self._measures, strict=True
+            )
         )
+
+    def _judge(self, sample: Sample, time_s: float) -> None:
+        """Fade the forces while what a control measures cannot be true, and say so once."""
+        for i, (name, now) in enumerate(zip(self._rig.controls, sample.controls, strict=True)):
+            known = now if self.link.measures_deflection else now._replace(deflection=math.nan)
+            before, found = self._faults[i], self._plausible[i].look(known)
+            if found == ("" if before is None else before["why"]):
+                continue
+            if before is not None:
+                before["to_s"] = time_s
+            if found:
+                spell = {"control": str(name), "why": found, "from_s": time_s, "to_s": None}
+                self._faults[i] = spell
+                self.losses.implausible.append(spell)
+                self._warn(f"all forces go: the {name} cannot be trusted, since {found}")
+            else:
+                self._faults[i] = None
+                self._warn(f"what the {name} measures agrees again: the forces come back")
+
+    def measured_now(self, i: int) -> bool:
+        """Tell whether the last look brought a new sample of control i, with its δ."""
+        return self._fresh and self._measures[i]
+
+    def validity(self) -> int:
+        """Return how far the frame's row can be used, as `coupled.record.channels` lists it."""
+        if not self._fresh:
+            return LOST if self.lost else REPEATED
+        held = self._fade.share < 1.0 or any(limiter.cut for limiter in self._limiters)
+        return FADED if held else FRESH
 
     def _put(self, controls: Any) -> None:
         """Give the kernels what was measured; a loader that is lost stays where it was."""
@@ -143,7 +193,7 @@ class Attached:
 
     def order(self, controls: Any, row: Any) -> None:
         """Send what a frame asks of the loader; the row gets what was sent, and δ as measured."""
-        share, orders = self._fade.move(not self.lost), []
+        share, orders = self._fade.move(not self.lost and not any(self._faults)), []
         for i, limiter in enumerate(self._limiters):
             m = controls["state"]["modification"][i]
             own = self.link.own_load(i, self._measured[i].computed)

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 from coupled.live.link import Measured, Order, Sample
 from coupled.live.roundtrip import RoundTrips
 from coupled.live.transport import Given, Transport
-from coupled.live.udp import reaches
+from coupled.live.udp import MOST_PACKETS, reaches
 from coupled.rig.rig import Rig
 
 EXTERNAL = 0xAF
@@ -43,7 +43,6 @@ WRITE = struct.Struct("<3iH")
 SCALES = (20, 999)
 AXES = ("column", "wheel", "pedals")  # elevator, aileron, rudder: bits 0x01 and 0x02 of v2
 MOST_COUNTS = 2**31 - 1
-ASK_AGAIN_s = 0.1
 
 
 class _Cls2Sim:
@@ -59,7 +58,7 @@ class _Cls2Sim:
         self._controls = [str(control) for control in rig.controls]
         self._travels = [control.travel for control in rig.controls.values()]
         self._reaches = reaches(rig)
-        self._asked = -math.inf
+        self._asked = -math.inf  # when the host last asked, s
 
     def receive(self, wait_s: float) -> Sample | None:
         """Return the newest sample since the last call, waiting for one so long at most."""
@@ -74,10 +73,13 @@ class _Cls2Sim:
     def _drain(self) -> Sample | None:
         raise NotImplementedError
 
+    def _sign(self, i: int) -> float:
+        """Return −1 for a control whose axis counts the other way, positions and forces alike."""
+        return -1.0 if self._controls[i] in self._given.turn else 1.0
+
     def _place(self, i: int, share: float) -> float:
         """Return δc of control i in d, from its position as a share of the travel, −1 to 1."""
-        sign = -1.0 if self._controls[i] in self._given.turn else 1.0
-        return sign * share * self._travels[i]
+        return self._sign(i) * share * self._travels[i]
 
     def _sample(self, measured: Sequence[Measured]) -> Sample | None:
         for one, reach in zip(measured, self._reaches, strict=True):
@@ -85,11 +87,16 @@ class _Cls2Sim:
                 finite = math.isfinite(one.force) and math.isfinite(one.computed)
                 self.dropped["out of range" if finite else "not a number"] += 1
                 return None
-        return Sample(tuple(measured))
+        came_s = self._wire.came_s
+        return Sample(tuple(measured), came_s if math.isfinite(came_s) else self._asked)
 
     def own_load(self, i: int, computed: float) -> float:
         """Return the load that the host makes for the loader, N."""
         raise NotImplementedError
+
+    def ordered_gradient(self, i: int) -> float:
+        """Return 0: what is ordered of the loader's spring is in its load."""
+        return 0.0
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
         """Send the orders of a frame."""
@@ -115,7 +122,9 @@ class External(_Cls2Sim):
 
     def _drain(self) -> Sample | None:
         found = None
-        while packet := self._wire.receive():
+        for _ in range(MOST_PACKETS):
+            if (packet := self._wire.receive()) is None:
+                break
             if len(packet) != POSITIONS.size:
                 self.dropped["wrong length"] += 1
                 continue
@@ -125,8 +134,8 @@ class External(_Cls2Sim):
                 continue
             shares = [2.0 * positions[AXES.index(name)] - 1.0 for name in self._controls]
             places = [self._place(i, share) for i, share in enumerate(shares)]
-            found = self._sample([Measured(*one) for one in zip(self._loads, places, strict=True)])
-            self._asked = -math.inf
+            measured = [Measured(*one) for one in zip(self._loads, places, strict=True)]
+            found = self._sample(measured) or found
         return found
 
     def own_load(self, i: int, computed: float) -> float:
@@ -141,10 +150,10 @@ class External(_Cls2Sim):
         """Send the load of each axis: it pushes back, so against the deflection."""
         counts = [0, 0, 0, 0]
         for i, (name, order) in enumerate(zip(self._controls, orders, strict=True)):
-            sign = -1.0 if name in self._given.turn else 1.0
-            wanted = -sign * order.force * self._given.counts_per_N
+            wanted = -self._sign(i) * order.force * self._given.counts_per_N
             counts[AXES.index(name)] = round(min(max(wanted, -MOST_COUNTS), MOST_COUNTS))
             self._loads[i] = order.force
+        self._asked = time.monotonic()
         self._wire.send(FORCES.pack(EXTERNAL, *counts))
 
 
@@ -171,8 +180,12 @@ class Version2(_Cls2Sim):
         """Return 0: the loader has its own spring, which is scaled."""
         return 0.0
 
+    def ordered_gradient(self, i: int) -> float:
+        """Return G_B: the scale orders the whole gradient, N/d."""
+        return self._basic[i]
+
     def _drain(self) -> Sample | None:
-        self._bytes += self._wire.receive()
+        self._bytes += self._wire.receive() or b""
         found = None
         while self._due:
             kind, i = self._due[0]
@@ -196,16 +209,18 @@ class Version2(_Cls2Sim):
 
     def _measured(self, i: int) -> Measured:
         counts, share = self._read[i]
-        force = counts / self._given.counts_per_N
+        force = self._sign(i) * counts / self._given.counts_per_N
         return Measured(force, self._place(i, share) if abs(share) <= 1.05 else math.nan)
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Ask for force and position, and set the scale where it has changed."""
-        now = time.monotonic()
-        if self._due and now - self._asked < ASK_AGAIN_s:
-            return  # what was asked for last is not answered yet
-        self._due.clear()
-        self._asked, self._bytes = now, b""
+        """Ask for force and position, and set the scale where it has changed.
+
+        Answers do not say what they answer: they come in the order of the questions, however late.
+        So nothing more is asked for while an answer is due.
+        """
+        if self._due:
+            return
+        self._asked = time.monotonic()
         for i, order in enumerate(orders):
             share = (self._basic[i] + order.gradient) / self._given.profile
             scale = round(min(max(self._given.scale * share, SCALES[0]), SCALES[1]))

@@ -22,14 +22,16 @@ from coupled.live.hands import Follower, Wishes
 from coupled.live.link import Link
 from coupled.live.measured import only_measured
 from coupled.live.pacing import Pacer
+from coupled.live.rows import Rows
 from coupled.live.safety import Limits
 from coupled.live.service import Adaptation, BendEstimator
 from coupled.live.switches import Switches
-from coupled.record.channels import channel
+from coupled.record.channels import FRESH, SWITCHED, channel
 from coupled.record.record import Record
 from coupled.rig.serving import check_led, lead, led, services_of
 
 STOPPED = "stopped"
+SAVE_EVERY_s = 5.0  # to write a record takes a part of the processor that frames need, too
 Motion = tuple[float, ...]
 
 
@@ -69,7 +71,7 @@ class Plan:
     `paced` is real time, else lock-step: as fast as the loader answers. `link` is a real loader;
     without it `wishes` moves the hands on the simulated one. `adapt` gives K of service to the
     compensation. `warn` hears what a pilot must know at once; `save` takes a record so far, in a
-    thread.
+    thread, and may raise InputError.
     """
 
     paced: bool = True
@@ -105,6 +107,7 @@ class Host:
         self.first_place = False  # whether the system granted real-time priority
         self.aboard: Aboard | None = None
         self._saving: threading.Thread | None = None
+        self._next_save_s = 0.0
 
     def board(self, aboard: Aboard) -> None:
         """Begin, with the aircraft in trim: meet the loader and let its forces in."""
@@ -114,6 +117,7 @@ class Host:
         self.substeps, controls = rig.substeps, list(rig.controls.values())
         self.switches = Switches(rig, aboard.controls, aboard.hands, self.elsewhere)
         self.pacer = Pacer(self.frame_s, len(aboard.data))
+        self.rows = Rows(len(aboard.data), plan.link is not None, plan.paced)
         self._followers = [Follower(control.travel, self.frame_s) for control in controls]
         self._columns = [
             [aboard.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
@@ -191,18 +195,29 @@ class Host:
         return found
 
     def _save(self) -> None:
-        """Let the record so far be written, beside the flight."""
-        rows, save, aboard = round(self.time_s / self.frame_s), self.plan.save, self.aboard
-        if save is not None and aboard is not None and rows > 1:
+        """Let the record so far be written, beside the flight; one at a time."""
+        rows, save = round(self.time_s / self.frame_s), self.plan.save
+        busy = self._saving is not None and self._saving.is_alive()
+        if save is None or rows < 2 or busy or self.time_s < self._next_save_s:
+            return
+        self._next_save_s = self.time_s + SAVE_EVERY_s
 
-            def write() -> None:
-                save(self.kept(aboard.so_far(rows), stopped=True))
+        def write() -> None:
+            try:
+                save(self.so_far(0, rows))
+            except InputError as error:
+                self.plan.warn(str(error))
 
-            self._saving = threading.Thread(target=write)
-            self._saving.start()
+        self._saving = threading.Thread(target=write)
+        self._saving.start()
 
-    def kept(self, record: Record, stopped: bool) -> Record:
-        """Return a record with what its manifest says of the live flight.
+    def so_far(self, first: int, last: int) -> Record:
+        """Return the record from frame `first` to before `last` of the flight that goes on."""
+        assert self.aboard is not None
+        return self.kept(self.aboard.so_far(first, last), True, first)
+
+    def kept(self, record: Record, stopped: bool, first: int = 0) -> Record:
+        """Return a record, which begins with frame `first`, with what is known of the live flight.
 
         A flight that was `stopped` by its user has not ended early.
         """
@@ -211,7 +226,9 @@ class Host:
         if stopped:
             manifest["ended_early"] = None
         kept = Record(record.channels, record.data, manifest)
-        return only_measured(kept, self.plan.link, self.switches.rig) if self.plan.link else kept
+        if self.plan.link is not None:
+            kept = only_measured(kept, self.plan.link, self.switches.rig)
+        return self.rows.beside(kept, first)
 
     def _lead(self, wishes: Wishes, k: int) -> None:
         """Write the hands' way over the frame to come."""
@@ -225,19 +242,27 @@ class Host:
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
         """Send the orders; take the frame into account."""
         assert self.aboard is not None
-        row = self.aboard.data[k]
-        if self.attached is not None:
-            self.attached.order(self.aboard.controls, row)
-        for name, at in zip(self.names, self._columns, strict=True):
+        row, attached = self.aboard.data[k], self.attached
+        validity = FRESH
+        if attached is not None:
+            attached.order(self.aboard.controls, row)
+            validity = attached.validity()
+            self.rows.loader_time_s[k] = attached.time_s
+        switched = validity == FRESH and self.switches.differs
+        self.rows.validity[k] = SWITCHED if switched else validity
+        for i, (name, at) in enumerate(zip(self.names, self._columns, strict=True)):
             if name in self.service:
-                self._serve(name, *(float(row[column]) for column in at))
+                new = attached is None or attached.measured_now(i)
+                self._serve(name, new, *(float(row[column]) for column in at))
         for watcher in self.plan.watchers:
             watcher.look(self, k)
 
-    def _serve(self, name: str, force: float, computed: float, deflection: float) -> None:
+    def _serve(
+        self, name: str, new: bool, force: float, computed: float, deflection: float
+    ) -> None:
         estimator = self.service[name]
         alarmed = estimator.now.alarm
-        found = estimator.look(force, computed, deflection)
+        found = estimator.look(force, computed, deflection, fresh=new)
         if found.alarm and not alarmed and found.bend is not None:
             self.happened.alarms.append((self.time_s, name, found.bend))
             self.plan.warn(f"K of the {name} is no longer the calibrated one")
@@ -273,7 +298,7 @@ class Host:
             "switched": [asdict(change) for change in self.switches.changes],
             "bend_in_service": {n: e.now.as_dict() for n, e in self.service.items()},
             "adapt": self.plan.adapt,
-            **asdict(self.happened),
+            **{what: list(events) for what, events in vars(self.happened).items()},
         }
         if link is not None and attached is not None:
             found |= {

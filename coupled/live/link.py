@@ -22,9 +22,14 @@ class Measured(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What a loader measured at one time, a control each, in the rig's order."""
+    """What a loader measured at one time, a control each, in the rig's order.
+
+    `time_s` is that time by the loader's own clock. On a wire that does not give it, it is when the
+    host's system took the answer in, or where the system does not tell, when the host asked.
+    """
 
     controls: tuple[Measured, ...]
+    time_s: float
 
 
 class Order(NamedTuple):
@@ -82,6 +87,12 @@ class Link(Protocol):
         """Return the load at δc in d that control i's loader leaves to the host, N.
 
         0 for a loader with a spring of its own. It is asked once a frame.
+        """
+
+    def ordered_gradient(self, i: int) -> float:
+        """Return the gradient that the host orders of control i beside ΔG, N/d.
+
+        0 for a loader whose own spring the host does not order.
         """
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:

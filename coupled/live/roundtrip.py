@@ -46,7 +46,7 @@ class RoundTrips:
 
     def as_dict(self, last: int | None = None) -> dict[str, Any] | None:
         """Return the figures of the flight, or of its last answers; None before the first."""
-        taken = np.array(self._taken_ms)[-(last or 0) :]
+        taken = np.array(self._taken_ms[-(last or 0) :])  # a copy: another thread may ask
         if not taken.size:
             return None
         p50, p99, largest = np.round(np.percentile(taken, (50, 99, 100)), 4).tolist()

@@ -1,21 +1,38 @@
-"""What the host may ask of a loader: limits of size and rate, fades, and a watchdog.
+"""What the host may ask of a loader, and whether what the loader measures can be true.
 
-Whatever the schedule, a switch or a fault asks for: ΔG over the whole travel, the breakout and
-F_mod each stay within `force_N`, and none moves faster than `rate_N_per_s`. Forces come and go by a
-share that rises from 0 to 1 over `fade_s`, and falls as long. Without a valid packet for the
-watchdog's time the share falls to 0; it rises again when the loader is back.
+Limits: ΔG over the whole travel and the breakout together, and F_mod, stay within `force_N`, and
+none changes faster than `rate_N_per_s`. Where the host orders the loader's own spring as well, that
+spring is in the sum. Forces fade by a share that rises from 0 to 1 over `fade_s`, and falls as
+long. Without a valid packet for the watchdog's time the share falls to 0; it rises again when the
+loader is back.
+
+Plausibility: a gauge that reads the same number while the control moves has failed, and δ has to
+agree with x + K·F, x being the servo's answer to δc. While either fails, the share falls to 0.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
-from coupled.live.link import Order
+from coupled.live.link import Measured, Order
+from coupled.live.servo import Servo
+from coupled.rig.parameters import Control
 
 FASTEST_N_per_s = 5000.0
 STRONGEST_N = 600.0  # 14 CFR 25.143(d) allows two hands 75 lbf on the column, both feet 150 lbf
 FADE_s = 0.5
+
+# A force that is held, as after a step, stays the same while the control still moves: until the
+# loader has come to rest, some tenths of a second. A gauge with any noise does not repeat at all.
+STUCK_s = 2.0  # F unchanged for so long, and in the second half of that time
+MOVED = 0.05  # of the travel moved by δc
+# δ may differ from x + K·F by this share of the travel, as by play and zeros, and by all of K·F,
+# since a structure may have softened to twice its K. Both are beyond what a calibration leaves.
+APART = 0.05
+APART_s = 0.2  # for so long: a blow on the grip is over before
+AGAIN_s = 1.0  # without a fault, until the forces come back
 
 
 @dataclass(frozen=True)
@@ -42,39 +59,133 @@ class Fade:
 
 
 class Limiter:
-    """Keeps one control's orders within the limits; `travel` in d."""
+    """Keeps one control's orders within the limits.
 
-    def __init__(self, limits: Limits, travel: float, frame_s: float) -> None:
-        self._force, self._travel = limits.force_N, travel
+    `travel` is in d; `own` is the gradient in N/d that the host orders beside ΔG.
+    """
+
+    def __init__(self, limits: Limits, travel: float, frame_s: float, own: float = 0.0) -> None:
+        self._force, self._travel, self._own = limits.force_N, travel, own
         self._step = limits.rate_N_per_s * frame_s
         self._last: Order | None = None
         self.limited = 0  # frames in which an order was cut
+        self.cut = False  # in the last frame
 
-    def _within(self, wanted: float, last: float, size: float, step: float) -> float:
+    def _within(self, wanted: float, last: float, low: float, high: float, step: float) -> float:
         if math.isnan(wanted):
             wanted = last
-        bounded = min(max(wanted, -size), size)
+        bounded = min(max(wanted, low), high)
         return min(max(bounded, last - step), last + step)
+
+    def total(self, order: Order) -> float:
+        """Return the most that an order can ask for within the travel, N."""
+        steepest = max(abs(self._own + order.gradient), abs(self._own + order.second))
+        return steepest * self._travel + abs(order.breakout)
 
     def order(self, asked: Order, share: float) -> Order:
         """Return what is sent of an order that was asked for, with that share of it on."""
         last = self._last or Order(0.0, 0.0, asked.break_at, 0.0, 0.0, asked.total, asked.trim)
-        size, step, travel = self._force, self._step, self._travel
-        wanted = (
-            share * asked.gradient,
-            share * asked.second,
-            share * asked.breakout,
-            share * asked.force,
+        wanted = asked._replace(
+            gradient=share * asked.gradient,
+            second=share * asked.second,
+            breakout=share * asked.breakout,
+            force=share * asked.force,
         )
-        sent = Order(
-            self._within(wanted[0], last.gradient, size / travel, step / travel),
-            self._within(wanted[1], last.second, size / travel, step / travel),
-            asked.break_at,
-            self._within(wanted[2], last.breakout, size, step),
-            self._within(wanted[3], last.force, size, step),
-            asked.total,
-            asked.trim,
-        )
-        self.limited += (sent.gradient, sent.second, sent.breakout, sent.force) != wanted
+        sent = self._together(self._each(self._shared(wanted), last), last)
+        parts = (sent.gradient, sent.second, sent.breakout, sent.force)
+        self.cut = parts != (wanted.gradient, wanted.second, wanted.breakout, wanted.force)
+        self.limited += self.cut
         self._last = sent
         return sent
+
+    def _shared(self, wanted: Order) -> Order:
+        """Return an order whose total is within the limit, its parts in the same proportion."""
+        total = self.total(wanted)
+        if not self._force < total < math.inf:
+            return wanted  # what is no number is dealt with one by one
+        factor = self._force / total
+        return wanted._replace(
+            gradient=factor * (self._own + wanted.gradient) - self._own,
+            second=factor * (self._own + wanted.second) - self._own,
+            breakout=factor * wanted.breakout,
+        )
+
+    def _each(self, wanted: Order, last: Order) -> Order:
+        """Return an order each part of which is within the limits of size and rate."""
+        size, step, steepest = self._force, self._step, self._force / self._travel
+        low, high, turn = -steepest - self._own, steepest - self._own, step / self._travel
+        return wanted._replace(
+            gradient=self._within(wanted.gradient, last.gradient, low, high, turn),
+            second=self._within(wanted.second, last.second, low, high, turn),
+            breakout=self._within(wanted.breakout, last.breakout, -size, size, step),
+            force=self._within(wanted.force, last.force, -size, size, step),
+        )
+
+    def _together(self, sent: Order, last: Order) -> Order:
+        """Return an order whose total is within the limit while its parts still move.
+
+        A part that would raise the total waits for the others, which fall at their rate.
+        """
+        if self.total(sent) <= self._force:
+            return sent
+
+        def smaller(now: float, before: float, own: float = 0.0) -> float:
+            return now if abs(own + now) <= abs(own + before) else before
+
+        return sent._replace(
+            gradient=smaller(sent.gradient, last.gradient, self._own),
+            second=smaller(sent.second, last.second, self._own),
+            breakout=smaller(sent.breakout, last.breakout),
+        )
+
+
+class Plausibility:
+    """Whether one control's measurements agree with one another.
+
+    `gauge` says that the loader measures F.
+    """
+
+    def __init__(self, control: Control, frame_s: float, gauge: bool) -> None:
+        self._servo, self._gauge = Servo(control, frame_s), gauge
+        self._bend = max(control.loader.bend, control.compensation.bend)
+        self._travel, self._frame_s = control.travel, frame_s
+        self._stuck_frames = round(STUCK_s / frame_s)
+        self._force, self._same = math.nan, 0  # the last F, and in how many samples it was so
+        self._places: deque[float] = deque(maxlen=self._stuck_frames // 2)
+        self._stuck = False
+        self._apart_s, self._well_s = 0.0, AGAIN_s
+        self._fault = ""
+
+    def miss(self) -> None:
+        """Take a frame without a new sample."""
+        self._servo.miss()
+
+    def look(self, measured: Measured) -> str:
+        """Take a new sample; return what is wrong with it, or an empty text."""
+        found = self._stuck_gauge(measured) or self._apart(measured)
+        self._well_s = 0.0 if found else self._well_s + self._frame_s
+        if found or self._well_s >= AGAIN_s:
+            self._fault = found
+        return self._fault
+
+    def _stuck_gauge(self, measured: Measured) -> str:
+        if not self._gauge:
+            return ""
+        same = measured.force == self._force
+        self._force, self._same = measured.force, self._same + 1 if same else 0
+        self._places.append(measured.computed)
+        if self._same < self._stuck_frames:
+            self._stuck = self._stuck and same
+        elif max(self._places) - min(self._places) > MOVED * self._travel:
+            self._stuck = True
+        return "its force gauge reads the same while the control moves" if self._stuck else ""
+
+    def _apart(self, measured: Measured) -> str:
+        position = self._servo.move(measured.computed)
+        bent = self._bend * measured.force
+        away = abs(measured.deflection - position - bent)
+        if not self._servo.settled or math.isnan(away):
+            return ""
+        beyond = away > APART * self._travel + abs(bent)
+        self._apart_s = self._apart_s + self._frame_s if beyond else 0.0
+        return "δ does not agree with δc + K·F" if self._apart_s > APART_s else ""

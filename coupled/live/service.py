@@ -9,18 +9,19 @@ least squares with forgetting: the sums of the normal equations, each of which l
 itself a frame (Ljung and Söderström 1983, ch. 2; here in information form). The variance is that of
 weighted least squares with equal noise, A⁻¹·B·A⁻¹ with B the sums of squared weights, times
 (1 + ρ)/(1 − ρ) for residuals whose neighbours correlate by ρ. Where the hand does too little
-nothing is learned and nothing is forgotten.
+nothing is learned and nothing is forgotten, nor from a sample that is repeated because no new one
+came.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from coupled.rig.linkage import servo_weights
+from coupled.live.servo import Servo
 from coupled.rig.parameters import Control
 
 MEMORY_s = 10.0  # time constant of the forgetting, of time in which the hand moves
@@ -63,16 +64,13 @@ class BendEstimator:
     """Estimates K of one control; `control` is its section of the rig, which gives the servo."""
 
     def __init__(self, control: Control, frame_s: float, memory_s: float = MEMORY_s) -> None:
-        loader, found = control.loader, control.calibration
-        omega = 2.0 * math.pi * loader.servo_frequency
-        weights = servo_weights(omega, loader.servo_damping_ratio, frame_s)
-        self._a, self._b = (row.tolist() for row in weights)
+        found = control.calibration
+        self._servo = Servo(control, frame_s)
         self._kept = math.exp(-frame_s / memory_s)
         self._second = math.exp(-frame_s)
         self._frame_s = frame_s
         self.calibrated = control.compensation.bend
         self._calibrated_error = found.bend_error if found.readings else 0.0
-        self._servo = self._speed = self._before = 0.0
         self._sums = np.zeros(5)  # of 1, F, F², y, F·y
         self._squares = np.zeros(3)  # of the squared weights of 1, F, F²
         self._apart = [0.0, 0.0, 0.0]  # of r², r·r before, and the last r
@@ -81,23 +79,28 @@ class BendEstimator:
         self._started = self._alarm = False
         self.now = ServiceBend(None, None, 0.0, True, False)
 
-    def look(self, force: float, computed: float, deflection: float) -> ServiceBend:
-        """Take a frame's F in N, δc and δ in d, and return the estimate."""
+    def look(
+        self, force: float, computed: float, deflection: float, *, fresh: bool = True
+    ) -> ServiceBend:
+        """Take a frame's F in N, δc and δ in d, and return the estimate.
+
+        A frame that is not `fresh` holds the sample before it again: nothing is learned from it.
+        """
+        if not fresh:
+            self._servo.miss()
+            self.now = replace(self.now, frozen=True)
+            return self.now
+        position = self._servo.move(computed)
         if not self._started:
-            self._started, self._before, self._servo = True, computed, computed
-            self._mean = force
-        x, v = self._servo, self._speed
-        a, b, before = self._a, self._b, self._before
-        self._servo = a[0] * x + a[1] * v + a[2] * before + a[3] * computed
-        self._speed = b[0] * x + b[1] * v + b[2] * before + b[3] * computed
-        self._before = computed
+            self._started, self._mean = True, force
         away = force - self._mean
         share = 1.0 - self._second
         self._mean += share * away
         self._variance = self._second * (self._variance + share * away * away)
-        frozen = self._variance < LEAST_N**2 or not math.isfinite(deflection)
+        known = math.isfinite(deflection) and self._servo.settled
+        frozen = self._variance < LEAST_N**2 or not known
         if not frozen:
-            self._learn(force, deflection - self._servo)
+            self._learn(force, deflection - position)
         if frozen and self.now.frozen:
             return self.now
         self.now = self._estimate(frozen)

@@ -24,7 +24,7 @@ INTERRUPTED = "interrupted"
 
 @dataclass(frozen=True)
 class LiveFlight:
-    """A live flight: its record, the rig as it stood at the end, and how late its frames were."""
+    """A live flight: its record, the rig as last switched, and how late its frames were."""
 
     record: Record
     rig: Rig
@@ -55,7 +55,7 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
     changes = host.switches.changes
     return LiveFlight(
         kept,
-        host.switches.rig,
+        host.switches.set_rig,
         max((change.time_s for change in changes), default=0.0),
         host.pacer.result() if plan.paced else None,
         stopped,

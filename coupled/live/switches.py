@@ -46,15 +46,17 @@ class Switches:
     """A flight's switches.
 
     `rig` is what is flown, `controls` the same as the kernels hold it, `hands` those of its
-    pilots, and `elsewhere` whether its loader is real.
+    pilots, and `elsewhere` whether its loader is real. `set_rig` is the rig as the last change by
+    the user made it, and `differs` whether `rig` has other settings than at the start.
     """
 
     def __init__(
         self, rig: Rig, controls: ControlArray, hands: Mapping[str, Hand], elsewhere: bool
     ) -> None:
-        self.rig = rig
+        self.rig = self.set_rig = self._begun = rig
         self._controls, self._hands, self._elsewhere = controls, hands, elsewhere
         self.changes: list[Change] = []
+        self.differs = False
 
     def values(self, control: str) -> dict[str, float | bool]:
         """Return what stands now of a control, SI."""
@@ -72,6 +74,7 @@ class Switches:
         """Make a change, and remember it; raise InputError for one that cannot be made."""
         self.put(control, what, value)
         self.changes.append(Change(time_s, control, what, value))
+        self.set_rig = self.rig
 
     def put(self, control: str, what: str, value: float | bool) -> None:
         """Make a change that is not remembered, as an adaptation makes them."""
@@ -90,6 +93,7 @@ class Switches:
     def _pack(self, rig: Rig) -> None:
         self._controls["parameters"][:] = pack(rig, self._hands)["parameters"]
         self.rig = rig
+        self.differs = rig.controls != self._begun.controls
 
     def _control(self, control: str) -> Any:
         if control not in self.rig.controls:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import select
 import socket
 from dataclasses import dataclass
 
 from coupled.errors import InputError
+from coupled.live.roundtrip import ask_for_stamps, receive
 from coupled.live.udp import resolved
 
 
@@ -16,7 +18,7 @@ class Given:
     """What a user has to say of a loader, for which no source has it.
 
     counts_per_N  the protocol's number for a newton; negative where it counts the other way
-    turn          the controls whose position counts the other way
+    turn          the controls whose axis counts the other way: positions and forces
     profile       gradient of the loader's own force profile, N/d, at `scale`; v2 only
     """
 
@@ -45,22 +47,31 @@ class Transport:
         if self._stream:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
+        self.closed = False  # by the other end of a stream
+        self._stamped = ask_for_stamps(self._socket)
+        self.came_s = math.nan  # when the system took in what was received last; NaN if unknown
 
     def send(self, packet: bytes) -> None:
         """Send; a wire that takes none drops it."""
         with contextlib.suppress(OSError):
             self._socket.send(packet)
 
-    def receive(self) -> bytes:
-        """Return a datagram, or what came of the stream; nothing where nothing did."""
+    def receive(self) -> bytes | None:
+        """Return a datagram, which may be empty, or bytes of the stream; None if none came."""
+        if self.closed:
+            return None
         try:
-            return self._socket.recv(4096)
+            packet, _, came_ns = receive(self._socket, 4096, self._stamped)
         except OSError:
-            return b""
+            return None
+        self.came_s = 1e-9 * came_ns if self._stamped else math.nan
+        self.closed = self._stream and not packet
+        return None if self.closed else packet
 
     def wait(self, seconds: float) -> None:
         """Wait until something comes, so long at most."""
-        select.select([self._socket], [], [], max(0.0, seconds))
+        # A stream that was closed is always readable: to select it would not wait.
+        select.select([] if self.closed else [self._socket], [], [], max(0.0, seconds))
 
     def close(self) -> None:
         """Close it."""

@@ -11,13 +11,15 @@ from collections import Counter
 from collections.abc import Sequence
 
 from coupled.errors import InputError
-from coupled.live.link import Order, Reach, Sample
+from coupled.live.link import Order, Reach, Sample, WATCHDOG_s
 from coupled.live.roundtrip import RoundTrips, ask_for_stamps, receive
 from coupled.live.wire import ORDER, BadPacketError, Header, newer, pack_orders, unpack_state
 from coupled.rig.rig import Rig
 
 LARGEST_bytes = 512
-MOST_PACKETS = 64  # taken in one look: a flood must not hold up the frame
+# Taken in one look: more than Linux's default receive buffer holds of the smallest packets (212,992
+# bytes of 768 each), so that none waits for the next frame; a flood must not hold up the frame.
+MOST_PACKETS = 512
 STRONGEST_N = 2500.0  # beyond what a person holds, F is a fault
 BEYOND = 1.25  # of the travel: δ passes δc's stop by what the structure bends
 
@@ -60,7 +62,9 @@ class UdpLink:
         self._reaches = reaches(rig)
         self._session = secrets.randbits(32)
         self._sequence = 0
-        self._last: int | None = None  # of the loader's sequence numbers
+        self._last: int | None = None  # sequence number of the last valid state
+        self._echo = 0  # which order that state answered
+        self._came_s = 0.0  # when it came, by the host's clock
         family, self._address = resolved(host, port, self.name)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -99,16 +103,33 @@ class UdpLink:
         header, sample = unpack_state(packet, self._reaches)
         if header.session != self._session:
             raise BadPacketError("of another flight")
-        if self._last is not None and not newer(header.sequence, self._last):
+        now_s = time.monotonic()
+        counts_on = self._last is None or newer(header.sequence, self._last)
+        if not counts_on and not self._restarted(header, now_s):
             raise BadPacketError("replayed or late")
-        self._last = header.sequence
+        self._last, self._echo, self._came_s = header.sequence, header.echo, now_s
         self.round_trips.hear(header.echo, came_ns)
         if self._lockstep and header.echo != self._sequence:
             raise BadPacketError("answers older orders")
         return sample
 
+    def _restarted(self, header: Header, now_s: float) -> bool:
+        """Tell whether a state with an older sequence number is of a loader that was restarted.
+
+        A restarted loader counts from its start again. Its state answers an order that was sent
+        after the last one answered, which a repeated or delayed packet does not. The sequence
+        numbers start anew only after the loader was silent for the watchdog's time.
+        """
+        silent = now_s - self._came_s > WATCHDOG_s
+        sent = header.echo == self._sequence or newer(self._sequence, header.echo)
+        return silent and sent and newer(header.echo, self._echo)
+
     def own_load(self, i: int, computed: float) -> float:
         """Return 0: the loader has its basic gradient, damping and breakout itself."""
+        return 0.0
+
+    def ordered_gradient(self, i: int) -> float:
+        """Return 0: the loader has its basic gradient itself."""
         return 0.0
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:

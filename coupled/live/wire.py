@@ -102,7 +102,7 @@ def unpack_state(packet: bytes, reaches: Sequence[Reach]) -> tuple[Header, Sampl
             finite = math.isfinite(measured.force) and math.isfinite(measured.computed)
             raise BadPacketError("out of range" if finite else "not a number")
         found.append(measured)
-    return header, Sample(tuple(found))
+    return header, Sample(tuple(found), 1e-6 * header.time_us)
 
 
 def unpack_orders(packet: bytes, controls: int) -> tuple[Header, tuple[Order, ...]]:

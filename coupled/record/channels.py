@@ -25,6 +25,16 @@ def unit_of(control: str) -> str:
 
 TIME = "time_s"
 
+# Of a live record: how far each row can be used, and the loader's own time of its sample.
+VALIDITY = "validity"
+LOADER_TIME = "loader_time_s"
+# Values of the channel `validity`, the first that applies from the left: of a row that is
+# LOST      the loader was silent for longer than the watchdog's time: its last sample is repeated
+# REPEATED  no new sample came since the row before: its sample is repeated
+# FADED     the forces ordered were not those of the rig: they faded, or a limit held them
+# SWITCHED  flown with other settings than the flight began with, which the manifest lists
+FRESH, REPEATED, LOST, FADED, SWITCHED = range(5)
+
 # In the order in which the frame kernel writes them; d is m, or rad for a wheel.
 _CONTROL = (
     "force_N",

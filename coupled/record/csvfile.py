@@ -20,14 +20,19 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def read_columns(path: Path, gaps: bool = False) -> dict[str, Floats]:
+def read_columns(path: Path, gaps: bool = False, torn: bool = False) -> dict[str, Floats]:
     """Return a table's columns by name, as doubles.
 
-    An empty cell is NaN where `gaps` are allowed, and a fault where not.
+    An empty cell is NaN where `gaps` are allowed, and a fault where not. A `torn` CSV file is one
+    that was being written when its program or machine stopped: a last line that is not whole is
+    left out.
     """
     import polars as pl
 
-    content = io.BytesIO(read_bytes(path))
+    held = read_bytes(path)
+    if torn:
+        held = held[: held.rfind(b"\n") + 1]
+    content = io.BytesIO(held)
     try:
         if path.suffix.lower() == ".parquet":
             table = pl.read_parquet(content)

@@ -102,6 +102,10 @@ class Record:
         rows = (self.time_s >= start_s) & (self.time_s < end_s)
         return Record(self.channels, self.data[rows], self.manifest)
 
+    def rows(self, first: int, last: int) -> Record:
+        """Return the rows from number `first`, counted from 0, to before `last`."""
+        return Record(self.channels, self.data[first:last], self.manifest)
+
     def to_polars(self) -> pl.DataFrame:
         """Return the rows as a polars DataFrame, a column a channel, SI."""
         import polars as pl
@@ -165,7 +169,10 @@ def write_record(record: Record, path: Path) -> None:
 def read_record(path: Path) -> Record:
     """Return the record of a file, with its manifest where there is one."""
     check_suffix(path)
-    columns = read_columns(path, gaps=True)
+    manifest = _read_manifest(manifest_path(path))
+    live = manifest.get("live")
+    unfinished = isinstance(live, dict) and live.get("unfinished") is True
+    columns = read_columns(path, gaps=True, torn=unfinished)
     if TIME not in columns:
         raise InputError(path, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
     if len(columns) < 2 or len(columns[TIME]) < 2:
@@ -173,7 +180,7 @@ def read_record(path: Path) -> Record:
     if not np.all(np.diff(columns[TIME]) > 0.0):
         raise InputError(path, TIME, "must rise from row to row, without a gap")
     data = np.column_stack(list(columns.values()))
-    return Record(tuple(columns), data, _read_manifest(manifest_path(path)))
+    return Record(tuple(columns), data, manifest)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:

@@ -14,16 +14,22 @@ Mask = NDArray[np.bool_]
 
 
 class Hosted(NamedTuple):
-    """What a record holds of the loader's services, and the frames that its host missed."""
+    """What a record holds of the loader's services, and of its host.
+
+    `missed` are the frames that the host missed, `assumed` is how far its K̂ in ΔG was another than
+    its first, d/N.
+    """
 
     services: ServiceRows | None = None
     missed: Mask | None = None
+    assumed: Floats | None = None
 
     def rows(self, frames: int) -> tuple[Floats, ...]:
-        """Return neutral x₀ in d, force in N and jams of services, and misses, at each frame."""
+        """Return neutral x₀ in d, force in N and jams of services, misses and K̂, at each frame."""
         none = np.zeros(frames)
         served = (none, none, none) if self.services is None else self.services[:3]
-        return (*served, none if self.missed is None else self.missed.astype(np.float64))
+        missed = none if self.missed is None else self.missed.astype(np.float64)
+        return (*served, missed, none if self.assumed is None else self.assumed)
 
 
 HOSTED = Hosted()

@@ -121,6 +121,19 @@ MODIFICATION = Declaration(
 
 
 @stage
+def assumed_bend(p: ModificationParameters) -> float:
+    """Return the K̂ by which ΔG is made, d/N; 0 without gradient compensation."""
+    return p.bend if p.compensated else 0.0
+
+
+@stage
+def assume(p: ModificationParameters, bend: float) -> None:
+    """Set the K̂ by which ΔG is made, d/N; 0 is without gradient compensation."""
+    p.bend = bend
+    p.compensated = 1
+
+
+@stage
 def set_gradients(
     p: ModificationParameters, s: ModificationState, first: float, second: float
 ) -> None:
@@ -130,7 +143,7 @@ def set_gradients(
     """
     s.offset = p.offset + p.drift * s.frames
     s.frames += 1
-    bend = p.bend if p.compensated else 0.0
+    bend = assumed_bend(p)
     preload = p.breakout if p.exact else 0.0
     s.break_computed = 0.0
     if p.break_deflection > 0.0:

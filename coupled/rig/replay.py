@@ -21,7 +21,7 @@ from coupled.rig.hosted import HOSTED, Hosted, Mask, held_over
 from coupled.rig.inertia import lead_force, set_inertia
 from coupled.rig.linkage import carry, deflection, move_linkage, start_bend, transducer
 from coupled.rig.loader import move_loader, set_external, start_loader
-from coupled.rig.modification import set_gradients
+from coupled.rig.modification import assume, assumed_bend, set_gradients
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
@@ -30,8 +30,8 @@ from coupled.rig.sensing import scale_at
 from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
-# Frames between restarts, and δc in d and its rate in d/s at every frame.
-Restart = tuple[int, Floats, Floats]
+# The frames of restarts, and δc in d and its rate in d/s at every frame.
+Restart = tuple[Mask, Floats, Floats]
 
 
 def replay_schedule(
@@ -93,10 +93,11 @@ def drive_loader(
     level = np.ones_like(misread) if load_factor is None else load_factor
     out = np.empty((2, len(misread)))
     h = 1.0 / (rig.frame_rate * rig.substeps)
-    every, position, rate = (0, misread, misread) if restart is None else restart
+    none = np.zeros_like(misread)
+    begun, position, rate = (none, none, none) if restart is None else restart
     both = (gradient, gradient if second is None else second)
-    given = np.stack((*both, misread, level, position, rate, *host.rows(len(misread))))
-    _loader(p, s, nodes_N, given, every, rig.substeps, h, out)
+    rows = (*both, misread, level, position, rate, *host.rows(len(misread)), begun)
+    _loader(p, s, nodes_N, np.stack(rows), rig.substeps, h, out)
     return out[0], out[1]
 
 
@@ -107,14 +108,17 @@ def replay_product(
     gradient: Floats,
     second: Floats | None = None,
     missed: Mask | None = None,
+    assumed: Floats | None = None,
 ) -> Floats:
     """Return F_mod in N for δc in d at each frame and G_T in N/d.
 
-    A digital product stays as it was in the frames `missed` by the host.
+    A digital product stays as it was in the frames `missed` by the host. `assumed` is how far the
+    host's K̂ in ΔG differs from the rig's, d/N.
     """
     p, s = _one(rig, control)
-    both = np.stack((gradient, gradient if second is None else second))
-    made = _product(p, s, computed, both, np.empty_like(computed))
+    more = np.zeros_like(gradient) if assumed is None else assumed
+    given = np.stack((gradient, gradient if second is None else second, more))
+    made = _product(p, s, computed, given, np.empty_like(computed))
     return held_over(made, missed) if p[0]["modification"]["digital"] else made
 
 
@@ -203,25 +207,27 @@ def _loader(
     states: Any,
     force: Floats,
     given: Floats,
-    every: int,
     substeps: int,
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader on what is `given`, shape (10, frames).
+    """Run the loader on what is `given`, shape (12, frames).
 
-    G_T twice, misread δc, load factor, restarts' δc and its rate, and `Hosted.rows`.
+    G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, and restarts.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
     neutral, added, jammed, missed = given[6], given[7], given[8], given[9]
+    assumed, begun = given[10], given[11]
+    bend = assumed_bend(p.modification)
     start_loader(p.loader, s.loader, force[0])
     ends = (-p.loader.travel, p.loader.travel)
     frames, read = len(misread), 0.0
     for k in range(frames):
         m = s.modification
-        if every > 0 and k % every == 0:
+        if begun[k] > 0.5:
             s.loader.computed, s.loader.rate = position[k], rate[k]
+        assume(p.modification, bend + assumed[k])
         set_gradients(p.modification, m, gradient[0, k], gradient[1, k])
         set_inertia(p.inertia, s.inertia, p.loader, s.loader, gradient[0, k])
         if missed[k] < 0.5:
@@ -244,10 +250,11 @@ def _loader(
 
 
 @long_entry
-def _product(p: Any, s: Any, computed: Floats, gradient: Floats, out: Floats) -> Floats:
-    m = s[0].modification
+def _product(p: Any, s: Any, computed: Floats, given: Floats, out: Floats) -> Floats:
+    m, bend = s[0].modification, assumed_bend(p[0].modification)
     for k in range(len(out)):
-        set_gradients(p[0].modification, m, gradient[0, k], gradient[1, k])
+        assume(p[0].modification, bend + given[2, k])
+        set_gradients(p[0].modification, m, given[0, k], given[1, k])
         out[k] = set_product(p[0], m, computed[k], computed[k])
     return out
 

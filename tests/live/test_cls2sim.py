@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import socket
 import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -13,14 +16,16 @@ from coupled.api.rigs import load_rig
 from coupled.errors import InputError
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.live.attach import open_link
+from coupled.live.cls2sim import FORCES, POSITIONS
 from coupled.live.hands import LiveHand
 from coupled.live.host import Plan
-from coupled.live.link import RUN, Order
+from coupled.live.link import RUN, Link, Order
 from coupled.live.session import fly_live
 from coupled.record.record import Record
 from tests.support.loaders import fake_loader
 
 RIG = load_rig("report-column")
+TURNED = "counts_per_N=10&turn=column"
 V2 = "protocol=v2&counts_per_N=100&profile_N_per_d=1000&scale=100"
 
 
@@ -52,6 +57,134 @@ def test_external_control_has_the_published_bytes() -> None:
         reasons = {"another command": 1, "wrong length": 1, "not a number": 1}
         assert link.dropped == reasons
         link.close()
+
+
+@contextmanager
+def external(words: str) -> Iterator[tuple[Link, Callable[[bytes], None], socket.socket]]:
+    """Yield a link of external control, what answers it, and the server's socket."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
+        server.bind(("127.0.0.1", 0))
+        server.settimeout(2.0)
+        url = f"cls2sim://127.0.0.1:{server.getsockname()[1]}?{words}"
+        link = open_link(url, RIG, lockstep=True, deflection=False)
+        assert link is not None
+        link.send((Order(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),), RUN)
+        _, host = server.recvfrom(64)
+        yield link, lambda packet: void(server.sendto(packet, host)), server
+        link.close()
+
+
+def void(_: object) -> None:
+    """Return nothing."""
+
+
+@pytest.mark.parametrize(("words", "share"), [("counts_per_N=10", 0.75), (TURNED, 0.25)])
+def test_the_load_of_a_turned_axis_pushes_back_too(words: str, share: float) -> None:
+    with external(words) as (link, answer, server):
+        answer(POSITIONS.pack(0xAF, share, 0.5, 0.5, 0.5))
+        sample = link.receive(1.0)
+        assert sample is not None
+        assert sample.controls[0].computed == 0.5 * RIG.controls["column"].travel
+        link.send((Order(0.0, 0.0, 0.0, 0.0, 12.34, 0.0, 0.0),), RUN)
+        load = FORCES.unpack(server.recv(64))[1]
+        assert abs(load) == 123
+        assert load * (share - 0.5) < 0.0  # in the loader's own direction
+
+
+def test_empty_datagrams_hold_up_no_position_and_are_counted() -> None:
+    with external("counts_per_N=10") as (link, answer, _):
+        for n in range(40):
+            answer(b"")
+            answer(POSITIONS.pack(0xAF, 0.5 + 0.005 * n, 0.5, 0.5, 0.5))
+        answer(b"")
+        time.sleep(0.05)
+        sample = link.receive(0.0)
+        assert sample is not None
+        newest = (2.0 * np.float32(0.5 + 0.005 * 39) - 1.0) * RIG.controls["column"].travel
+        assert sample.controls[0].computed == pytest.approx(newest, rel=1e-6)
+        assert link.dropped == {"wrong length": 41}
+        assert link.receive(0.0) is None
+
+
+@contextmanager
+def version2(words: str) -> Iterator[tuple[Link, socket.socket]]:
+    """Yield a link of protocol v2 and the other end of its stream, past the first request."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as door:
+        door.bind(("127.0.0.1", 0))
+        door.listen(1)
+        url = f"cls2sim://127.0.0.1:{door.getsockname()[1]}?{words}"
+        link = open_link(url, RIG, lockstep=True, deflection=False)
+        assert link is not None
+        wire, _ = door.accept()
+    with wire:
+        wire.settimeout(2.0)
+        assert len(wire.recv(64)) == 12
+        wire.sendall(struct.pack("<HB", 3, 0))
+        assert link.receive(0.05) is None  # what is answered is no sample
+        yield link, wire
+        link.close()
+
+
+def asked(link: Link, wire: socket.socket, gradient: float, force: int, share: float) -> int:
+    """Order a gradient ΔG in N/m, answer with force in counts and position; return the scale."""
+    link.send((Order(gradient, gradient, 0.0, 0.0, 0.0, 0.0, 0.0),), RUN)
+    request = wire.recv(256)
+    assert len(request) == 14 + 2 * 12
+    wire.sendall(struct.pack("<HB", 3, 0) + struct.pack("<HBHi", 9, 0, 1, force))
+    wire.sendall(struct.pack("<HBHf", 9, 0, 1, share))
+    return int(struct.unpack_from("<3iH", request)[3])
+
+
+@pytest.mark.parametrize(("turn", "sign"), [("", 1), ("&turn=column", -1)])
+def test_v2_turns_force_and_position_alike(turn: str, sign: int) -> None:
+    with version2(V2 + turn) as (link, wire):
+        asked(link, wire, 0.0, 1500 * sign, 0.5 * sign)
+        sample = link.receive(1.0)
+        assert sample is not None
+        assert sample.controls[0].force == 15.0
+        assert sample.controls[0].computed == 0.5 * RIG.controls["column"].travel
+
+
+def test_v2_scales_the_profile_to_the_whole_gradient_within_its_range() -> None:
+    basic = RIG.controls["column"].loader.basic_gradient
+    for gradient, scale in ((4000.0 - basic, 400), (50e3 - basic, 999), (-basic, 20)):
+        with version2(V2) as (link, wire):
+            assert asked(link, wire, gradient, 0, 0.0) == scale
+
+
+def test_v2_takes_a_late_answer_for_what_it_answers() -> None:
+    with version2(V2) as (link, wire):
+        asked(link, wire, 500.0, 1500, 0.25)
+        assert link.receive(1.0) is not None
+        order = (Order(500.0, 500.0, 0.0, 0.0, 0.0, 0.0, 0.0),)
+        link.send(order, RUN)
+        assert len(wire.recv(256)) == 2 * 12
+        time.sleep(0.15)  # the loader pauses for longer than the watchdog's time
+        link.send(order, RUN)
+        wire.sendall(struct.pack("<HBHi", 9, 0, 1, -700))
+        assert link.receive(0.05) is None
+        link.send(order, RUN)
+        wire.sendall(struct.pack("<HBHf", 9, 0, 1, 0.5))
+        sample = link.receive(1.0)
+        assert sample is not None
+        assert sample.controls[0].force == -7.0
+        assert sample.controls[0].computed == 0.5 * RIG.controls["column"].travel
+
+
+@pytest.mark.parametrize("share", [1.1, -1.1, 2.9])
+def test_v2_drops_a_position_beyond_its_range(share: float) -> None:
+    with version2(V2) as (link, wire):
+        asked(link, wire, 0.0, 0, share)
+        assert link.receive(0.2) is None
+        assert sum(link.dropped.values()) == 1
+
+
+def test_a_stream_that_its_loader_closed_is_waited_for_and_not_read_in_a_rush() -> None:
+    with version2(V2) as (link, wire):
+        wire.close()
+        begun = time.monotonic()
+        assert link.receive(0.2) is None
+        assert time.monotonic() - begun >= 0.2
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 
+import numpy as np
 import pytest
 
 from coupled.live.pacing import EDGES_ms, Pacer
@@ -68,6 +69,31 @@ def test_missed_deadlines_are_counted_and_not_made_up_for() -> None:
     assert said["late_over_a_frame"] == 1
     assert said["missed_deadlines"] == 3
     assert said["late_largest_ms"] == pytest.approx(3.25e3 * FRAME_s, rel=1e-4)
+
+
+def test_of_a_hundred_frames_one_is_later_than_the_99th_percentile() -> None:
+    clock, step_s = Clock(), 2.0**-15
+    pacer = Pacer(FRAME_s, 101, clock, clock.sleep)
+    pacer.wait()  # on time
+    for k in np.random.default_rng(5).permutation(np.arange(1, 101)):
+        clock.overslept = int(k) * step_s
+        pacer.wait()
+    said = pacer.result().as_dict()
+    for name, steps in (("p50", 50), ("p99", 99), ("largest", 100)):
+        assert said[f"late_{name}_ms"] == pytest.approx(1e3 * steps * step_s, abs=1e-4)
+
+
+@pytest.mark.parametrize(("late", "passed"), [(0.75, 0), (1.0, 1), (1.75, 1), (2.75, 2)])
+def test_a_deadline_is_missed_once_it_has_passed(late: float, passed: int) -> None:
+    """A frame that begins `late` frames after its deadline: so many later ones have passed."""
+    clock = Clock()
+    pacer = Pacer(FRAME_s, 10, clock, clock.sleep)
+    pacer.wait()
+    clock.now += (1.0 + late) * FRAME_s
+    pacer.wait()
+    assert pacer.missed == passed
+    pacer.wait()
+    assert clock.now == 100.0 + (2 + passed) * FRAME_s
 
 
 def test_the_histogram_counts_every_frame() -> None:

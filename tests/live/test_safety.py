@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.signal import lsim
 
-from coupled.live.link import Order
-from coupled.live.safety import Fade, Limiter, Limits
+from coupled.api.rigs import load_rig
+from coupled.live.link import Measured, Order
+from coupled.live.safety import Fade, Limiter, Limits, Plausibility
+from coupled.live.servo import Servo
 
 FRAME_s, TRAVEL = 1.0 / 120.0, 0.18
 LIMITS = Limits(force_N=200.0, rate_N_per_s=2000.0, fade_s=0.5)
+Floats = NDArray[np.float64]
+COLUMN = load_rig("report-column").controls["column"]
+K = COLUMN.loader.bend
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 ORDERS = st.lists(st.builds(Order, ANY, ANY, ANY, ANY, ANY, ANY, ANY), min_size=1, max_size=30)
 
@@ -32,7 +40,84 @@ def test_whatever_is_asked_size_and_rate_stay_within(asked: list[Order], share: 
             now, before = getattr(sent, name) * scale, getattr(last, name) * scale
             assert abs(now) <= 200.0 * (1.0 + 1e-12)
             assert abs(now - before) <= step
+        assert most(sent) <= 200.0 * (1.0 + 1e-9)
         last = sent
+
+
+def most(order: Order, own: float = 0.0) -> float:
+    """Return the largest force that an order makes within the travel, by trying places, N."""
+    if 0.0 < order.break_at < TRAVEL:
+        ends = np.array([0.0, order.break_at, TRAVEL])
+        slopes = np.array([own + order.gradient, own + order.second])
+        force = np.concatenate(([0.0], np.cumsum(slopes * np.diff(ends))))
+    else:
+        force = np.array([0.0, TRAVEL * (own + order.gradient)])
+    return float(np.abs(order.breakout + force).max())
+
+
+@given(ORDERS)
+def test_the_loader_s_own_spring_counts_where_the_host_orders_it(asked: list[Order]) -> None:
+    own = 900.0  # N/m: 162 N at the end of the travel
+    limiter = Limiter(LIMITS, TRAVEL, FRAME_s, own)
+    for order in asked:
+        assert most(limiter.order(order, 1.0), own) <= 200.0 * (1.0 + 1e-9)
+
+
+def test_what_is_together_too_much_is_reduced_in_proportion() -> None:
+    limiter, asked = Limiter(LIMITS, TRAVEL, FRAME_s), Order(1000.0, 1000.0, 0, 120.0, 0, 1560.0, 0)
+    for _ in range(200):
+        sent = limiter.order(asked, 1.0)
+    share = 200.0 / (1000.0 * TRAVEL + 120.0)
+    assert sent.gradient == pytest.approx(share * 1000.0)
+    assert sent.breakout == pytest.approx(share * 120.0)
+
+
+def watched(force: Floats, computed: Floats, more: Floats, gauge: bool = True) -> list[str]:
+    """Return what is said of each sample of a control; δ is as it should be, and `more`."""
+    plausible = Plausibility(COLUMN, FRAME_s, gauge)
+    servo = Servo(COLUMN, FRAME_s)
+    places = [servo.move(float(one)) for one in computed]
+    samples = zip(force, computed, places + K * force + more, strict=True)
+    return [plausible.look(Measured(*map(float, sample))) for sample in samples]
+
+
+def hand(seconds: float, noise: float = 0.05) -> tuple[Floats, Floats]:
+    """Return the force in N of a hand that moves a control by 30 N, and δc in m."""
+    time = np.arange(0.0, seconds, FRAME_s)
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * time)
+    return force + noise * np.random.default_rng(1).standard_normal(len(time)), force / 1200.0
+
+
+def test_what_a_healthy_control_measures_is_plausible() -> None:
+    force, computed = hand(20.0)
+    for more in (0.0 * force, 0.9 * K * force, 2e-3 * np.sign(force)):  # softened, with play
+        assert set(watched(force, computed, more)) == {""}
+    held = np.where(np.arange(len(force)) < 240, 0.0, 30.0)  # a force that is held, without noise
+    answer = lsim(([1.0], [4.0, 75.0, 1200.0]), held, FRAME_s * np.arange(len(held)))[1]
+    assert set(watched(held, np.asarray(answer), 0.0 * held)) == {""}
+
+
+@pytest.mark.parametrize("stuck", [0.0, 17.5, 2000.0])
+def test_a_gauge_that_is_lost_is_found_while_the_control_moves(stuck: float) -> None:
+    force, computed = hand(20.0)
+    begun, ended = round(5.0 / FRAME_s), round(12.0 / FRAME_s)
+    read = force.copy()
+    read[begun:ended] = stuck
+    said = watched(read, computed, K * (force - read))
+    assert set(said[:begun]) == {""}
+    assert all("force gauge" in one for one in said[begun + round(2.1 / FRAME_s) : ended])
+    assert "force gauge" in said[ended + round(0.9 / FRAME_s)]  # until it has been well for 1 s
+    assert set(said[ended + round(1.1 / FRAME_s) :]) == {""}
+    assert set(watched(read, computed, K * (force - read), gauge=False)[:begun]) == {""}
+
+
+def test_a_transducer_that_does_not_agree_is_found() -> None:
+    force, computed = hand(10.0)
+    begun = round(5.0 / FRAME_s)
+    more = np.where(np.arange(len(force)) < begun, 0.0, 0.05)
+    said = watched(force, computed, more)
+    assert set(said[: begun + round(0.2 / FRAME_s)]) == {""}
+    assert all("δ does not agree" in one for one in said[begun + round(0.25 / FRAME_s) :])
 
 
 def test_an_order_within_the_limits_passes_as_it_is() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lsim
 
 from coupled.api.rigs import load_rig
 from coupled.live.service import LEAST_N, Adaptation, BendEstimator, ServiceBend
@@ -97,6 +97,49 @@ def test_a_hand_that_does_too_little_teaches_nothing() -> None:
         estimator.look(float(f), 0.0, 3.0 * K * f)
     assert estimator.now.frozen
     assert estimator.now.bend == pytest.approx(before, rel=0.02)  # but for the second it takes
+
+
+def moved(frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return F in N and δc in d of a control that is moved by a hand, shape (frames,) each."""
+    time = FRAME_s * np.arange(frames)
+    force = 30.0 * np.sin(2.0 * np.pi * 0.5 * time)
+    return force, force / 1500.0
+
+
+def servoed(computed: np.ndarray) -> np.ndarray:
+    """Return the servo's answer to δc, straight between frames, by scipy's linear systems."""
+    w, z = 2.0 * np.pi * COLUMN.loader.servo_frequency, COLUMN.loader.servo_damping_ratio
+    time = FRAME_s * np.arange(len(computed))
+    _, answer, _ = lsim(([w * w], [1.0, 2.0 * z * w, w * w]), computed, time)
+    return np.asarray(answer)
+
+
+def test_a_sample_that_is_repeated_teaches_nothing() -> None:
+    force, computed = moved(2400)
+    deflection = servoed(computed) + K * force
+    estimator = BendEstimator(COLUMN, FRAME_s)
+    for f, c, d in zip(force[:1500], computed, deflection, strict=False):
+        estimator.look(float(f), float(c), float(d))
+    before = estimator.now
+    for _ in range(500):  # the loader is lost: its last sample is repeated
+        estimator.look(float(f), float(c), float(d), fresh=False)
+    assert estimator.now.bend == before.bend
+    assert estimator.now.frozen
+    for f, c, d in zip(force[2000:], computed[2000:], deflection[2000:], strict=True):
+        estimator.look(float(f), float(c), float(d))
+    assert not estimator.now.frozen
+    assert estimator.now.bend == pytest.approx(K, rel=2e-3)
+
+
+def test_lost_samples_leave_k_without_bias() -> None:
+    force, computed = moved(2400)
+    deflection = servoed(computed) + K * force
+    lost = np.random.default_rng(3).random(2400) < 0.05
+    estimator, held = BendEstimator(COLUMN, FRAME_s), (0.0, 0.0, 0.0)
+    for missing, *sample in zip(lost, force, computed, deflection, strict=True):
+        held = held if missing else (float(sample[0]), float(sample[1]), float(sample[2]))
+        estimator.look(*held, fresh=not missing)
+    assert estimator.now.bend == pytest.approx(K, rel=2e-3)
 
 
 def test_adaptation_is_slow_bounded_and_needs_to_be_sure() -> None:

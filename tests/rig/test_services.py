@@ -13,7 +13,7 @@ from coupled.flight.conditions import Conditions
 from coupled.flight.event import Event
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
-from coupled.flight.pilot import Pilot, Step
+from coupled.flight.pilot import ForceTable, Pilot, Step
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.packing import pack
@@ -42,7 +42,7 @@ def flown(
 ) -> Record:
     """Return a bench's record with services, the events that lead them, and a pilot.
 
-    Unless given, the pilot pulls with a force from 0.5 s on.
+    Unless a pilot is given, a force is held from 0.5 s on.
     """
     given = {f"{PLACE}.services.{key}": value for key, value in (services or {}).items()}
     whole = bench({**STRAIGHT, **given, **(rig or {})})
@@ -138,6 +138,19 @@ def test_an_autopilot_lets_go_of_a_hand_that_holds_on() -> None:
     assert at(record, "autopilot", 1.7) == 0.0
     assert at(record, "computed_m", 5.9) == pytest.approx(60.0 / G, rel=1e-3)
     assert at(flown(held, events, 45.0), "autopilot", 3.9) == 1.0
+
+
+def test_a_hand_that_lets_go_in_between_has_to_hold_for_the_whole_time_again() -> None:
+    """Of 1 s that an override takes: 0.7 s, a pause, 0.7 s do not; 1.2 s at a stretch do."""
+    held = {**DRIVEN, "override_time_s": 1.0}
+    events = {"engage": {"service": "autopilot", "at_s": 0.1}}
+    times = [0.0, 0.5, 0.51, 1.2, 1.21, 1.7, 1.71, 2.4, 2.41, 5.0]
+    forces = [0.0, 0.0, 60.0, 60.0, 0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
+    twice = ForceTable(time_s=times, force_N=forces)
+    assert at(flown(held, events, twice), "autopilot", 3.9) == 1.0
+    times, forces = [0.0, 0.5, 0.51, 1.71, 1.72, 5.0], [0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
+    once = ForceTable(time_s=times, force_N=forces)
+    assert at(flown(held, events, once), "autopilot", 3.9) == 0.0
 
 
 def test_an_autopilot_engages_where_the_control_is() -> None:

@@ -44,6 +44,8 @@ class Diagnosis(Findings):
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and where their floors come from.
     filtered: Mapping[str, str] = field(default_factory=dict)
+    # What of live records is not judged, or not as it was recorded; a sentence each.
+    left_out: tuple[str, ...] = ()
 
     @property
     def first(self) -> Record:
@@ -102,6 +104,7 @@ class Diagnosis(Findings):
         filtered = filtered_words(self.filtered)
         said = summary(self, self.shrink, flight, filtered, self.next_test)
         said += f" {CIRCLED}" if self.choice.circled else ""
+        said = " ".join((said, *self.left_out))
         return said if self.baseline is None else f"{self.baseline.words} {said}"
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -122,6 +125,8 @@ class Diagnosis(Findings):
             found["circled"] = True
         if self.filtered:
             found["filtered"] = dict(self.filtered)
+        if self.left_out:
+            found["left_out"] = list(self.left_out)
         if self.baseline is not None:
             found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:

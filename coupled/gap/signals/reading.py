@@ -13,6 +13,7 @@ from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.driven import Drive
 from coupled.gap.signals.floors import floor_from, input_noise, noise_in
+from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
 from coupled.gap.signals.sensed import Sensed
 from coupled.gap.signals.served import left
@@ -43,19 +44,46 @@ class Reading:
         """The frames that the host missed."""
         return missed_in(self.record)
 
+    @cached_property
+    def live(self) -> Live | None:
+        """What of a live record can be judged; None of another record."""
+        return live_of(self.record)
+
+    @property
+    def judged(self) -> Mask | None:
+        """The rows at which stages of the loader are judged; None for all."""
+        return None if self.live is None or self.live.judged.all() else self.live.judged
+
+    def assumed(self) -> Assumed | None:
+        """Return K̂ as the host used it, where it changed in flight."""
+        return None if self.live is None else self.live.assumed.get(self.control)
+
     @property
     def surface(self) -> str:
         """The channel of the control's surface."""
         return f"{SURFACES[self.control]}_rad"
 
     def signal(self, quantity: str) -> Floats:
-        """Return a control's channel."""
+        """Return a control's channel; what a live loader measured at equal steps of its clock."""
+        return self._measured(channel(self.control, quantity))
+
+    def as_read(self, quantity: str) -> Floats:
+        """Return a control's channel as the host read it."""
         return self.record[channel(self.control, quantity)]
+
+    def _measured(self, name: str) -> Floats:
+        signals = {} if self.live is None else self.live.signals
+        return signals[name] if name in signals else self.record[name]
+
+    def _quiet(self, name: str) -> Floats:
+        """Return a channel over the rows by which its noise is estimated."""
+        signal = self._measured(name)
+        return signal if self.live is None else signal[self.live.quiet]
 
     def partner(self) -> list[Floats]:
         """Return the force in N on the control whose force leaks into this one, if recorded."""
         names = [channel(name, "force") for name in leaking(self.control)]
-        return [self.record[name] for name in names if name in self.record][:1]
+        return [self._measured(name) for name in names if name in self.record][:1]
 
     def load(self) -> Callable[[Rig], Floats | None]:
         """Return by the rig what load factor pulls at the bob weight; none where not recorded.
@@ -75,12 +103,16 @@ class Reading:
         """Return what a rig's channels have to do with what they measure."""
         return Sensed(rig, self.control, self.number)
 
-    def others(self) -> dict[str, Floats]:
-        """Return the forces in N on other controls of a common structure, where recorded."""
+    def others(self, as_read: bool = False) -> dict[str, Floats]:
+        """Return the forces in N on other controls of a common structure, where recorded.
+
+        As the host read them, or those of a live loader at equal steps of its clock.
+        """
         if self.rig.structure.stands_apart:
             return {}
         held = {str(n): channel(n, "force") for n in self.rig.controls if n != self.control}
-        return {name: self.record[force] for name, force in held.items() if force in self.record}
+        taken = self.record.__getitem__ if as_read else self._measured
+        return {name: taken(force) for name, force in held.items() if force in self.record}
 
     def missing(self) -> dict[str, list[str]]:
         """Return the channels that each stage would need and the record lacks."""
@@ -170,19 +202,20 @@ class Reading:
 
     def heard(self, quantity: str) -> Noise:
         """Return the noise of a control's channel."""
-        return noise_in(self.rig, self.name_of(quantity), self.signal(quantity))
+        name = self.name_of(quantity)
+        return noise_in(self.rig, name, self._quiet(name))
 
     def driving(self, quantity: str) -> Noise:
         """Return the noise of a control's channel that drives a stage, and may be a signal's."""
-        return input_noise(self.heard(quantity), self.signal(quantity))
+        return input_noise(self.heard(quantity), self._quiet(self.name_of(quantity)))
 
     def filtered(self) -> dict[str, str]:
         """Return {a channel of the control whose log was filtered: where its floor comes from}."""
         names = [self.name_of(quantity) for quantity in ("force", "computed", "deflection")]
         return {
-            name: floor_from(self.rig, name, self.record[name])
+            name: floor_from(self.rig, name, self._quiet(name))
             for name in names
-            if name in self.record and noise_of(self.record[name]).filtered
+            if name in self.record and noise_of(self._quiet(name)).filtered
         }
 
 

@@ -11,6 +11,7 @@ from coupled.gap.signals.floors import unsmoothed
 from coupled.gap.signals.output import Predict
 from coupled.gap.signals.reading import Reading
 from coupled.gap.thresholds import ROUNDING_SPAN
+from coupled.rig.hosted import held_over
 from coupled.rig.replay import replay_compensation
 from coupled.rig.rig import Rig
 
@@ -23,12 +24,14 @@ def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
     The floor is δc's noise, though both hold the same: F may be stamped a little late. Where the
     rig has it late, the record may hold another noise of F than the host had.
     """
-    computed, recorded = reading.signal("computed"), reading.signal("force")
-    control, others = reading.control, reading.others()
+    computed, recorded = reading.as_read("computed"), reading.as_read("force")
+    control, others = reading.control, reading.others(as_read=True)
+    assumed = reading.assumed()
 
     def made(rig: Rig, force: Floats) -> Floats:
         missed = reading.missed.under(rig, control)
-        return replay_compensation(rig, control, computed, force, others, missed)
+        made = replay_compensation(rig, control, computed, force, others, missed)
+        return made if assumed is None else made + held_over(assumed.estimate * force, missed)
 
     def predict(rig: Rig) -> Floats:
         return made(rig, reading.sensed(rig).as_the_host_had_it(recorded))

@@ -49,15 +49,18 @@ class Product:
     def unsure(self) -> NDArray[np.bool_]:
         """Where noise in δc says on which side of neutral it is, and a breakout makes F_mod jump.
 
-        There the prediction is the measurement. A jump that F_mod's own noise covers counts too,
-        where it is more than the gradient's rise: δc as read is on its right side more often than
-        δc smoothed, of an analog product as of a digital one.
+        And the rows of a live record at which the loader is not judged. There the prediction is the
+        measurement. A jump that F_mod's own noise covers counts too, where it is more than the
+        gradient's rise: δc as read is on its right side more often than δc smoothed, of an analog
+        product as of a digital one.
         """
         away, level = self._smooth - self._neutral, self._level.rms
         below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
         jump, rise = np.abs(above - below), np.abs(beyond - above)
         near = np.abs(away) < PRELOAD_UNSURE * level
-        return np.asarray(near & ((jump > PRELOAD_UNSURE * self.own.rms) | (jump > 2.0 * rise)))
+        jumps = near & ((jump > PRELOAD_UNSURE * self.own.rms) | (jump > 2.0 * rise))
+        judged = self.reading.judged
+        return np.asarray(jumps if judged is None else jumps | ~judged)
 
     @cached_property
     def echo(self) -> Floats:
@@ -81,7 +84,7 @@ class Product:
 
     @cached_property
     def _computed(self) -> Floats:
-        return self.reading.signal("computed")
+        return self.reading.as_read("computed")
 
     @cached_property
     def _smooth(self) -> Floats:
@@ -119,5 +122,7 @@ class Product:
         """Return the product of δc as read, N, by a rig, without one the nominal."""
         of = self.reading
         rig = of.rig if rig is None else rig
-        missed = of.missed.under(rig, of.control)
-        return replay_product(rig, of.control, read - self._neutral, *self._gradients, missed)
+        missed, assumed = of.missed.under(rig, of.control), of.assumed()
+        more = None if assumed is None else assumed.gradient
+        place = read - self._neutral
+        return replay_product(rig, of.control, place, *self._gradients, missed, more)

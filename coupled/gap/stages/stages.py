@@ -30,6 +30,7 @@ from coupled.gap.signals.floors import (
     with_error,
     without_echo,
 )
+from coupled.gap.signals.live import Mask
 from coupled.gap.signals.output import Hides, Output, Predict, heard, spread
 from coupled.gap.signals.reading import Reading
 from coupled.gap.signals.served import asked, left, services
@@ -166,28 +167,29 @@ class Reader(Reading):
         load_of = self.load()
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
-        every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
+        every = self._restarts(round(RESTART_s * self.rig.frame_rate))
+        own_starts = every if (drifts := self._drifts(gradient)) else self._restarts()
 
-        def driven(f: Floats, seen: Floats, every: int = every) -> Driven:
+        def driven(f: Floats, seen: Floats, starts: Mask = own_starts) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start."""
             nodes = Nodes(f)
             misread = computed - seen
-            rate = rate_of(seen, self.rig.frame_rate) if every else seen
+            rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
                 scale, hum = sensed.scale(len(seen)), sensed.hum(computed)
                 still = rate
-                if every and isinstance(hum, np.ndarray):
+                if rate is not seen and isinstance(hum, np.ndarray):
                     still = rate - rate_of(hum, self.rig.frame_rate)
-                restart = (every, (seen - hum) / scale, still / scale)
+                restart = (starts, (seen - hum) / scale, still / scale)
                 pull = sensed.force_on_nodes(nodes.of(rig), f)
                 if times:
                     pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
-                host = Hosted(services(self), self.missed.under(rig, self.control))
-                driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
+                made_by = (second, restart, self._hosted(rig))
+                driven_by = (pull, gradient, misread + hum, load_of(rig), *made_by)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
             return at
@@ -196,7 +198,7 @@ class Reader(Reading):
             def walked(rig: Rig) -> Floats:
                 return unwalked(rig, self.control, at, computed, times)
 
-            return walked if walks else lambda rig: at(rig, 0.0)
+            return self._judged(walked if walks else lambda rig: at(rig, 0.0), computed)
 
         def noisy(rig: Rig, k: int) -> Floats:
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
@@ -215,11 +217,33 @@ class Reader(Reading):
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
-        whole = self._made("loader", *made).under(force.noise)
-        if not every:
-            shot = driven(force.smooth, smooth, round(RESTART_s * self.rig.frame_rate))
-            whole = replace(whole, shots=lambda rig: shot(rig, 0.0))
-        return [replace(whole, rough=lambda rig: answer(rig, 0.0)) if walks else whole]
+        whole = self._made("loader", *made, judged=self.judged).under(force.noise)
+        if not drifts:
+            shot = driven(force.smooth, smooth, every)
+            shots = self._judged(lambda rig: shot(rig, 0.0), computed)
+            whole = replace(whole, shots=shots)
+        if not walks:
+            return [whole]
+        return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
+
+    def _hosted(self, rig: Rig) -> Hosted:
+        """Return what the record holds of the host's work."""
+        assumed = self.assumed()
+        more = None if assumed is None else assumed.gradient
+        return Hosted(services(self), self.missed.under(rig, self.control), more)
+
+    def _restarts(self, every: int = 0) -> Mask:
+        """Return the frames at which a replay starts as measured, and those `every` so many."""
+        frames = np.arange(len(self.record))
+        starts = np.zeros(len(frames), dtype=bool) if self.live is None else self.live.starts
+        return starts | (frames % every == 0) if every else starts
+
+    def _judged(self, predict: Predict, measured: Floats) -> Predict:
+        """Return a prediction that is the measurement where the loader is not judged."""
+        judged = self.judged
+        if judged is None:
+            return predict
+        return lambda rig: np.where(judged, predict(rig), measured)
 
     def _answering(self) -> list[Output]:
         """Return the force that answers an imposed motion."""
@@ -256,14 +280,15 @@ class Reader(Reading):
                 )
                 return sensed.zero + drive_linkage(rig, self.control, *driven_by, others)
 
-            return lambda rig: unratcheted(rig, self.control, at, measured)
+            return self._judged(lambda rig: unratcheted(rig, self.control, at, measured), measured)
 
         def noisy(rig: Rig, k: int) -> Floats:
             pulled = force.with_error(k + NOISE_TRIES)
             return driven(command.with_error(k), pulled)(rig)
 
         made = (measured, driven(command.smooth, force.smooth), noisy, self.heard("deflection"))
-        linkage = self._made("linkage", self.name_of("deflection"), *made, "computed")
+        name = self.name_of("deflection")
+        linkage = self._made("linkage", name, *made, "computed", judged=self.judged)
         return [replace(linkage, noises={"force": force.noise.rms})]
 
     def _compensation(self) -> list[Output]:

@@ -8,7 +8,6 @@ import json
 import multiprocessing
 import secrets
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from coupled.record.channels import (
 
 STATE_EVERY_s = 0.2
 START_s = 30.0  # how long the page's process may take to start
+MOST_WORDS = 64  # taken in one look, each some 10 µs of the frame
 SHOWN = ("force", "computed", "deflection", "estimate", "gradient", "modifying_force")
 
 
@@ -131,7 +131,7 @@ class Page:
             "calibrated": {name: one.calibrated for name, one in host.service.items()},
             "adapt": host.plan.adapt,
             "services": host.services(),
-            "happened": {key: value[-8:] for key, value in asdict(host.happened).items()},
+            "happened": {key: value[-8:] for key, value in vars(host.happened).items()},
         }
         self.board_memory.say(self._state)
 
@@ -140,10 +140,16 @@ class Page:
         self._state["warnings"] = [*self._state["warnings"][-4:], text]
 
     def words(self) -> Sequence[Word]:
-        """Return what was asked for since the last call; a page that has gone lets go."""
+        """Return what was asked for since the last call; a page that has gone lets go.
+
+        Of a hand's words the last counts. Of others there is one at most: to change a switch takes
+        a part of the frame.
+        """
         found: list[Word] = []
         try:
-            while not self.gone and len(found) < 16 and self._wire.poll():
+            for _ in range(MOST_WORDS):
+                if self.gone or found or not self._wire.poll():
+                    break
                 word = json.loads(self._wire.recv_bytes())
                 if word["what"] == "hand":
                     if word["control"] in self._wanted:

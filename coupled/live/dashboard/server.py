@@ -3,6 +3,9 @@
 It binds to loopback unless given another address. Every request needs the token of this flight; a
 websocket must come from the page itself (its Origin is the address that it is served at). What a
 browser asks for is checked here, and once more by the host.
+
+No browser can take the time that the flight needs: connections, viewers and words a second are
+bounded, a request that does not come is not waited for, and the process gives way to the flight's.
 """
 
 from __future__ import annotations
@@ -11,10 +14,13 @@ import asyncio
 import contextlib
 import json
 import math
+import os
 import secrets
 import signal
 import socket
 import threading
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -27,8 +33,10 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from coupled.live.dashboard.board import Board
+from coupled.record.channels import CONTROL_NAMES
 
 STATIC = Path(__file__).parent / "static"
 FILES = {
@@ -45,9 +53,14 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
+    "Connection": "close",
 }
 RATE_Hz = 60.0
 MOST_VIEWERS = 8
+MOST_CONNECTIONS = 32  # a page opens six for its files, and one that stays
+REQUEST_s = 5.0  # until a connection has sent its request
+WORDS_per_s, MOST_WORDS = 10.0, 20  # of all viewers, on average and at once; a hand's do not count
+NICE = 10  # steps by which the page's process gives way
 LARGEST_bytes = 2048
 WORDS = ("stop", "mark", "set", "lead", "save", "hand", "leave")
 
@@ -87,13 +100,48 @@ def word_of(text: str) -> dict[str, Any] | None:
     return plain | {"value": float(value)}
 
 
+class Bounded(H11Protocol):
+    """A connection that is one of MOST_CONNECTIONS at most, and has to send its request soon."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Refuse one too many; else wait for its request."""
+        assert isinstance(transport, asyncio.Transport)
+        super().connection_made(transport)
+        if len(self.connections) > MOST_CONNECTIONS:
+            transport.abort()
+        else:
+            self.loop.call_later(REQUEST_s, self._give_up)
+
+    def _give_up(self) -> None:
+        """End a connection that has sent no request; a websocket has another protocol by then."""
+        if self.cycle is None and self.transport.get_protocol() is self:
+            self.transport.abort()
+
+
+class Allowance:
+    """How many words may still be asked for: it fills by WORDS_per_s, up to MOST_WORDS."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._left, self._then = clock, float(MOST_WORDS), clock()
+
+    def take(self) -> bool:
+        """Take one; tell whether there was one."""
+        now = self._clock()
+        filled = self._left + WORDS_per_s * (now - self._then)
+        self._then, self._left = now, min(float(MOST_WORDS), filled)
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
 class Server:
     """The application: one flight's page."""
 
     def __init__(self, door: Door, board: Board, host: Connection, width: int) -> None:
         self._door, self._board, self._host, self._width = door, board, host, width
         self._viewers = 0
-        self._handed = asyncio.Lock()
+        self._allowance = Allowance()
 
     def app(self) -> Starlette:
         """Return the application."""
@@ -141,15 +189,23 @@ class Server:
             return
         await socket.accept()
         self._viewers += 1
-        sender = asyncio.create_task(self._send(socket))
+        moved: dict[str, dict[str, Any]] = {}  # a hand's last words, which the sender passes on
+        sender = asyncio.create_task(self._send(socket, moved))
         held: set[str] = set()
         try:
             while True:
                 word = word_of(await socket.receive_text())
-                if word is not None:
-                    if word["what"] == "hand":
+                if word is None:
+                    continue
+                if word["what"] == "hand":
+                    if word["control"] in CONTROL_NAMES:
                         held.add(word["control"])
+                        moved[word["control"]] = word
+                elif word["what"] in ("stop", "leave") or self._allowance.take():
                     self._pass(word)
+                else:
+                    await socket.close(1008, "too many words")
+                    break
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
@@ -162,10 +218,12 @@ class Server:
         with contextlib.suppress(OSError):
             self._host.send_bytes(json.dumps(word).encode())
 
-    async def _send(self, socket: WebSocket) -> None:
+    async def _send(self, socket: WebSocket, moved: dict[str, dict[str, Any]]) -> None:
         seen, count = -1, 0
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
+                while moved:
+                    self._pass(moved.popitem()[1])
                 seen, state = self._board.state(seen)
                 if state:
                     await socket.send_text(state)
@@ -188,6 +246,8 @@ def bind(address: str, port: int) -> socket.socket:
 def serve(address: str, port: int, token: str, memory: Any, host: Connection, width: int) -> None:
     """Be the page's process: say where it is, serve it, and end when the host has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's
+    if hasattr(os, "nice"):
+        os.nice(NICE)
     try:
         wire = bind(address, port)
     except OSError as error:
@@ -197,6 +257,7 @@ def serve(address: str, port: int, token: str, memory: Any, host: Connection, wi
     app = Server(door, Board(memory), host, width).app()
     config = uvicorn.Config(
         app,
+        http=Bounded,
         log_level="critical",
         ws="websockets-sansio",
         ws_max_size=LARGEST_bytes,

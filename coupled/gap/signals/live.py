@@ -1,0 +1,381 @@
+"""What of a live record can be judged: by its rows' validity, the loader's clock, and what changed.
+
+A host flies on when a sample of the loader does not come, so a row may repeat an older sample; it
+was taken at a time of the loader's own clock, which is not that of the frame. What the loader
+measured is brought to equal steps of the loader's clock. A sample that is missing is bridged where
+the gap is short, and its rows are left out where it is long. So are rows whose forces faded, and
+rows flown with hardware other than at the start. Where rows are left out a replay starts again from
+the state as measured.
+
+K̂ and the corrections may change in flight, by a switch or as K̂ follows K in service. The manifest
+lists when (`live.switched`, `live.adapted`), so the host's arithmetic is replayed with what it used
+at each moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import median_filter
+
+from coupled.errors import InputError
+from coupled.gap.thresholds import SHORTEST_RECORD_s
+from coupled.record.channels import (
+    CONTROL_NAMES,
+    FADED,
+    LOADER_TIME,
+    LOST,
+    REPEATED,
+    SWITCHED,
+    VALIDITY,
+    channel,
+    unit_of,
+)
+from coupled.record.record import Record
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+HARDWARE = ("bend", "friction", "breakout")  # what a switch changes of a simulated loader
+HOSTED = ("assumed_bend", "deflection", "gradient")  # and of the host's own arithmetic
+MEASURED = ("force", "computed", "deflection")
+
+# With a gap of three frames at 120 Hz the samples still hold what is below 15 Hz; a hand moves a
+# control below 5 Hz.
+BRIDGED_s = 0.025
+# After a replay has started from a measured state, what was wrong with that state fades: the
+# slowest of the shipped loaders has a time constant of 0.11 s, and the start is already measured to
+# within its noise.
+SETTLE_s = 0.2
+LEAD_s = 0.05  # samples before a start, from which its rate is estimated
+LEAST_s = 0.5  # a shorter stretch is not judged
+SHORTEST_s = 2.5  # of all stretches together: half of the shortest record
+# A clock whose rate differs by more than this from the host's is none: crystals keep 1e-4.
+CLOCK_RATE = 0.01
+CLOCK_WINDOW_s = 1.0  # over which the median of host's and loader's clocks is taken
+LEAST_STEP = 1e-3  # frames; samples nearer together are one
+CLOCK_STEP = 0.5  # frames; a host that misses a deadline is later by whole frames from there on
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """How far the K̂ that a host used differs from its first one, d/N, shape (frames,).
+
+    `estimate` is that of δ̂, `gradient` that of ΔG; a correction that is off has K̂ = 0.
+    """
+
+    estimate: Floats
+    gradient: Floats
+
+
+@dataclass(frozen=True)
+class Live:
+    """What of a live record can be judged; masks have shape (frames,).
+
+    judged    rows at which stages of the loader are judged
+    starts    rows at which their replays start from the state as measured
+    quiet     the longest stretch of samples, by which noise is estimated
+    signals   the channels that the loader measured, at equal steps of its clock
+    assumed   K̂ as the host used it, by the control; of those alone for which it changed
+    left_out  what is not judged, or not as it was recorded, and why; a sentence each
+    """
+
+    judged: Mask
+    starts: Mask
+    quiet: slice
+    signals: Mapping[str, Floats] = field(default_factory=dict)
+    assumed: Mapping[str, Assumed] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+
+def live_of(record: Record) -> Live | None:
+    """Return what of a live record can be judged; None of another record.
+
+    Raises InputError where its manifest is damaged.
+    """
+    live = record.manifest.get("live")
+    live = live if isinstance(live, Mapping) else {}
+    frame_s = float(np.median(np.diff(record.time_s)))
+    settings = _Settings(record, live, frame_s)
+    validity = _validity(record, live)
+    if validity is None and not settings.known:
+        return None
+    if validity is None:
+        validity = np.zeros(len(record))
+    sampled = (validity != REPEATED) & (validity != LOST)
+    bridged = _short_runs(~sampled, max(1, round(BRIDGED_s / frame_s)))
+    clock = _Clock(record, sampled, frame_s)
+    other = settings.other_hardware()
+    if not settings.known:  # something was switched, and nothing says what
+        other |= validity == SWITCHED
+    heard = sampled | bridged
+    judged, starts = _stretches(heard & (validity != FADED) & ~other, clock.jumps, frame_s)
+    present = [channel(control, q) for control in CONTROL_NAMES for q in MEASURED]
+    signals = {
+        name: clock.resampled(record[name], sampled, heard) for name in present if name in record
+    }
+    quiet = max(_runs(heard, clock.jumps), key=lambda run: run.stop - run.start, default=slice(0))
+    assumed = settings.assumed()
+    words = _words(frame_s, sampled, bridged, validity, other, clock)
+    return Live(judged, starts, quiet, signals, assumed, (*words, *map(_in_words, assumed.items())))
+
+
+def judged_part(record: Record, file: object) -> Record:
+    """Return a record up to the last row at which its loader can be judged.
+
+    Raises InputError where too little can be.
+    """
+    live = live_of(record)
+    if live is None or live.judged.all():
+        return record
+    frame_s = float(np.median(np.diff(record.time_s)))
+    rows = np.flatnonzero(live.judged)
+    whole = 0 if not rows.size else int(rows[-1]) + 1
+    if frame_s * len(rows) < SHORTEST_s or frame_s * whole < SHORTEST_RECORD_s:
+        problem = (
+            f"holds {frame_s * len(rows):.1f} s in which the loader can be judged, the last at"
+            f" {frame_s * whole:.1f} s; {SHORTEST_s:g} s are needed, and {SHORTEST_RECORD_s:g} s of"
+            " record"
+        )
+        raise InputError(file, VALIDITY, ". ".join((problem, *live.left_out)))
+    return record.rows(0, whole)
+
+
+def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
+    """Return each row's validity; of a record without that channel by when no answer came."""
+    if VALIDITY in record:
+        return record[VALIDITY]
+    spells = live.get("spells") or []
+    if not spells:
+        return None
+    found = np.zeros(len(record))
+    for spell in spells:
+        try:
+            begun, ended = spell
+            later = np.inf if ended is None else float(ended)
+            found[(record.time_s >= float(begun)) & (record.time_s < later)] = LOST
+        except (TypeError, ValueError):
+            raise _damaged("spells") from None
+    return found
+
+
+def _damaged(key: str) -> InputError:
+    problem = "is not as coupled live writes it; leave the manifest as it was written"
+    return InputError("the record's manifest", f"live.{key}", problem)
+
+
+def _runs(mask: Mask, cuts: Mask | None = None) -> list[slice]:
+    """Return the stretches of a mask; at `cuts` a new one begins."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
+    found = []
+    for first, last in edges.reshape(-1, 2):
+        inside = [] if cuts is None else first + 1 + np.flatnonzero(cuts[first + 1 : last])
+        found += [slice(a, b) for a, b in pairwise((int(first), *map(int, inside), int(last)))]
+    return found
+
+
+def _short_runs(mask: Mask, most: int) -> Mask:
+    """Return a mask's stretches of so many rows at most that lie between others."""
+    found = np.zeros(len(mask), dtype=bool)
+    for run in _runs(mask):
+        inner = run.start > 0 and run.stop < len(mask)
+        found[run] = inner and run.stop - run.start <= most
+    return found
+
+
+def _stretches(usable: Mask, jumps: Mask, frame_s: float) -> tuple[Mask, Mask]:
+    """Return the rows that are judged, and those at which a replay starts as measured."""
+    judged, starts = np.zeros(len(usable), dtype=bool), np.zeros(len(usable), dtype=bool)
+    lead, settle = round(LEAD_s / frame_s), round(SETTLE_s / frame_s)
+    for run in _runs(usable, jumps):
+        begun = run.start + lead + settle if run.start else 0
+        if run.stop - begun < LEAST_s / frame_s:
+            continue
+        judged[begun : run.stop] = True
+        if run.start:
+            starts[run.start + lead] = True
+    return judged, starts
+
+
+class _Clock:
+    """When the samples of a record were taken, in frames along equal steps of the loader's clock.
+
+    `at` is that of each row, `jumps` are the rows at which the steps start anew, and `problem` says
+    why the loader's clock is not used.
+    """
+
+    def __init__(self, record: Record, sampled: Mask, frame_s: float) -> None:
+        rows = np.flatnonzero(sampled)
+        self.at = np.arange(len(record), dtype=np.float64)
+        self.jumps, self.problem = np.zeros(len(record), dtype=bool), ""
+        if LOADER_TIME not in record or len(rows) < 3:
+            return
+        time, own = record.time_s[rows], record[LOADER_TIME][rows]
+        rate = float(np.median(np.diff(own) / np.diff(time)))
+        if not abs(rate - 1.0) < CLOCK_RATE:
+            self.problem = f"The loader's clock runs {rate:.3g} times as fast as the host's"
+            return
+        away = (own - time) / frame_s
+        window = 2 * round(0.5 * CLOCK_WINDOW_s / frame_s) + 1
+        usual = median_filter(away, window, mode="nearest")
+        cuts = np.concatenate(([False], np.abs(np.diff(usual)) > CLOCK_STEP))
+        self.jumps[rows[cuts]] = True
+        for part in _runs(np.ones(len(rows), dtype=bool), cuts):
+            near = np.abs(away[part] - usual[part]) < CLOCK_STEP
+            if not near.any():
+                continue
+            # The two clocks drift apart along a line; a short stretch does not show its slope.
+            degree = 1 if np.sum(near) > window else 0
+            drift = Polynomial.fit(rows[part][near], away[part][near], degree)
+            self.at[rows[part]] += away[part] - drift(rows[part])
+
+    def resampled(self, signal: Floats, sampled: Mask, heard: Mask) -> Floats:
+        """Return a signal at equal steps of the clock.
+
+        Rows that are not `heard` lie on a straight line between those that are.
+        """
+        rows = np.flatnonzero(sampled)
+        if len(rows) < 4:
+            return signal
+        before = np.maximum.accumulate(self.at[rows])[:-1]
+        rows = rows[np.concatenate(([True], self.at[rows][1:] > before + LEAST_STEP))]
+        moved = np.abs(self.at[rows] - rows).max() > LEAST_STEP
+        if heard.all() and len(rows) == len(signal) and not moved:
+            return signal
+        at, frames = self.at[rows], np.arange(len(signal))
+        found = np.interp(frames, at, signal[rows])
+        inside = heard & (frames >= at[0]) & (frames <= at[-1])
+        found[inside] = CubicSpline(at, signal[rows])(frames[inside])
+        return found
+
+
+class _Settings:
+    """What the host and a simulated loader were set to, row by row, by the record's manifest.
+
+    It is `known` where the manifest lists what was changed.
+    """
+
+    def __init__(self, record: Record, live: Mapping[str, Any], frame_s: float) -> None:
+        self._time, self._frame_s = record.time_s, frame_s
+        events = sorted(_events(live, frame_s), key=lambda event: event[0])
+        self._events = [event for event in events if event[0] <= self._time[-1]]
+        self._first = _first_settings(record)
+        self.known = bool(events)
+
+    def _rows(self, control: str, what: str) -> Floats | None:
+        """Return a setting's value at each row; None where its first one is not known."""
+        first = self._first.get(control, {}).get(what)
+        times, changes = self._changes(control, what)
+        if first is None:
+            return None if changes else np.zeros(len(self._time))
+        values = np.array([first, *changes])
+        return np.asarray(values[np.searchsorted(times, self._time, side="right")])
+
+    def _changes(self, control: str, what: str) -> tuple[list[float], list[float]]:
+        """Return when a setting was changed, s, and to which values."""
+        own = [(at, value) for at, of, key, value in self._events if (of, key) == (control, what)]
+        return [at for at, _ in own], [value for _, value in own]
+
+    def other_hardware(self) -> Mask:
+        """Return the rows flown with other hardware than the first, or with unknown settings."""
+        found = np.zeros(len(self._time), dtype=bool)
+        for control in CONTROL_NAMES:
+            for what in (*HARDWARE, *HOSTED):
+                rows = self._rows(control, what)
+                if rows is None:  # the first one is not known
+                    found |= self._time >= min(self._changes(control, what)[0])
+                elif what in HARDWARE:
+                    found |= rows != rows[0]
+        return found
+
+    def assumed(self) -> dict[str, Assumed]:
+        """Return K̂ as the host used it, of each control for which it changed."""
+        found: dict[str, Assumed] = {}
+        for control in CONTROL_NAMES:
+            bend, estimate, gradient = (self._rows(control, what) for what in HOSTED)
+            if bend is None or estimate is None or gradient is None:
+                continue
+            used = Assumed(*(bend * on - bend[0] * on[0] for on in (estimate, gradient)))
+            if used.estimate.any() or used.gradient.any():
+                found[control] = used
+        return found
+
+
+def _in_words(one: tuple[str, Assumed]) -> str:
+    """Return by how much a control's K̂ changed in flight."""
+    control, used = one
+    least = min(float(used.estimate.min()), float(used.gradient.min()))
+    most = max(float(used.estimate.max()), float(used.gradient.max()))
+    span = f"{least:+.3g} to {most:+.3g} {unit_of(control)}/N"
+    return f"The {control}'s K̂ in use changed by {span} in flight: each row has its own."
+
+
+def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, str, str, float]]:
+    """Yield what was changed: when it acts from, s, of which control, what, and to which value.
+
+    A switch is set before its frame, K̂ of an adaptation after it.
+    """
+    for change in live.get("switched") or []:
+        try:
+            at, value = float(change["time_s"]), float(change["value"])
+            yield at - 0.5 * frame_s, str(change["control"]), str(change["what"]), value
+        except (TypeError, KeyError, ValueError):
+            raise _damaged("switched") from None
+    for change in live.get("adapted") or []:
+        try:
+            at, control, value = change
+            yield float(at) + 0.5 * frame_s, str(control), "assumed_bend", float(value)
+        except (TypeError, ValueError):
+            raise _damaged("adapted") from None
+
+
+def _first_settings(record: Record) -> dict[str, dict[str, float]]:
+    """Return the settings that the flight began with, by control, as its manifest has them."""
+    found: dict[str, dict[str, float]] = {}
+    for control in CONTROL_NAMES:
+        bend = f"bend_{unit_of(control)}_per_N"
+        keys = {
+            "assumed_bend": ("compensation", bend),
+            "deflection": ("compensation", "deflection"),
+            "gradient": ("compensation", "gradient"),
+            "bend": ("loader", bend),
+            "friction": ("loader", "friction_N"),
+            "breakout": ("loader", "breakout_N"),
+        }
+        with suppress(KeyError, TypeError, ValueError):
+            data = record.manifest["rig"]["controls"][control]
+            found[control] = {what: float(data[part][key]) for what, (part, key) in keys.items()}
+    return found
+
+
+def _words(
+    frame_s: float, sampled: Mask, bridged: Mask, validity: Floats, other: Mask, clock: _Clock
+) -> Iterator[str]:
+    """Yield what of a record is not judged, or not as it was recorded."""
+
+    def seconds(mask: Mask) -> str:
+        first, last = np.flatnonzero(mask)[[0, -1]] * frame_s
+        return f"{frame_s * np.sum(mask):.2g} s between {first:.2f} s and {last:.2f} s"
+
+    if bridged.any():
+        share = 100.0 * float(np.mean(bridged))
+        yield f"{share:.2g} % of the loader's samples did not come: they are interpolated."
+    if (silent := ~sampled & ~bridged).any():
+        yield f"Left out: {seconds(silent)} in which the loader sent no new sample."
+    if (faded := validity == FADED).any():
+        yield f"Left out: {seconds(faded)} in which forces faded or a limit held them."
+    if other.any():
+        yield f"Left out: {seconds(other)} flown with other settings, as switched in flight."
+    if clock.jumps.any():
+        count = int(np.sum(clock.jumps))
+        span_s = SETTLE_s + LEAD_s
+        yield f"Left out: {span_s:g} s after each of {count} frames that the host missed."
+    if clock.problem:
+        yield f"{clock.problem}: its samples are taken at the host's frames."

@@ -1,0 +1,41 @@
+"""What a live flight records beside a batch flight's channels, one value a frame."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from coupled.record.channels import LOADER_TIME, VALIDITY
+from coupled.record.record import Record
+
+
+class Rows:
+    """How far each row can be used, and the time of its sample by the loader's clock.
+
+    `always` records the validity even where every row is fresh; `timed` records the loader's time,
+    which means nothing in lock-step.
+    """
+
+    def __init__(self, frames: int, always: bool, timed: bool) -> None:
+        self._always, self._timed = always, timed
+        self.validity = np.zeros(frames, np.uint8)
+        self.loader_time_s = np.full(frames, math.nan)
+
+    def beside(self, record: Record, first: int) -> Record:
+        """Return a record with these channels behind; its first row is frame `first`.
+
+        A simulated loader's validity is left out while no row differs from fresh.
+        """
+        rows = slice(first, first + len(record))
+        added: dict[str, Any] = {}
+        if self._always or self.validity[: rows.stop].any():
+            added[VALIDITY] = self.validity[rows]
+        if self._timed and math.isfinite(self.loader_time_s[0]):
+            added[LOADER_TIME] = self.loader_time_s[rows] - self.loader_time_s[0]
+        if not added:
+            return record
+        names = (*record.channels, *added)
+        data = np.column_stack((record.data, *added.values()))
+        return Record(names, data, {**record.manifest, "channels": list(names)})
