@@ -29,7 +29,7 @@ from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
-from coupled.gap.stages.imposed import under_motion
+from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -94,7 +94,7 @@ def _diagnose(
         raise InputError(file, "", problem)
     every = library_of(rig, control)
     library = [effect for effect in every if effect.can_be_tried(list(records.values()), control)]
-    library = under_motion(library) if readers[0].moved else library
+    library = as_judged(library, readers, outputs)
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)
 
@@ -135,7 +135,7 @@ def _diagnose(
         rivals=tuple(
             (s.effect.name, *(r.effect.name for r in s.rivals)) for s in choice.steps if s.rivals
         ),
-        settings=settings_of(choice, rig, control),
+        settings=settings_of(choice, rig, control, outputs),
         shrink=shrink(case, fitted, floors),
         nominal=rig,
         improved=choice.fit.rig,

@@ -25,6 +25,7 @@ from coupled.gap.search.fit import Fit, fit, touched
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import ALIKE, SHARES_IN
@@ -65,12 +66,18 @@ def fit_nominal(
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)
-    chosen = tuple(keys) or default_keys(rig, control, {output.stage for output in outputs})
-    effects = [freed(rig, control, key) for key in chosen]
-    for key, effect in zip(chosen, effects, strict=True):
-        if not touched(outputs, [effect]):
-            lacking = sorted({n for r in readers for n in r.missing().get(effect.stage, [])})
-            needs = ", ".join(lacking) or f"what judges the {effect.stage}"
+    judged = {output.stage for output in outputs}
+    if any(output.in_series for output in outputs):
+        judged.add("linkage")
+    chosen = tuple(keys) or default_keys(rig, control, judged)
+    effects = []
+    for key in chosen:
+        asked = freed(rig, control, key)
+        shown = as_judged([asked], readers, outputs)
+        effects += shown
+        if not touched(outputs, shown):
+            lacking = sorted({n for r in readers for n in r.missing().get(asked.stage, [])})
+            needs = ", ".join(lacking) or f"what judges the {asked.stage}"
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     _tell(tell, "fitting", 0, len(records) + 2)

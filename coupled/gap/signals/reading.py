@@ -98,6 +98,11 @@ class Reading:
             loader = [self.name_of("force"), self.name_of(self.imposed), *self._gradient_from()]
             needs = {"schedule": needs["schedule"], "loader": loader}
             lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        if self.in_series:
+            del needs["linkage"]
+            needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
+            needs["loader"] += self._gradient_from()
+            lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         if self.set_points:  # a bend is not to be seen without the force, but all else
             needless = self.name_of("force")
             lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
@@ -112,6 +117,13 @@ class Reading:
     def moved(self) -> bool:
         """Whether the motion is imposed, and the force its answer."""
         return self.rig.controls[self.control].drive == "displacement"
+
+    @property
+    def in_series(self) -> bool:
+        """Whether the record has F and δ without δc: loader and linkage are judged in series."""
+        if self.moved or self.set_points or self.name_of("computed") in self.record:
+            return False
+        return all(self.name_of(quantity) in self.record for quantity in ("force", "deflection"))
 
     @property
     def imposed(self) -> str:
