@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.rig.linkage import servo_weights
+from coupled.rig.linkage import weights_of_servo
 from coupled.rig.parameters import Control
 
 MEMORY_s = 10.0  # time constant of the forgetting, of time in which the hand moves
@@ -64,9 +64,7 @@ class BendEstimator:
 
     def __init__(self, control: Control, frame_s: float, memory_s: float = MEMORY_s) -> None:
         loader, found = control.loader, control.calibration
-        omega = 2.0 * math.pi * loader.servo_frequency
-        weights = servo_weights(omega, loader.servo_damping_ratio, frame_s)
-        self._a, self._b = (row.tolist() for row in weights)
+        self._a, self._b = (row.tolist() for row in weights_of_servo(loader, frame_s))
         self._kept = math.exp(-frame_s / memory_s)
         self._second = math.exp(-frame_s)
         self._frame_s = frame_s

@@ -184,10 +184,25 @@ def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None
     if sensing.gauge_delay * rig.frame_rate * rig.substeps > GAUGE_SLOTS - 2:
         problem = "is too long for this loader_rate_Hz; lower either"
         raise InputError(file, f"{path}.sensing.gauge_delay_s", problem)
+    if control.loader.servo_frequency == 0.0:
+        _check_without_servo(control, file, path)
     for key in ("computed_skew", "force_skew", "gradient_skew"):
         if getattr(sensing, key) > frame_s:
             problem = f"must lie within the frame of {frame_s:g} s"
             raise InputError(file, f"{path}.sensing.{key}_s", problem)
+
+
+def _check_without_servo(control: Control, file: object, path: str) -> None:
+    """Refuse what only a servo has, on a rig without one."""
+    loader, names = control.loader, ("servo_rate_share", "servo_acceleration_limit")
+    for key, name in file_keys(type(loader), "{d}").items():
+        if name in names and getattr(loader, name) > 0.0:
+            problem = "needs a servo; give servo_frequency_Hz, or 0 here"
+            raise InputError(file, f"{path}.loader.{key}", problem)
+    if control.sensing.gauge_mass > 0.0:
+        problem = "needs a servo, which moves it (servo_frequency_Hz); without one, what lies"
+        problem += " beyond the gauge is part of the loader's mass_kg"
+        raise InputError(file, f"{path}.sensing.gauge_mass_kg", problem)
 
 
 def _check_inertia(control: Control, file: object, path: str, d: str) -> None:

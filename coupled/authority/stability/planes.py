@@ -38,6 +38,11 @@ from coupled.schema import changed
 Floats = NDArray[np.float64]
 Kind = Literal["assumed", "frame", "hand", "servo", "gauge", "mass"]
 KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo", "gauge", "mass")
+
+
+def kinds_of(control: Control) -> tuple[Kind, ...]:
+    """Return the planes of a control: what lies beyond the gauge moves with a servo only."""
+    return KINDS if control.loader.servo_frequency > 0.0 else KINDS[:-1]
 GAUGE_Hz = 50.0  # the amplifier of a gauge that a rig file says nothing of
 FIRM = 1.0  # K·k_h of a hand as stiff as the structure
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
