@@ -45,6 +45,8 @@ class Loader(Section):
     relaxing_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     relaxing_time: float = quantity("s", 1.0, gt=0)
     force_limit: float = quantity("N", 0.0, ge=0)
+    stop_aft: float = quantity("{d}", 0.0, ge=0)
+    stop_forward: float = quantity("{d}", 0.0, ge=0)
     crosstalk: float = quantity("", 0.0, ge=-1, le=1)
     delay: float = quantity("s", 0.0, ge=0, le=0.2)
     multiplier: Literal["hybrid", "digital"] = "hybrid"

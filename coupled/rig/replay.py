@@ -261,7 +261,7 @@ def _loader(
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
     neutral, added, jammed, missed = given[6], given[7], given[8], given[9]
     start_loader(p.loader, s.loader, force[0])
-    ends = (-p.loader.travel, p.loader.travel)
+    ends = (-p.loader.forward, p.loader.aft)
     frames, read = len(misread), 0.0
     if len(fine) > 0:
         fine[0] = s.loader.computed

@@ -1,6 +1,7 @@
 """A rig as the text of a rig file: what `rigfile` reads, written back.
 
-Values at their defaults are left out, but for those that a file gives together; floats are written so that they read back the same.
+Values at their defaults are left out, but for those that a file gives together; floats are
+written so that they read back the same.
 """
 
 from __future__ import annotations

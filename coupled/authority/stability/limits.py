@@ -90,7 +90,8 @@ def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
     control = rig.controls[name]
     stiffest = gradient_range(control)[1]
     limits = tuple(
-        replace(_limit(rig, name, kind, stiffest), filed=filed(rig, name, kind)) for kind in kinds_of(control)
+        replace(_limit(rig, name, kind, stiffest), filed=filed(rig, name, kind))
+        for kind in kinds_of(control)
     )
     share, growths = stiffest * control.loader.bend, _growths(rig, name, stiffest)
     return StabilityLimits(name, stiffest, share, limits, growths)

@@ -8,6 +8,7 @@ from coupled.gap.effects.effect import Effect, Signature
 from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
 from coupled.gap.effects.frictions import FRICTIONS
 from coupled.gap.effects.ripples import ripples
+from coupled.gap.effects.stops import stops
 from coupled.gap.thresholds import CLOCK_s
 
 LOADER: tuple[Effect, ...] = (
@@ -109,6 +110,16 @@ LOADER: tuple[Effect, ...] = (
         "force_limit",
         limit("limit_N", "loader.force_limit_N", 0.001, 2000, 10.0, 60.0),
         *("computed", "missing"),
+    ),
+    Effect(
+        "travel",
+        "loader",
+        (
+            limit("aft_{d}", "loader.stop_aft_{d}", 1e-4, 10, 0.05),
+            limit("forward_{d}", "loader.stop_forward_{d}", 1e-4, 10, 0.05),
+        ),
+        Signature("computed", "missing"),
+        seen=stops,
     ),
     replace(
         one(

@@ -90,6 +90,8 @@ def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float,
     wide = rig.controls[control].tolerance.get(number.key_on(control))
     if wide is None and tolerance <= 0.0:
         return None
+    if number.mode == "factor" and not number.nominal(rig, control):
+        return None  # the rig has none of it, as a servo
     neutral = number.neutral(rig, control)
     if wide is not None:
         filed = float(number.nominal(rig, control))

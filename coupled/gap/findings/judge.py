@@ -138,7 +138,8 @@ class Judge:
         known |= {"loader": "δc is a set point"} if reader.set_points else {}
         known |= {"surface": BY_LAWS} if flown else {}
         if name in known:
-            return StageResult(name, why=known[name])
+            shown = ("loader",) if name == "linkage" and with_loader else ()
+            return StageResult(name, why=known[name], shown_in=shown)
         if name == "airframe" and flown:
             lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
             return StageResult(name, missing=tuple(lacking))

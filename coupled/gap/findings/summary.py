@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import dotted
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import Shrink
@@ -146,7 +148,14 @@ def _set(found: Findings) -> str:
         return ""
     numbers = [p for effect in found.effects for p in effect.parameters]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
-    return " ".join(f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True))
+    said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
+    switches = [
+        p for one in found.effects for p in BY_NAME[one.name].parameters if p.mode == "switch"
+    ]
+    for one in switches:
+        key = dotted(one.key_on(found.control), found.control)
+        said.append(f"Set {key} in the rig file to {json.dumps(one.on)}.")
+    return " ".join(said)
 
 
 def _settings(found: Findings) -> str:

@@ -92,4 +92,3 @@ class Series:
     def noisy(self, rig: Rig, k: int) -> Floats:
         """Return the prediction with sample number k of what is wrong with the smoothed force."""
         return self._predicted(self.force.with_error(k), 2.0**0.5)(rig)
-
