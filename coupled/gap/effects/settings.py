@@ -21,7 +21,7 @@ CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share
 MOST_ELASTIC = 0.95
 
 
-def settings(rig: Rig, control: ControlName, outputs: Sequence[Output]) -> dict[str, Effect]:
+def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
     """Return {the effect that frees the same number: the setting, free within its tolerance}.
 
     Of the `outputs`, those of loader and linkage in series show the linkage's settings, too.
