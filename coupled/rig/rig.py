@@ -158,6 +158,8 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    if loader.servo_frequency == 0.0:
+        _check_without_servo(control, file, path, d)
     _check_dynamics(rig, control, file, path)
     _check_inertia(control, file, path, d)
     _check_schedule(control, file, path, d)
@@ -184,18 +186,16 @@ def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None
     if sensing.gauge_delay * rig.frame_rate * rig.substeps > GAUGE_SLOTS - 2:
         problem = "is too long for this loader_rate_Hz; lower either"
         raise InputError(file, f"{path}.sensing.gauge_delay_s", problem)
-    if control.loader.servo_frequency == 0.0:
-        _check_without_servo(control, file, path)
     for key in ("computed_skew", "force_skew", "gradient_skew"):
         if getattr(sensing, key) > frame_s:
             problem = f"must lie within the frame of {frame_s:g} s"
             raise InputError(file, f"{path}.sensing.{key}_s", problem)
 
 
-def _check_without_servo(control: Control, file: object, path: str) -> None:
+def _check_without_servo(control: Control, file: object, path: str, d: str) -> None:
     """Refuse what only a servo has, on a rig without one."""
     loader, names = control.loader, ("servo_rate_share", "servo_acceleration_limit")
-    for key, name in file_keys(type(loader), "{d}").items():
+    for key, name in file_keys(type(loader), d).items():
         if name in names and getattr(loader, name) > 0.0:
             problem = "needs a servo; give servo_frequency_Hz, or 0 here"
             raise InputError(file, f"{path}.loader.{key}", problem)

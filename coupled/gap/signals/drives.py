@@ -43,7 +43,7 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
     if held or any(_made(record, control) for record in records):
         return rig.changed({f"controls.{control}.drive": "setpoint"})
     alone = all(name not in one and grip in one and force in one for one in records)
-    if alone and any(drifts(rig, control, _softest(rig, control, one)) for one in records):
+    if alone and any(drifts(rig, control, softest_gradient(rig, control, one)) for one in records):
         return rig.changed({f"controls.{control}.drive": "displacement"})
     return rig
 
@@ -57,7 +57,7 @@ def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
     return max(gradient, 0.0) * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * mass
 
 
-def _softest(rig: Rig, control: ControlName, record: Record) -> float:
+def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
     """Return the least gradient of a record, N/d: recorded, by its q̄, or the least of the table."""
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     schedule = rig.controls[control].schedule

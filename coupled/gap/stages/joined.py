@@ -18,10 +18,10 @@ def as_judged(
 
     Effects that show in none of them are left out.
     """
-    if readers[0].moved:
-        return under_motion(effects, readers[0].imposed)
     if any(output.in_series for output in outputs):
         return _in_series(effects, any(output.stage == "linkage" for output in outputs))
+    if readers[0].moved:
+        return under_motion(effects, readers[0].imposed)
     return list(effects)
 
 

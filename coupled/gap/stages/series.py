@@ -10,12 +10,14 @@ in that one output. A static record gives one number only, the slope of δ over 
 
 so that a bend, a gradient and a scale of the force are the same law there. The loader's mass and
 damping distinguish them where the force is fast enough for both to matter.
+
+On a bench that imposes the motion, what moves the grip takes up a rigid play by the side of the
+force, δ = x + sgn(F)·play/2 + bend(F). Within the play no force acts, and δ may be anywhere in it.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import smoothed
@@ -24,11 +26,13 @@ from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
 from coupled.gap.signals.served import services
 from coupled.gap.stages.ratchet import Driven, is_walked, unratcheted, unwalked
+from coupled.record.channels import unit_of
 from coupled.rig.hosted import Hosted
 from coupled.rig.nodes import Nodes
 from coupled.rig.replay import drive_series
 from coupled.rig.rig import Rig
 
+NO_FORCE = 3.0  # of the noise of F: within it, the force is none
 SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
 
 
@@ -49,7 +53,7 @@ class Series:
         """Return the answer to a force, N at the frames, and so many times its noise."""
         reading, nodes = self._reading, Nodes(force)
 
-        def at(rig: Rig, times: float) -> NDArray[np.float64]:
+        def at(rig: Rig, times: float) -> Floats:
             sensed = reading.sensed(rig)
             pull = sensed.force_on_nodes(nodes.of(rig), force)
             bending = sensed.force(force)
@@ -63,7 +67,18 @@ class Series:
             read = drive_series(rig, reading.control, *driven_by, host, self._others)
             return sensed.zero + read
 
-        return at
+        def taken_up(rig: Rig, times: float) -> Floats:
+            loader = rig.controls[reading.control].loader
+            if loader.play == 0.0 or loader.play_stiffness > 0.0:
+                return at(rig, times)
+            key = f"controls.{reading.control}.loader.play_{unit_of(reading.control)}"
+            held, half = at(rig.changed({key: 0.0}), times), 0.5 * loader.play
+            true = reading.sensed(rig).force(force)
+            free = np.clip(reading.signal("deflection"), held - half, held + half)
+            acts = np.abs(true) > NO_FORCE * self.force.noise.rms
+            return np.where(acts, held + half * np.sign(true), free)
+
+        return taken_up if reading.by_hand else at
 
     def _predicted(self, force: Floats, times: float) -> Predict:
         reading, at = self._reading, self._driven(force)
@@ -71,7 +86,8 @@ class Series:
 
         def predicted(rig: Rig) -> Floats:
             loader = rig.controls[reading.control].loader
-            if loader.play or loader.bend_hysteresis_share:
+            ratchets = loader.play > 0.0 and not reading.by_hand
+            if ratchets or loader.bend_hysteresis_share:
                 return unratcheted(rig, reading.control, at, measured)
             if self._walks:
                 return unwalked(rig, reading.control, at, measured, times)
