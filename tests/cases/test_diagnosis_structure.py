@@ -14,16 +14,24 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from coupled.authority.stability.linear import growth as linear_growth
+from coupled.authority.stability.planes import linear_rig
 from coupled.errors import InputError
 from coupled.gap.diagnose import diagnose
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.nominal import fit_nominal
 from coupled.record.record import Record, read_record
 from coupled.resources import find, shipped_rigs
+from coupled.rig.growth import growth as simulated_growth
+from coupled.rig.packing import Hand
+from coupled.rig.replay import replay_linkage
 from coupled.rig.rig import Rig
-from coupled.rig.rigfile import read_rig
-from tests.support.rigs import K_REPORT, bench
+from coupled.rig.rigfile import read_rig, rig_from_table
+from coupled.rig.rigwrite import rig_text
+from coupled.schema import loads_toml
+from tests.support.rigs import K_REPORT, bench, push
 
 Floats = NDArray[np.float64]
 CASES = Path(__file__).parents[1] / "data" / "cases"
@@ -236,3 +244,39 @@ def test_a_stop_on_one_side_leaves_the_other_at_the_travel() -> None:
     sizes = {p.name: p.value for p in found.effects[0].parameters}
     assert sizes["aft_m"] == pytest.approx(0.03, rel=0.01)
     assert sizes["forward_m"] == pytest.approx(rig.controls["column"].travel)
+    assert "aft none → 0.03 m, forward none met" in found.summary
+
+
+def test_a_wheel_stops_in_radians_and_a_column_in_metres() -> None:
+    aft, forward = BY_NAME["travel"].free
+    assert (aft.named("wheel"), forward.named("column")) == ("aft_rad", "forward_m")
+    assert aft.key_on("wheel") == "loader.stop_aft_rad"
+
+
+@pytest.mark.parametrize(("force_N", "wanted_m"), [(60.0, 0.02), (-60.0, -0.03)])
+def test_a_loader_stops_where_each_side_has_its_stop(force_N: float, wanted_m: float) -> None:
+    """Both are less than the travel, and than the 60/560 m to which the spring would yield."""
+    rig = plain(stop_aft_m=0.02, stop_forward_m=0.03)
+    assert push(rig, force_N, 2.0)[-1] == wanted_m
+
+
+def test_a_stop_beyond_the_travel_is_none() -> None:
+    assert push(plain(stop_aft_m=9.0), 90.0, 2.0)[-1] == push(plain(), 90.0, 2.0)[-1]
+
+
+def test_a_grip_without_a_servo_is_where_the_computed_deflection_is() -> None:
+    rig = plain(servo_frequency_Hz=0.0, bend_m_per_N=0.0)
+    computed = 0.01 * np.sin(np.arange(200) / 9.0)
+    assert replay_linkage(rig, "column", computed, np.zeros(200)) == pytest.approx(computed)
+
+
+def test_a_rig_without_a_servo_reads_back_as_it_was_written() -> None:
+    rig = plain(servo_frequency_Hz=0.0)
+    assert rig_from_table(loads_toml(rig_text(rig), "text"), "text") == rig
+
+
+def test_without_a_servo_a_free_loader_dies_by_half_its_damping_over_its_mass() -> None:
+    """A closed form, c/(2·m) = 75/8 1/s, of a mass on a spring with damping below critical."""
+    rig = linear_rig(plain(servo_frequency_Hz=0.0), "column", 560.0)
+    assert linear_growth(rig, Hand()) == pytest.approx(-75.0 / 8.0)
+    assert simulated_growth(rig, Hand(), 3.0) == pytest.approx(-75.0 / 8.0, rel=0.01)

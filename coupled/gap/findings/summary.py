@@ -146,7 +146,7 @@ def _set(found: Findings) -> str:
     """Return what to set, so that host and rig file have what was found."""
     if found.verdict not in ("effect", "mostly"):
         return ""
-    numbers = [p for effect in found.effects for p in effect.parameters]
+    numbers = [p for effect in found.effects for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
     said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
     switches = [
@@ -280,8 +280,20 @@ def _closes(shrink: Shrink) -> str:
 
 
 def _effect(effect: EffectResult) -> str:
-    numbers = ", ".join(change(parameter) for parameter in effect.parameters)
+    pairs = zip(labels(effect), effect.parameters, strict=True)
+    numbers = ", ".join(f"{label} {change(p)}".lstrip() for label, p in pairs)
     return f"{plain(effect.name)}, {numbers}" if numbers else plain(effect.name)
+
+
+def labels(effect: EffectResult) -> list[str]:
+    """Return what to call each number of an effect: nothing where its unit says which it is."""
+    units = [p.unit for p in effect.parameters]
+    return [p.name.partition("_")[0] if units.count(p.unit) > 1 else "" for p in effect.parameters]
+
+
+def _is_none(p: ParameterEstimate) -> bool:
+    """Tell whether a number is of a limit that is not filed, and that no record meets."""
+    return p.filed is None and p.found_low is None and p.found_high is None
 
 
 def _found(p: ParameterEstimate) -> str:
@@ -299,6 +311,8 @@ def figure(value: float) -> str:
 def change(p: ParameterEstimate) -> str:
     """Return a parameter as filed → found (change), with its unit."""
     unit = f" {p.unit}" if p.unit else ""
+    if _is_none(p):
+        return "none met"
     if p.filed is None:
         return f"none → {figure(p.found)}{unit}"
     more = p.found - p.filed
