@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlParameters
 from coupled.rig.events import sign
@@ -82,7 +83,7 @@ def answer_to(
 
 def behind_linkage(
     rig: Rig,
-    control: str,
+    control: ControlName,
     read: Floats,
     force_N: Floats,
     others_N: Mapping[str, Floats] | None = None,

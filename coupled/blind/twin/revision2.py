@@ -18,8 +18,10 @@ from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
 Found = dict[str, float]
 CONTACT_s = 2e-3  # damping over stiffness of a contact in the play
-OF_SERVO = ("servo_lag", "servo_delay", "servo_tuning", "servo_rate_limit")
-OF_SERVO += ("servo_acceleration_limit",)
+OF_SERVO = (
+    *("servo_lag", "servo_delay", "servo_tuning", "servo_rate_limit"),
+    "servo_acceleration_limit",
+)
 STIFF_BEND_m_per_N = 1e-4  # what a rig that is filed as rigid bends, times the size
 
 

@@ -28,8 +28,10 @@ USUAL = {
 }
 SERVO_START_Hz = 20.0  # chosen, amid the 8 to 30 Hz of control loaders
 # Numbers of which 0 means that there is none: a fit of one stays above 0.
-NONE_AT_ZERO = ("servo_frequency", "bend_frequency", "bend_limit", "force_limit", "play_stiffness")
-NONE_AT_ZERO += ("servo_rate_limit", "servo_acceleration_limit", "stop_aft", "stop_forward")
+NONE_AT_ZERO = (
+    *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
+    *("bend_limit", "force_limit", "play_stiffness", "stop_aft", "stop_forward"),
+)
 FAR = 1e3  # times where a fit starts: as far as a number without a bound may go
 
 
