@@ -60,9 +60,12 @@ MOST_FAULTS = 20  # of one table that are named
 MOST_DOTS = 100  # in a dotted key; tomllib's time grows with their square
 
 
-def quantity(unit: str, default: Any = ..., **bounds: Any) -> Any:
-    """Declare a field with a unit; `{d}` stands for the control's unit of deflection."""
-    return Field(default, json_schema_extra={"unit": unit}, **bounds)
+def quantity(unit: str, default: Any = ..., *, written: bool = False, **bounds: Any) -> Any:
+    """Declare a field with a unit; `{d}` stands for the control's unit of deflection.
+
+    One that is `written` stands in every file that the package writes, at its default as well.
+    """
+    return Field(default, json_schema_extra={"unit": unit, "written": written}, **bounds)
 
 
 def named(key: str, default: Any = ..., **bounds: Any) -> Any:

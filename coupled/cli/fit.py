@@ -91,6 +91,8 @@ def _print(fitted: NominalFit) -> None:
     print_channels(out, fitted.channels)
     for one in fitted.alike:
         say(f"not distinguished: {one.words}")
+    for doubt in fitted.doubts:
+        say(f"doubtful: {doubt}")
     for key in fitted.unknown:
         say(f"not determined: {key}; nothing in these records depends on it")
     for number in fitted.numbers:

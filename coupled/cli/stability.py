@@ -42,7 +42,7 @@ def stability(
     """
     from coupled.authority.stability.aircraft import bob_weight
     from coupled.authority.stability.limits import disagreement, stability_limits
-    from coupled.authority.stability.planes import KINDS, plane
+    from coupled.authority.stability.planes import kinds_of, plane
     from coupled.cli.tables.stability import print_limits, write_planes
     from coupled.plots.saving import check_format, save
     from coupled.plots.stability import draw_stability
@@ -65,7 +65,7 @@ def stability(
         check_target(target, [file])
     check_json(json_file, [file, path, table])
     say_stale(data)
-    asked = [(name, kind) for name in bent for kind in KINDS]
+    asked = [(name, kind) for name in bent for kind in kinds_of(data.controls[name])]
     every = []
     err.print(
         f"simulating {len(asked)} maps, some thousand motions of a control each", soft_wrap=True

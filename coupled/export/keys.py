@@ -38,6 +38,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
             *("multiplier_offset", "multiplier_drift", "modifying_lag", "servo_frequency"),
             *("servo_damping_ratio", "servo_rate_limit", "bend", "bend_push", "bend_limit"),
             *("bend_hysteresis_share", "bend_hysteresis_width", "play", "arc_geometry"),
+            *("stop_aft", "stop_forward"),
         )
     ),
     Schedule: frozenset(

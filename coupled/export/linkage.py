@@ -37,6 +37,8 @@ class Grip:
 def add_weights(made: Made) -> None:
     """Add the servo's weights for a δc that runs straight over a substep (`servo_weights`)."""
     loader, system, h = made.control.loader, made.system, made.own("step-s")
+    if loader.servo_frequency == 0.0:
+        return
     w, z = 2.0 * math.pi * loader.servo_frequency, loader.servo_damping_ratio
     system.channel("servo's weights", "x'' = ω²·(δc − x) − 2ζω·x', stepped exactly")
     decay = exponential(-z * w * h)
@@ -63,12 +65,15 @@ def add_servo(made: Made, place: str, was: Motion, now: Motion, grip: Grip) -> G
     """Add one substep of servo and play; the hand's part is as before."""
     system, loader, own = made.system, made.control.loader, made.own
     x, v = grip.position, grip.rate
-    position = own("servo/x-by-x") * x + own("servo/swing") * v
-    position = position + own("servo/x-by-before") * was.computed
-    position = position + own("servo/x-by-after") * now.computed
-    rate = own("servo/v-by-x") * x + own("servo/v-by-v") * v
-    rate = rate + own("servo/v-by-before") * was.computed
-    rate = rate + own("servo/v-by-after") * now.computed
+    if loader.servo_frequency == 0.0:
+        position, rate = now.computed, (now.computed - was.computed) / own("step-s")
+    else:
+        position = own("servo/x-by-x") * x + own("servo/swing") * v
+        position = position + own("servo/x-by-before") * was.computed
+        position = position + own("servo/x-by-after") * now.computed
+        rate = own("servo/v-by-x") * x + own("servo/v-by-v") * v
+        rate = rate + own("servo/v-by-before") * was.computed
+        rate = rate + own("servo/v-by-after") * now.computed
     limit = loader.servo_rate_limit
     if limit > 0.0:
         step = limit * own("step-s")

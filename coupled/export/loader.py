@@ -31,6 +31,7 @@ from coupled.export.expression import (
     within,
 )
 from coupled.export.making import Made
+from coupled.rig.loader import stop_of
 
 
 @dataclass(frozen=True)
@@ -98,13 +99,14 @@ def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -
     if neutral is not None:
         reached = either(equal(halfway, neutral), 0.0, reached)
     travel = made.control.travel
+    aft, forward = stop_of(travel, loader.stop_aft), stop_of(travel, loader.stop_forward)
     out = f"{place}/computed"
-    computed = system.add(out, within(reached, -travel, travel))
+    computed = system.add(out, within(reached, -forward, aft))
     rate = _rate(made, v, halfway)
     if neutral is not None:
         slow = _too_slow(made, 2.0 * halfway - v, 0.5 * (before + after) + made.own("external-N"))
         rate = either(equal(halfway, neutral), either(slow, 0.0, 2.0 * halfway - v), rate)
-    rate = either(equal(size(computed), travel), 0.0, rate)
+    rate = either(equal(computed, aft), 0.0, either(equal(computed, -forward), 0.0, rate))
     moving = system.add(f"{place}/rate", rate)
     if felt is not None and loader.modifying_lag > 0.0:
         felt = _feel(made, f"{place}/felt-after", felt, computed)

@@ -30,7 +30,7 @@ from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
-from coupled.gap.stages.imposed import under_motion
+from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
@@ -97,7 +97,7 @@ def _diagnose(
         raise InputError(file, "", problem)
     every = library_of(rig, control)
     library = [effect for effect in every if effect.can_be_tried(list(records.values()), control)]
-    library = under_motion(library) if readers[0].moved else library
+    library = as_judged(library, readers, outputs)
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)
 
@@ -138,7 +138,7 @@ def _diagnose(
         rivals=tuple(
             (s.effect.name, *(r.effect.name for r in s.rivals)) for s in choice.steps if s.rivals
         ),
-        settings=settings_of(choice, rig, control),
+        settings=settings_of(choice, rig, control, outputs),
         shrink=shrink(case, fitted, floors),
         nominal=rig,
         improved=choice.fit.rig,

@@ -9,7 +9,8 @@ distinguished: a friction and a damping where all motion has one speed are one n
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,10 @@ from coupled.gap.search.fit import Fit, fit, touched
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import ALIKE, SHARES_IN
+from coupled.gap.thresholds import ALIKE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -65,12 +67,18 @@ def fit_nominal(
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"
         raise InputError(next(iter(records)), "", problem)
-    chosen = tuple(keys) or default_keys(rig, control, {output.stage for output in outputs})
-    effects = [freed(rig, control, key) for key in chosen]
-    for key, effect in zip(chosen, effects, strict=True):
-        if not touched(outputs, [effect]):
-            lacking = sorted({n for r in readers for n in r.missing().get(effect.stage, [])})
-            needs = ", ".join(lacking) or f"what judges the {effect.stage}"
+    judged = {output.stage for output in outputs}
+    if any(output.in_series for output in outputs):
+        judged.add("linkage")
+    chosen = tuple(keys) or default_keys(rig, control, judged)
+    effects = []
+    for key in chosen:
+        asked = freed(rig, control, key)
+        shown = as_judged([asked], readers, outputs)
+        effects += [_begun(effect, outputs, rig, control) for effect in shown]
+        if not touched(outputs, shown):
+            lacking = sorted({n for r in readers for n in r.missing().get(asked.stage, [])})
+            needs = ", ".join(lacking) or f"what judges the {asked.stage}"
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     _tell(tell, "fitting", 0, len(records) + 2)
@@ -84,13 +92,70 @@ def fit_nominal(
     )
     used = touched(outputs, effects)
     files = list(records)
+    known = _known(rig, control, numbers)
+    doubts = _doubts_of_servo(known, control, {one.key for one in numbers}, held.rig, used)
     return NominalFit(
         control,
-        _known(rig, control, numbers),
+        known,
         numbers,
         tuple(one for group in whole.information.items() for one in _alike(rig, control, *group)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
+        doubts,
     )
+
+
+def _doubts_of_servo(
+    found: Rig, control: ControlName, fitted: Set[str], held: Rig, used: Sequence[Output]
+) -> tuple[str, ...]:
+    """Return why a servo as fitted is none: its damping, or that the records need no servo.
+
+    `held` is the rig fitted to the stretches that are not held out. A servo whose numbers were not
+    fitted is not doubted.
+    """
+    loader = found.controls[control].loader
+    keys = {"loader.servo_frequency_Hz", "loader.servo_damping_ratio"}
+    if not keys & fitted or loader.servo_frequency == 0.0:
+        return ()
+    reasons = []
+    if loader.servo_damping_ratio < LEAST_SERVO_RATIO:
+        reasons.append(
+            f"a servo's damping ratio is at least {LEAST_SERVO_RATIO:g}, and this one would ring"
+        )
+    none = _without_servo(held, control)
+    if none is not None:
+        with_servo, without = (_left(used, rig) for rig in (held, none))
+        if without <= with_servo * (1.0 + SERVO_NEEDED):
+            reasons.append("without a servo the held-out stretches are predicted as well")
+    if not reasons:
+        return ()
+    found_as = (
+        f"servo_frequency_Hz = {loader.servo_frequency:.3g} with servo_damping_ratio ="
+        f" {loader.servo_damping_ratio:.2g} is no servo: {'; '.join(reasons)}."
+    )
+    advice = " For a machine without a servo leave out both keys, and fit again"
+    return (found_as + advice,)
+
+
+def _without_servo(rig: Rig, control: ControlName) -> Rig | None:
+    """Return a rig without its servo; None where it has what only a servo has."""
+    try:
+        return rig.changed({f"controls.{control}.loader.servo_frequency_Hz": 0.0})
+    except InputError:
+        return None
+
+
+def _left(used: Sequence[Output], rig: Rig) -> float:
+    """Return the rms of all residuals on stretches held out, in floors."""
+    left = np.concatenate([output.residual(rig, "held") for output in used])
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def _begun(effect: Effect, outputs: Sequence[Output], rig: Rig, control: ControlName) -> Effect:
+    """Return a freed number that a fit begins where the records show it, if they do."""
+    seen = [] if effect.seen is None else effect.seen(outputs, rig, control)
+    (number,) = effect.free
+    starts = tuple(one[number.name] for one in seen)
+    return replace(effect, parameters=(replace(number, starts=starts),)) if starts else effect
 
 
 def _tell(tell: Tell | None, what: str, done: int, total: int) -> None:

@@ -93,6 +93,7 @@ class NominalFit:
     numbers: tuple[Number, ...]
     alike: tuple[Alike, ...]
     channels: tuple[ChannelFit, ...]
+    doubts: tuple[str, ...] = ()  # what was found and cannot be a machine's, a sentence each
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -107,4 +108,5 @@ class NominalFit:
             "alike": [one.as_dict() for one in self.alike],
             "undetermined": list(self.unknown),
             "channels": [one.as_dict() for one in self.channels],
+            "doubts": list(self.doubts),
         }

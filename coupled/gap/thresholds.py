@@ -176,6 +176,11 @@ SLOPES_KEPT = 250_000  # chosen: numbers of a fit's slopes, 2 MB, that are kept 
 RIGS_KEPT = 3  # chosen: rigs, of the last asked for, whose floors are kept
 
 # A nominal rig from records (`nominal`).
+# A servo as fitted (`nominal`). Its phase margin in degrees is about 100 times its damping ratio
+# (Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, ch. 6): below 0.1 it has
+# less than 10°, where 30 to 60° are usual, and its resonance is five times the command.
+LEAST_SERVO_RATIO = 0.1
+SERVO_NEEDED = 0.01  # chosen: of the residual's rms, by which a servo must be better than none
 ALIKE = 0.05  # least eigenvalue of signatures' cosines: two at cosine 0.95 are one answer together
 SHARES_IN = 0.3  # chosen: of the largest part, from which a number belongs to such a group
 

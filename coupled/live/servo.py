@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from coupled.rig.linkage import servo_weights
+from coupled.rig.linkage import weights_of_servo
 from coupled.rig.parameters import Control
 
 BRIDGED_s = 0.025  # a gap in the samples up to which δc is taken to run straight
@@ -19,13 +19,12 @@ class Servo:
 
     def __init__(self, control: Control, frame_s: float) -> None:
         loader = control.loader
-        omega = 2.0 * math.pi * loader.servo_frequency
-        weights = servo_weights(omega, loader.servo_damping_ratio, frame_s)
-        self._a, self._b = (row.tolist() for row in weights)
-        # Five time constants of its slowest part: less than 1 % of a wrong start is left.
-        ratio = loader.servo_damping_ratio
+        self._a, self._b = (row.tolist() for row in weights_of_servo(loader, frame_s))
+        omega, ratio = 2.0 * math.pi * loader.servo_frequency, loader.servo_damping_ratio
         slowest = ratio if ratio <= 1.0 else ratio - math.sqrt(ratio * ratio - 1.0)
-        self._settle_s = 5.0 / (omega * slowest)
+        # Five time constants of its slowest part: less than 1 % of a wrong start is left.
+        # Without a servo the position is δc itself.
+        self._settle_s = 5.0 / (omega * slowest) if omega > 0.0 else 0.0
         self._frame_s = frame_s
         self._speed = self._before = self.position = 0.0
         self._missed = 0

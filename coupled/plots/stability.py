@@ -47,7 +47,9 @@ def draw_stability(rig: Rig, planes: Mapping[ControlName, Sequence[Plane]]) -> F
     norm = SymLogNorm(_LINEAR, vmin=-_FASTEST, vmax=_FASTEST)
     for i, (name, of_control) in enumerate(planes.items()):
         ours = grid[i * rows : (i + 1) * rows]
-        for axes, plane in zip(ours.flat, of_control, strict=True):
+        for axes in ours.flat[len(of_control) :]:
+            axes.set_visible(False)
+        for axes, plane in zip(ours.flat, of_control, strict=False):
             mesh = _panel(axes, plane, norm)
             _mark_own(axes, rig, plane)
             axes.set_title(f"{name}, {_TITLES[plane.kind]}", fontsize=10)

@@ -4,8 +4,15 @@ The loader's own laws, solved for the force instead of the motion:
 
     F = m·x'' + c·x' + friction + breakout·sgn(x) + springs(x) + F_mod − F_offset + b·(n_z − 1)
 
+Where the motion of the grip is imposed, the linkage lies between it and the loader. The structure's
+bend is a function of the measured force, and the servo's law is solved for its command u, x being
+the servo's place:
+
+    x = δ − bend(F),     u + (2ζp/ω)·u' = x + (2ζ/ω)·x' + x''/ω²
+
 Play lies between what is imposed and the loader, which follows once the play is taken up; in the
-gap no force is felt, and the loader goes where its own springs, against its damping, take it.
+gap no force is felt, and the loader goes where its own springs, against its damping, take it. A
+play whose contact yields bends by F/stiffness beside.
 
 A friction whose contact is rigid holds a still loader with any force up to its level: which, the
 motion does not say. It is taken to yield by a tenth of a thousandth of the travel, so that the
@@ -15,11 +22,15 @@ the blow at the end of a play lasts no time, and a force that is sampled has no 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
+from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry, stage
 from coupled.rig.control import ControlParameters
 from coupled.rig.events import sign
@@ -28,7 +39,10 @@ from coupled.rig.friction import bent_after, more_friction, running_friction
 from coupled.rig.inertia import set_inertia
 from coupled.rig.loader import LoaderState, set_external, start_loader
 from coupled.rig.modification import set_gradients
+from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import pack
+from coupled.rig.recorder import stamped
+from coupled.rig.replay import bent_by
 from coupled.rig.rig import Rig
 from coupled.rig.springs import elastic, feel, relax
 
@@ -65,6 +79,44 @@ def answer_to(
     accelerated = (speed[after] - speed[before]) / ((after - before) * h)
     share = 0.5 * (touched[np.maximum(at, 1)] + touched[np.minimum(at + 1, last)])
     return sampled + share * mass * accelerated, touched[before] != touched[after]
+
+
+def behind_linkage(
+    rig: Rig,
+    control: ControlName,
+    read: Floats,
+    force_N: Floats,
+    others_N: Mapping[str, Floats] | None = None,
+) -> Floats:
+    """Return the motion behind the linkage on the loader's nodes, d, for that of the grip.
+
+    `read` is what the transducer reads of δ at the frames, d, without its zero; `force_N` F at the
+    frames, N, which bends the structure, and `others_N` the forces on other controls. Play is left
+    out: where it lies, the loader's own motion decides (`answer_to`).
+    """
+    data = rig.controls[control]
+    loader, length = data.loader, data.length
+    true = read
+    if loader.arc_geometry:
+        true = length * np.arcsin(np.clip(read / length, -1.0, 1.0))
+    place = true - bent_by(rig, control, force_N, others_N)
+    if loader.play > 0.0 and loader.play_stiffness > 0.0:
+        place = place - force_N / loader.play_stiffness
+    nodes = on_nodes(rig, place)
+    rate_Hz = rig.frame_rate * rig.substeps
+    if loader.servo_frequency > 0.0:
+        omega, ratio = 2.0 * np.pi * loader.servo_frequency, loader.servo_damping_ratio
+        frames = np.arange(len(place))
+        curve = CubicSpline(frames, place)
+        speed = on_nodes(rig, curve(frames, 1) * rig.frame_rate)
+        gained = on_nodes(rig, curve(frames, 2) * rig.frame_rate**2)
+        nodes = nodes + 2.0 * ratio / omega * speed + gained / omega**2
+        lag = 2.0 * ratio * loader.servo_rate_share / omega * rate_Hz  # in substeps
+        if lag > 0.0:
+            kept = np.exp(-1.0 / lag)
+            start = kept * nodes[:1]
+            nodes = lfilter([1.0 - kept], [1.0, -kept], nodes, zi=start)[0]
+    return stamped(nodes, -loader.servo_delay * rate_Hz)
 
 
 @stage

@@ -1,6 +1,7 @@
 """Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
 
-    servo      x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit, |x''| ≤ acceleration
+    servo      (without one: x = u, |x'| ≤ rate limit)
+               x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit, |x''| ≤ acceleration
                limit, of a motor's torque or a profile;  u is δc as `command` gives it, late or
                in set points. p = 0: a servo on position, of second order,
                and with ζ far above 1 a proportional one, of first; p = 1: a PI controller of the
@@ -33,7 +34,7 @@ from numpy.typing import NDArray
 from coupled.rig.command import CommandParameters, CommandState, commanded
 from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Given
-from coupled.rig.parameters import DELAY_SLOTS
+from coupled.rig.parameters import DELAY_SLOTS, Loader
 
 CONTACT_s = 2e-3  # chosen: damping of a play's contact over its stiffness
 SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
@@ -99,10 +100,19 @@ def servo_weights(
     return np.column_stack((free, level - ramp / h, ramp / h))
 
 
-def _servo(g: Given) -> NDArray[np.float64]:
-    loader = g.control.loader
+def weights_of_servo(loader: Loader, h: float) -> NDArray[np.float64]:
+    """Return the map of a loader's servo over h seconds, as `servo_weights`.
+
+    Without a servo the place is δc itself, and the rate its mean over the substep.
+    """
+    if loader.servo_frequency == 0.0:
+        return np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / h, 1.0 / h]])
     omega = 2.0 * math.pi * loader.servo_frequency
-    return _weights(omega, loader.servo_damping_ratio, g.substep_s, loader.servo_rate_share)
+    return _weights(omega, loader.servo_damping_ratio, h, loader.servo_rate_share)
+
+
+def _servo(g: Given) -> NDArray[np.float64]:
+    return weights_of_servo(g.control.loader, g.substep_s)
 
 
 def _push(g: Given) -> float:
@@ -194,8 +204,12 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
     bends more, so a hand that takes this slope implicitly does not overshoot. What has mass does
     not bend at once.
     """
-    if p.modal:
-        return 0.0
+    return 0.0 if p.modal else static_slope(p, force)
+
+
+@stage
+def static_slope(p: LinkageParameters, force: float) -> float:
+    """Return the slope of `bend` by the force, d/N, of a structure that has come to rest."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
@@ -203,11 +217,36 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
 
 
 @stage
+def pressed(p: LinkageParameters, force: float) -> float:
+    """Return how far a force in N moves the grip ahead of the servo in a soft play at rest, d.
+
+    Half of the play, and what its contact yields: sgn(F)·play/2 + F/k; 0 for a rigid contact,
+    behind which the servo takes the grip along.
+    """
+    if p.contact == 0.0 or force == 0.0:
+        return 0.0
+    return math.copysign(0.5 * p.play, force) + force / p.contact
+
+
+@stage
+def loaded(p: LinkageParameters, force: float) -> float:
+    """Return how far the grip is ahead of the servo under a force that rose slowly, d.
+
+    The bend on the loading branch of its hysteresis, and a soft play.
+    """
+    bent = bend(p, force)
+    if p.share > 0.0:
+        carried = math.copysign(max(abs(force) - 0.5 * p.width, 0.0), force)
+        bent += p.share * (bend(p, carried) - bent)
+    return bent + pressed(p, force)
+
+
+@stage
 def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
     """Begin at rest under the force at the first node, N."""
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
-    s.asked = s.bent = _still(p, s, force)
+    s.asked = s.bent = still(p, s, force)
 
 
 @stage
@@ -219,7 +258,7 @@ def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None
     s.carried = min(max(s.carried, force - half), force + half)
     if p.modal:
         a, b, y, v = p.mode_position, p.mode_speed, s.bent, s.bent_rate
-        before, s.asked = s.asked, _still(p, s, force)
+        before, s.asked = s.asked, still(p, s, force)
         s.bent = a[0] * y + a[1] * v + a[2] * before + a[3] * s.asked
         s.bent_rate = b[0] * y + b[1] * v + b[2] * before + b[3] * s.asked
         if abs(s.bent) < TINY and abs(s.bent_rate) < TINY:
@@ -240,7 +279,7 @@ def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> Non
 
 
 @stage
-def _still(p: LinkageParameters, s: LinkageState, force: float) -> float:
+def still(p: LinkageParameters, s: LinkageState, force: float) -> float:
     """Return the bend under a force in N as it would stay, d."""
     bent = bend(p, force)
     if p.share > 0.0:
@@ -253,7 +292,7 @@ def _still(p: LinkageParameters, s: LinkageState, force: float) -> float:
 @stage
 def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
     """Return the true deflection δ at the grip in d under a force in N."""
-    return s.grip + (s.bent if p.modal else _still(p, s, force)) + s.others
+    return s.grip + (s.bent if p.modal else still(p, s, force)) + s.others
 
 
 @stage

@@ -1,7 +1,7 @@
 """Loader: the electronics' mass-spring-damper, from the pilot's force to δc.
 
     m·δc'' + c·δc' + friction·sgn(δc') + breakout·sgn(δc) + springs(δc) + F_mod
-        = F(t − delay) + F_offset − b·(n_z − 1),      |δc| ≤ travel, inelastic stops
+        = F(t − delay) + F_offset − b·(n_z − 1),      −forward ≤ δc ≤ aft, inelastic stops
 
 F is the pilot's force, and with crosstalk a share of that on another control (`crossing`).
 
@@ -56,7 +56,9 @@ class LoaderParameters(SpringParameters, DelayParameters, Protocol):
     breakout: float  # F_BO, N
     bob_weight: float  # b, N per g
     offset: float  # F_offset, N, with the pilot's force
-    travel: float  # stops at ±travel, d
+    travel: float  # of the control to either side, d
+    aft: float  # where δc stops on the positive side, d: the travel, or a stop within it
+    forward: float  # and on the negative side, as a size
 
 
 class LoaderState(SpringState, DelayState, Protocol):
@@ -75,6 +77,11 @@ class LoaderState(SpringState, DelayState, Protocol):
     stop: int  # the stop met during this frame: −1, 0 or +1
 
 
+def stop_of(travel: float, stop: float) -> float:
+    """Return where a control stops on one side, d: at its travel, or at a `stop` within it."""
+    return min(travel, stop) if stop > 0.0 else travel
+
+
 LOADER = Declaration(
     layout(LoaderParameters),
     section="control.loader",
@@ -82,6 +89,8 @@ LOADER = Declaration(
     | {
         "delay_substeps": lambda g: g.control.loader.delay / g.substep_s,
         "travel": lambda g: g.control.travel,
+        "aft": lambda g: stop_of(g.control.travel, g.control.loader.stop_aft),
+        "forward": lambda g: stop_of(g.control.travel, g.control.loader.stop_forward),
     },
     state=layout(LoaderState, history=(DELAY_SLOTS,)),
     fixed=("external", "mass", "damping", "neutral"),
@@ -112,10 +121,10 @@ def _release(
     """
     down, up = holds
     if s.computed >= ends[1] and start >= 0.0 and end >= 0.0:
-        s.stop = 1 if end > up and s.computed >= p.travel else s.stop
+        s.stop = 1 if end > up and s.computed >= p.aft else s.stop
         return 0.0, 0.0
     if s.computed <= ends[0] and start <= 0.0 and end <= 0.0:
-        s.stop = -1 if end < down and s.computed <= -p.travel else s.stop
+        s.stop = -1 if end < down and s.computed <= -p.forward else s.stop
         return 0.0, 0.0
     if not down <= start <= up:
         return 0.0, sign(start)
@@ -216,7 +225,7 @@ def _strike(p: LoaderParameters, s: LoaderState, ends: Ends) -> None:
     """Stop at the end that the control has met."""
     above = s.computed - ends[0] > ends[1] - s.computed
     s.computed, s.rate = ends[1] if above else ends[0], 0.0
-    if abs(s.computed) == p.travel:
+    if s.computed in (p.aft, -p.forward):
         s.stop = 1 if above else -1
 
 

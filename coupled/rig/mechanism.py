@@ -153,7 +153,7 @@ def run_frame(
             run_node(p, s, force, held, first_node, node, scripted)
         return
     # The same without what such a control has not, which to ask at every node takes a fifth.
-    h, ends = p.clock.substep, (-p.loader.travel, p.loader.travel)
+    h, ends = p.clock.substep, (-p.loader.forward, p.loader.aft)
     for node in range(first_node + 1, last + 1):
         move_muscle(p.hand, s.hand)
         before = s.loader.computed

@@ -8,8 +8,9 @@ forward are positive.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
+from coupled.errors import InputError
 from coupled.schema import Section, named, quantity
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.
@@ -17,6 +18,7 @@ PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
 MAX_ROWS = 32  # of a schedule's table
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
 GAUGE_SLOTS = 256  # of the gauge's, likewise
+SERVO_DAMPING_RATIO = 0.7  # of a servo that a fit adds to a rig without one; usual
 
 
 class Loader(Section):
@@ -43,14 +45,16 @@ class Loader(Section):
     relaxing_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     relaxing_time: float = quantity("s", 1.0, gt=0)
     force_limit: float = quantity("N", 0.0, ge=0)
+    stop_aft: float = quantity("{d}", 0.0, ge=0)
+    stop_forward: float = quantity("{d}", 0.0, ge=0)
     crosstalk: float = quantity("", 0.0, ge=-1, le=1)
     delay: float = quantity("s", 0.0, ge=0, le=0.2)
     multiplier: Literal["hybrid", "digital"] = "hybrid"
     multiplier_offset: float = quantity("N", 0.0)
     multiplier_drift: float = quantity("N_per_s", 0.0)
     modifying_lag: float = quantity("s", 0.0, ge=0, le=10)
-    servo_frequency: float = quantity("Hz", gt=0)
-    servo_damping_ratio: float = quantity("", gt=0)
+    servo_frequency: float = quantity("Hz", 0.0, ge=0, written=True)
+    servo_damping_ratio: float = quantity("", SERVO_DAMPING_RATIO, gt=0, written=True)
     servo_delay: float = quantity("s", 0.0, ge=0, le=0.5)
     servo_rate_share: float = quantity("", 0.0, ge=0, le=1)
     servo_rate_limit: float = quantity("{d}_per_s", 0.0, ge=0)
@@ -65,6 +69,18 @@ class Loader(Section):
     play: float = quantity("{d}", 0.0, ge=0)
     play_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     arc_geometry: bool = False
+
+    def __init__(self, **values: Any) -> None:
+        """Refuse half of a servo: a frequency without a damping ratio, or the other way."""
+        super().__init__(**values)
+        given = self.model_fields_set
+        lone = "leave out both for a machine without a servo"
+        if "servo_frequency" not in given and "servo_damping_ratio" in given:
+            problem = f"is missing beside servo_damping_ratio; give it, or {lone}"
+            raise InputError("coupled.Loader", "servo_frequency_Hz", problem)
+        if self.servo_frequency > 0.0 and "servo_damping_ratio" not in given:
+            problem = f"is missing beside servo_frequency_Hz; give it, or {lone}"
+            raise InputError("coupled.Loader", "servo_damping_ratio", problem)
 
 
 class Schedule(Section):

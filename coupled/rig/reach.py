@@ -83,7 +83,7 @@ def _place(
     linkage_p: LinkageParameters,
 ) -> tuple[float, float]:
     """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
-    low, high = 0.0, p.travel
+    low, high = 0.0, p.aft if side > 0.0 else p.forward
     x = min(r, high)
     rubs = friction.running + more_friction(friction, 0.0, side)
     level = p.breakout + m.breakout + rubs - side * s.external
@@ -142,12 +142,11 @@ def bounds(
 
     From beyond the reach, if it has moved inward, only back.
     """
-    travel = loader_p.travel
     if p.reach == 0.0:
-        return -travel, travel
+        return -loader_p.forward, loader_p.aft
     half = 0.5 * linkage_p.play
-    low = max(-travel, min(stop.bottom - half, computed))
-    return low, min(travel, max(stop.top + half, computed))
+    low = max(-loader_p.forward, min(stop.bottom - half, computed))
+    return low, min(loader_p.aft, max(stop.top + half, computed))
 
 
 @seldom

@@ -97,8 +97,37 @@ def drive_loader(
     begun, position, rate = (none, none, none) if restart is None else restart
     both = (gradient, gradient if second is None else second)
     rows = (*both, misread, level, position, rate, *host.rows(len(misread)), begun)
-    _loader(p, s, nodes_N, np.stack(rows), rig.substeps, h, out)
+    _loader(p, s, nodes_N, np.stack(rows), rig.substeps, h, out, np.empty(0))
     return out[0], out[1]
+
+
+def drive_series(
+    rig: Rig,
+    control: str,
+    nodes_N: Floats,
+    gradient: Floats,
+    force_N: Floats,
+    load_factor: Floats | None = None,
+    second: Floats | None = None,
+    host: Hosted = HOSTED,
+    others_N: Mapping[str, Floats] | None = None,
+) -> Floats:
+    """Return what the transducer at the grip reads, d, for F alone: loader and linkage in series.
+
+    `nodes_N` is F in N on the loader's nodes as the loader takes it (with another control's share),
+    `force_N` F at the frames as it bends the structure. The other arguments are those of
+    `drive_loader` and `replay_linkage`. δc is predicted, not measured; the host reads it without
+    error.
+    """
+    p, s = _one(rig, control)
+    frames = len(force_N)
+    level = np.ones(frames) if load_factor is None else load_factor
+    h, none = 1.0 / (rig.frame_rate * rig.substeps), np.zeros(frames)
+    both = (gradient, gradient if second is None else second)
+    given = np.stack((*both, none, level, none, none, *host.rows(frames), none))
+    computed = np.empty((frames - 1) * rig.substeps + 1)
+    _loader(p, s, nodes_N, given, rig.substeps, h, np.empty((2, frames)), computed)
+    return drive_linkage(rig, control, computed, force_N, others_N)
 
 
 def replay_product(
@@ -149,6 +178,20 @@ def drive_linkage(
     s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = nodes[0]
     bent = _by_others(rig, control, others_N or {}, 0, force_N)
     return _linkage(p, s, nodes, force_N, bent, rig.substeps, h, np.empty_like(force_N))
+
+
+def bent_by(
+    rig: Rig, control: str, force_N: Floats, others_N: Mapping[str, Floats] | None = None
+) -> Floats:
+    """Return the structure's bend in d at each frame under F in N, and the others' forces.
+
+    With its hysteresis and its mode, and without the linkage's play.
+    """
+    p, s = _one(rig, control)
+    p[0]["linkage"]["contact"] = 0.0
+    h = 1.0 / (rig.frame_rate * rig.substeps)
+    bent = _by_others(rig, control, others_N or {}, 0, force_N)
+    return _bent(p, s, force_N, bent, rig.substeps, h, np.empty_like(force_N))
 
 
 def replay_compensation(
@@ -210,10 +253,12 @@ def _loader(
     substeps: int,
     h: float,
     out: Floats,
+    fine: Floats,
 ) -> None:
     """Run the loader on what is `given`, shape (12, frames).
 
     G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, and restarts.
+    Write δc and F_mod at the frames to `out`, and δc at every node to `fine`, unless that is empty.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
@@ -221,8 +266,10 @@ def _loader(
     assumed, begun = given[10], given[11]
     bend = assumed_bend(p.modification)
     start_loader(p.loader, s.loader, force[0])
-    ends = (-p.loader.travel, p.loader.travel)
+    ends = (-p.loader.forward, p.loader.aft)
     frames, read = len(misread), 0.0
+    if len(fine) > 0:
+        fine[0] = s.loader.computed
     for k in range(frames):
         m = s.modification
         if begun[k] > 0.5:
@@ -247,6 +294,8 @@ def _loader(
                 if p.inertia.rows > 0:
                     led = lead_force(p.inertia, s.inertia, led)
                 move_loader(p.loader, p.friction, m, s.loader, led, here, h)
+                if len(fine) > 0:
+                    fine[node] = s.loader.computed
 
 
 @long_entry
@@ -283,6 +332,27 @@ def _linkage(
                 if p.carries:
                     share = (node + 1 - k * substeps) / substeps
                     carry(p, s, force[k] + share * (force[k + 1] - force[k]), h)
+    return out
+
+
+@long_entry
+def _bent(
+    parameters: Any,
+    states: Any,
+    force: Floats,
+    others: Floats,
+    substeps: int,
+    h: float,
+    out: Floats,
+) -> Floats:
+    p, s = parameters[0].linkage, states[0].linkage
+    start_bend(p, s, force[0])
+    for k in range(len(force)):
+        s.others = others[k]
+        out[k] = deflection(p, s, force[k])
+        if k + 1 < len(force) and p.carries:
+            for node in range(1, substeps + 1):
+                carry(p, s, force[k] + node / substeps * (force[k + 1] - force[k]), h)
     return out
 
 

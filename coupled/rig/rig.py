@@ -158,6 +158,8 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    if loader.servo_frequency == 0.0:
+        _check_without_servo(control, file, path, d)
     _check_dynamics(rig, control, file, path)
     _check_inertia(control, file, path, d)
     _check_schedule(control, file, path, d)
@@ -188,6 +190,19 @@ def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None
         if getattr(sensing, key) > frame_s:
             problem = f"must lie within the frame of {frame_s:g} s"
             raise InputError(file, f"{path}.sensing.{key}_s", problem)
+
+
+def _check_without_servo(control: Control, file: object, path: str, d: str) -> None:
+    """Refuse what only a servo has, on a rig without one."""
+    loader, names = control.loader, ("servo_rate_share", "servo_acceleration_limit")
+    for key, name in file_keys(type(loader), d).items():
+        if name in names and getattr(loader, name) > 0.0:
+            problem = "needs a servo; give servo_frequency_Hz, or 0 here"
+            raise InputError(file, f"{path}.loader.{key}", problem)
+    if control.sensing.gauge_mass > 0.0:
+        problem = "needs a servo, which moves it (servo_frequency_Hz); without one, what lies"
+        problem += " beyond the gauge is part of the loader's mass_kg"
+        raise InputError(file, f"{path}.sensing.gauge_mass_kg", problem)
 
 
 def _check_inertia(control: Control, file: object, path: str, d: str) -> None:

@@ -38,7 +38,12 @@ def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
             found["flight", "model_folder"] = new.flight.folder
     for name, control in new.controls.items():
         d = unit_of(name)
-        found |= _within(("controls", str(name)), old.controls[name], control, d)
+        path = ("controls", str(name))
+        found |= _within(path, old.controls[name], control, d)
+        added = old.controls[name].loader.servo_frequency == 0.0 < control.loader.servo_frequency
+        if added:  # a file gives both numbers of a servo, or none
+            ratio = control.loader.servo_damping_ratio
+            found[(*path, "loader", "servo_damping_ratio")] = ratio
     return found
 
 

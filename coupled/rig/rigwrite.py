@@ -1,6 +1,7 @@
 """A rig as the text of a rig file: what `rigfile` reads, written back.
 
-Values at their defaults are left out; floats are written so that they read back the same.
+Values at their defaults are left out, but for those that a file gives together; floats are
+written so that they read back the same.
 """
 
 from __future__ import annotations
@@ -65,7 +66,10 @@ def _values(section: Section, d: str) -> Iterator[str]:
     for key, field in file_keys(type(section), d).items():
         value = getattr(section, field)
         plain = isinstance(value, (bool, int, float, str, list))
-        if plain and value != type(section).model_fields[field].default:
+        known = type(section).model_fields[field]
+        marks = known.json_schema_extra
+        always = isinstance(marks, dict) and marks.get("written") is True
+        if plain and (always or value != known.default):
             yield f"{key} = {_shown(value)}"
 
 

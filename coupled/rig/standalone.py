@@ -118,7 +118,7 @@ def _frames(controls: Any, script: Floats, record: Floats, pressure: Floats) -> 
 def _supplied(parameters: Any, states: Any, supply_N: Floats, h: float) -> None:
     p, s = parameters[0], states[0]
     start_loader(p.loader, s.loader, 0.0)
-    ends = (-p.loader.travel, p.loader.travel)
+    ends = (-p.loader.forward, p.loader.aft)
     set_external(p.loader, s.loader, 1.0)
     for node in range(len(supply_N)):
         s.modification.held = -supply_N[node]

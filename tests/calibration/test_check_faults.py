@@ -29,6 +29,7 @@ FAULTS: dict[str, dict[str, float]] = {
     "friction_ripple": {"ripple_N": 30.0, "period_{d}": 0.05, "phase_rad": 0.0},
     "relaxation": {"stiffness_N_per_{d}": 3000.0, "time_s": 0.3},
     "force_limit": {"limit_N": 100.0},
+    "travel": {"aft_{d}": 0.04, "forward_{d}": 0.06},
     "deflection_scale": {"factor": 1.15},
     "force_scale": {"factor": 1.8},
     "force_zero": {"offset_N": 250.0},
@@ -63,6 +64,7 @@ UNSEEN = {
     " `coupled diagnose`",
     "servo_delay": "a release is timed from its own 90 %, and δc goes to the host ahead of the"
     " servo; `coupled diagnose`",
+    "no_servo": "a servo of 18 Hz answers within the tolerances; `coupled diagnose`",
     "digital_multiplier": "steps of force; `coupled compare` shows them",
     "bob_weight": "nz is 1",
     "arc_geometry": "0.7 % at this column's 11°, within its tolerance",

@@ -49,6 +49,8 @@ EFFECTS: dict[str, tuple[Any, dict[str, Any]]] = {
     f"{LOADER}.multiplier_offset_N": (4.0, {}),
     f"{LOADER}.multiplier_drift_N_per_s": (2.0, {}),
     f"{LOADER}.modifying_lag_s": (0.05, {}),
+    f"{LOADER}.stop_aft_m": (0.02, {}),
+    f"{LOADER}.stop_forward_m": (0.015, {f"{LOADER}.servo_frequency_Hz": 0.0}),
     f"{LOADER}.servo_frequency_Hz": (9.0, {}),
     f"{LOADER}.servo_damping_ratio": (1.2, {}),
     f"{LOADER}.servo_rate_limit_m_per_s": (0.15, {}),

@@ -30,8 +30,9 @@ def test_a_grip_with_its_force_and_nothing_else_is_taken_as_moved() -> None:
     assert as_driven(rig, both, "column") == rig
 
 
-def test_of_the_linkage_play_alone_shows_in_the_force() -> None:
-    moved = [effect for effect in under_motion(EFFECTS) if effect.stage == "linkage"]
+def test_of_the_linkage_play_alone_shows_in_the_force_of_a_loader_that_is_moved() -> None:
+    library = under_motion(EFFECTS, "computed")
+    moved = [effect for effect in library if effect.stage == "linkage"]
     assert [(effect.name, effect.shows_in) for effect in moved] == [("backlash", ("loader",))]
 
 

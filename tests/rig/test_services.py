@@ -147,10 +147,10 @@ def test_a_hand_that_lets_go_in_between_has_to_hold_for_the_whole_time_again() -
     times = [0.0, 0.5, 0.51, 1.2, 1.21, 1.7, 1.71, 2.4, 2.41, 5.0]
     forces = [0.0, 0.0, 60.0, 60.0, 0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
     twice = ForceTable(time_s=times, force_N=forces)
-    assert at(flown(held, events, twice), "autopilot", 3.9) == 1.0
+    assert at(flown(held, events, pilot=twice), "autopilot", 3.9) == 1.0
     times, forces = [0.0, 0.5, 0.51, 1.71, 1.72, 5.0], [0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
     once = ForceTable(time_s=times, force_N=forces)
-    assert at(flown(held, events, once), "autopilot", 3.9) == 0.0
+    assert at(flown(held, events, pilot=once), "autopilot", 3.9) == 0.0
 
 
 def test_an_autopilot_engages_where_the_control_is() -> None:

@@ -11,12 +11,12 @@ import numpy as np
 
 from coupled.authority.stability.linear import growth as linear_growth
 from coupled.authority.stability.planes import (
-    KINDS,
     Crossing,
     Kind,
     Plane,
     axis,
     crossings,
+    kinds_of,
     linear_rig,
     simulated_along,
 )
@@ -90,7 +90,8 @@ def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
     control = rig.controls[name]
     stiffest = gradient_range(control)[1]
     limits = tuple(
-        replace(_limit(rig, name, kind, stiffest), filed=filed(rig, name, kind)) for kind in KINDS
+        replace(_limit(rig, name, kind, stiffest), filed=filed(rig, name, kind))
+        for kind in kinds_of(control)
     )
     share, growths = stiffest * control.loader.bend, _growths(rig, name, stiffest)
     return StabilityLimits(name, stiffest, share, limits, growths)

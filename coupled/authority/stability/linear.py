@@ -1,7 +1,7 @@
 """Linear theory of the rig: the poles of its loops, or the eigenvalues of its frame's exact map.
 
     loader    m·δc'' + c·δc' + (G_B + ΔG)·δc = F(t − τ)
-    servo     x'' = ω²·(δc − x) − 2ζω·x'
+    servo     x'' = ω²·(δc − x) − 2ζω·x';  without one x = δc
     grip      δ = x + K·F
     hand      F = −k_h·δ − c_h·δ' − k_I·∫δ dt
 
@@ -44,6 +44,7 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 _TERMS = 18  # of the exponential's series, which leave 1e-23 of a norm of a half
 _COMPUTED, _RATE, _POSITION, _SPEED = range(4)
+FOLLOWS_per_s = 1e4  # of a grip without a servo; far beyond any growth that is looked for
 
 
 def added_gradient(control: Control) -> float:
@@ -97,6 +98,20 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     A hybrid ΔG is in it, a digital one is not.
     """
     (control,) = rig.controls.values()
+    matrix = _with_servo(rig, control, hand)
+    if control.loader.servo_frequency == 0.0:
+        _follow(matrix)
+    return matrix
+
+
+def _follow(a: Floats) -> None:
+    """Put x = δc in place of the servo: the difference, which starts at 0, is let die quickly."""
+    a[_POSITION], a[_SPEED] = 0.0, a[_RATE]
+    a[_POSITION, [_RATE, _COMPUTED, _POSITION]] = 1.0, FOLLOWS_per_s, -FOLLOWS_per_s
+    a[_SPEED, [_RATE, _SPEED]] += FOLLOWS_per_s, -FOLLOWS_per_s
+
+
+def _with_servo(rig: Rig, control: Control, hand: Hand) -> Floats:
     loader, width = control.loader, 4
     stiffness = loader.basic_gradient
     if loader.multiplier == "hybrid":
@@ -199,6 +214,8 @@ def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:
     grown = np.zeros((n + 1, n + 1))
     grown[:n, :n] = matrix
     grown[_RATE, n] = -added_gradient(control) / control.loader.mass
+    if control.loader.servo_frequency == 0.0:
+        grown[_SPEED, n] = grown[_RATE, n]
     over = exponential(grown * frame_s)
     found = over[:n, :n].copy()
     found[:, _COMPUTED] += over[:n, n]

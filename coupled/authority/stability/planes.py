@@ -38,6 +38,13 @@ from coupled.schema import changed
 Floats = NDArray[np.float64]
 Kind = Literal["assumed", "frame", "hand", "servo", "gauge", "mass"]
 KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo", "gauge", "mass")
+
+
+def kinds_of(control: Control) -> tuple[Kind, ...]:
+    """Return the planes of a control: what lies beyond the gauge moves with a servo only."""
+    return KINDS if control.loader.servo_frequency > 0.0 else KINDS[:-1]
+
+
 GAUGE_Hz = 50.0  # the amplifier of a gauge that a rig file says nothing of
 FIRM = 1.0  # K·k_h of a hand as stiff as the structure
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
@@ -122,6 +129,8 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
     d, control = unit_of(name), rig.controls[name]
     linear: dict[str, Any] = {
         f"travel_{d}": _FAR,
+        f"loader.stop_aft_{d}": 0.0,
+        f"loader.stop_forward_{d}": 0.0,
         "loader.breakout_N": 0.0,
         "loader.friction_N": 0.0,
         "loader.breakaway_N": 0.0,

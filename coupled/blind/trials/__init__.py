@@ -1,3 +1,3 @@
 """Sealed trials: drawn, made, sized, answered and scored."""
 
-NEWEST = 4  # version of the trials
+NEWEST = 5  # version of the trials

@@ -61,7 +61,9 @@ def read_deck(version: int) -> Deck:
     table = load_toml(path)
     if "like" in table:
         like = read_deck(int(str(table["like"]).removeprefix("v")))
-        return replace(like, version=version, built=table["truth"] == "built")
+        more = _chosen(path, "more", table, (*EFFECTS, *REVISION_2)) if "more" in table else ()
+        built, effects = table["truth"] == "built", (*like.effects, *more)
+        return replace(like, version=version, built=built, effects=effects)
     homes = VERSIONS / str(table.get("rigs_of", folder.name)) / "rigs"
     rigs = {str(name): read_rig(homes / f"{name}.toml") for name in table["rigs"]}
     return Deck(

@@ -129,7 +129,13 @@ def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], deck: Deck) -> Setting:
 
 
 def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig | None:
-    """Return a rig that suits: a drawn one in one of three draws; a bench in one of four."""
+    """Return a rig that suits: a drawn one in one of three draws; a bench in one of four.
+
+    None for kinds that no rig can have together.
+    """
+    names = {kind.name for kind in kinds}
+    if any(names & {*kind.excludes} for kind in kinds):
+        return None
     suited = [name for name, rig in pool.items() if all(kind.suits(rig) for kind in kinds)]
     drawn = not rng.uniform() < 2.0 / 3.0
     benches = rng.uniform() < 0.25

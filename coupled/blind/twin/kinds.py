@@ -71,7 +71,7 @@ class Kind:
 
     `least` and `most` bound the size, which the residual grows with; equal for a switch.
     `shows` is the stage whose residual it widens, where that is not its own; `other` says that it
-    needs another control's force.
+    needs another control's force. Nothing is left of the kinds in `excludes` beside it.
     """
 
     name: str
@@ -82,6 +82,7 @@ class Kind:
     flown: bool = False
     shows: str = ""
     other: bool = False
+    excludes: tuple[str, ...] = ()
 
     @property
     def widens(self) -> str:

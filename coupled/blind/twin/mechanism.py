@@ -161,7 +161,7 @@ def step_loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: fl
         if abs(v1 - last) < 1e-13:
             break
     s.z, s.relaxed, s.second_x, s.second_v, s.felt = z1, relaxed, y1, w1, felt
-    s.x, s.v = min(max(x1, -p.travel), p.travel), v1
+    s.x, s.v = min(max(x1, -p.forward), p.aft), v1
     if s.x != x1:
         s.v = 0.0
 
@@ -196,6 +196,17 @@ def _servo_slope(p: TwinParameters, wanted: float, x: float, v: float) -> tuple[
 @stage
 def step_servo(p: TwinParameters, s: TwinState, before: float, after: float, h: float) -> None:
     """Advance the servo by h seconds in which δc goes straight, and the play behind it."""
+    if p.servo_rate > 0.0:
+        _step_servo(p, s, before, after, h)
+    else:
+        s.servo, s.servo_v = after, (after - before) / h
+    lost = s.servo - s.grip
+    if abs(lost) > 0.5 * p.play:
+        s.grip += lost - math.copysign(0.5 * p.play, lost)
+
+
+@stage
+def _step_servo(p: TwinParameters, s: TwinState, before: float, after: float, h: float) -> None:
     x, v, middle = s.servo, s.servo_v, 0.5 * (before + after)
     a1, b1 = _servo_slope(p, before, x, v)
     a2, b2 = _servo_slope(p, middle, x + 0.5 * h * a1, v + 0.5 * h * b1)
@@ -205,9 +216,6 @@ def step_servo(p: TwinParameters, s: TwinState, before: float, after: float, h: 
     s.servo_v = v + h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
     if p.servo_limit > 0.0:
         s.servo_v = min(max(s.servo_v, -p.servo_limit), p.servo_limit)
-    lost = s.servo - s.grip
-    if abs(lost) > 0.5 * p.play:
-        s.grip += lost - math.copysign(0.5 * p.play, lost)
 
 
 @stage

@@ -69,7 +69,8 @@ class TwinParameters(Protocol):
     offset: float
     delay: float
     modifying_lag: float  # s, of F_mod on its way to the loader
-    travel: float
+    aft: float  # where the loader stops on either side, m, as sizes
+    forward: float
     load_friction: float  # N of friction per N of force
     cog_force: float  # periodic in δc, N
     cog_pitch: float
@@ -81,7 +82,7 @@ class TwinParameters(Protocol):
     hum_rate: float  # rad/s
     gradient_drift: float  # outsider: share of G_B a second
     # linkage
-    servo_rate: float  # ω, rad/s
+    servo_rate: float  # ω, rad/s; 0 without a servo
     servo_ratio: float
     servo_limit: float
     servo_delay: float  # dead time, s

@@ -18,6 +18,10 @@ from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
 Found = dict[str, float]
 CONTACT_s = 2e-3  # damping over stiffness of a contact in the play
+OF_SERVO = (
+    *("servo_lag", "servo_delay", "servo_tuning", "servo_rate_limit"),
+    "servo_acceleration_limit",
+)
 STIFF_BEND_m_per_N = 1e-4  # what a rig that is filed as rigid bends, times the size
 
 
@@ -94,6 +98,25 @@ def _servo_tuning(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     twin.set(servo_delay=0.1 * size, servo_rate=twin.get("servo_rate") * factor)
     twin.set(servo_ratio=twin.get("servo_ratio") * damping)
     return {"delay_s": 0.1 * size, "factor": factor, "damping_factor": damping}
+
+
+def _no_servo(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    twin.set(servo_rate=0.0)
+    return {}
+
+
+def _stops(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
+    """Stop the loader within its motion: one side by the size, the other by a part of it."""
+    moved = clean.record["column_computed_m"]
+    ends = float(np.max(moved)), float(-np.min(moved))
+    shares = (1.0, draw.u[0]) if draw.side > 0.0 else (draw.u[0], 1.0)
+    travel = clean.rig.controls["column"].travel
+    aft, forward = (
+        end / (1.0 + share * size) if end > 0.0 else travel
+        for end, share in zip(ends, shares, strict=True)
+    )
+    twin.set(aft=aft, forward=forward)
+    return {"aft_m": aft, "forward_m": forward}
 
 
 def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
@@ -189,5 +212,7 @@ REVISION_2 = (
     Kind("mass", "airframe", 0.001, 0.3, in_air("mass"), flown=True),
     Kind("servo_acceleration_limit", "linkage", 0.05, 2.5, _servo_push),
     Kind("servo_tuning", "linkage", 0.2, 0.7, _servo_tuning),
+    Kind("travel", "loader", 0.01, 4.0, _stops),
+    Kind("no_servo", "linkage", 1.0, 1.0, _no_servo, excludes=OF_SERVO),
     Kind("dropped_frames", "compensation", 0.001, 0.5, _dropped, shows="schedule"),
 )

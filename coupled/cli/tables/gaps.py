@@ -17,7 +17,7 @@ from coupled.gap.findings.flown import ChannelAgain
 from coupled.gap.findings.inflight import EffectInFlight
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.findings.summary import change, figure, in_figures, plain
+from coupled.gap.findings.summary import change, figure, in_figures, labels, plain
 
 if TYPE_CHECKING:
     from coupled.gap.findings.diagnosis import Diagnosis
@@ -60,9 +60,10 @@ def print_effects(
         explains = "" if share is None else f"{100 * share.value:.1f} %"
         first, *rest = [in_units(p, system) for p in effect.parameters] or (None,)
         sure = f"{effect.probability:.2f}"
-        table.add_row(plain(effect.name), *_number(first), explains, sure)
-        for parameter in rest:
-            table.add_row("", *_number(parameter), "", "")
+        said, *others = labels(effect) or [""]
+        table.add_row(f"{plain(effect.name)} {said}".rstrip(), *_number(first), explains, sure)
+        for label, parameter in zip(others, rest, strict=True):
+            table.add_row(f"  {label}".rstrip(), *_number(parameter), "", "")
     for one in budget:
         for left in (one.unexplained, one.noise):
             table.add_row(f"{one.stage}: {left.name}", "", "", f"{100 * left.value:.1f} %", "")

@@ -216,8 +216,9 @@ class Track(Pilot):
         """Return the surface command per newton of the pilot's, on the rig as specified."""
         control, s, frame_s = rig.controls[name], 1j * rate, 1.0 / rig.frame_rate
         loader, rigging = control.loader, control.rigging
-        servo = 2.0 * math.pi * loader.servo_frequency
-        follows = servo**2 / (s**2 + 2.0 * loader.servo_damping_ratio * servo * s + servo**2)
+        servo, follows = 2.0 * math.pi * loader.servo_frequency, complex(1.0)
+        if servo > 0.0:
+            follows = servo**2 / (s**2 + 2.0 * loader.servo_damping_ratio * servo * s + servo**2)
         gradient = specified_gradient(control.schedule, pressure_Pa)
         feel = loader.mass * s**2 + loader.damping * s + gradient
         stiffness, damping = self._arm(name)

@@ -7,6 +7,7 @@ from typing import Any
 from coupled.errors import InputError, nearest
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.linkage import SERVO
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 from coupled.schema import LARGEST, Section, file_keys
@@ -25,22 +26,30 @@ USUAL = {
     "loader": ("mass", "damping", "basic_gradient", "friction", "offset", "delay"),
     "linkage": ("servo_frequency", "servo_damping_ratio", "bend", "play"),
 }
+SERVO_START_Hz = 20.0  # chosen, amid the 8 to 30 Hz of control loaders
+# Numbers of which 0 means that there is none: a fit of one stays above 0.
+NONE_AT_ZERO = (
+    *("servo_frequency", "servo_rate_limit", "servo_acceleration_limit", "bend_frequency"),
+    *("bend_limit", "force_limit", "play_stiffness", "stop_aft", "stop_forward"),
+)
 FAR = 1e3  # times where a fit starts: as far as a number without a bound may go
 
 
 def default_keys(rig: Rig, control: ControlName, stages: set[str]) -> tuple[str, ...]:
     """Return the keys that are usually fitted, of the stages that records judge.
 
-    A basic gradient of 0 is no spring, and stays so.
+    A basic gradient of 0 is no spring and a servo frequency of 0 no servo, and they stay so.
     """
     fields = {f: key for key, f in _fields(rig, control, "loader").items()}
     loader, drive = rig.controls[control].loader, rig.controls[control].drive
+    absent: set[str] = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
+    if loader.servo_frequency == 0.0:
+        absent |= {"servo_frequency", "servo_damping_ratio"}
     found = []
     for stage, names in USUAL.items():
         wanted = names if stage in stages else ()
         if stage == "linkage" and drive == "setpoint":
             wanted = (*wanted, "servo_delay")  # of a bus, or of the servo's own cycle
-        absent = {"basic_gradient"} if loader.basic_gradient == 0.0 else set()
         found += [f"loader.{fields[name]}" for name in wanted if name not in absent]
     return tuple(found)
 
@@ -75,6 +84,8 @@ def _fields(rig: Rig, control: ControlName, section: str) -> dict[str, str]:
 
 def _usual_start(key: str, control: ControlName) -> float:
     """Return where the library's fits of a number begin, for one that is 0 in the file."""
+    if key == SERVO:
+        return SERVO_START_Hz
     for effect in EFFECTS:
         for p in effect.free:
             if p.key_on(control) == key and p.mode in ("added", "value") and not p.inverse:
@@ -88,6 +99,7 @@ def _bounds(holder: Section, field: str, start: float) -> tuple[float, float]:
     low, high = -far, far
     for bound in type(holder).model_fields[field].metadata:
         low = max(low, float(getattr(bound, "ge", low)))
-        low = max(low, 1e-3 * abs(start) if hasattr(bound, "gt") else low)
+        above = hasattr(bound, "gt") or field in NONE_AT_ZERO
+        low = max(low, 1e-3 * abs(start) if above else low)
         high = min(high, float(getattr(bound, "le", getattr(bound, "lt", high))))
     return low, min(high, LARGEST)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.entries import added, factor, limit, one, setting_of, value
-from coupled.gap.effects.linkage import LINKAGE
+from coupled.gap.effects.linkage import LINKAGE, without_servo
 from coupled.gap.effects.loader import LOADER
 from coupled.gap.effects.sensing import COMPENSATION, SENSING
 from coupled.gap.signals.air import NEEDS as AIR
@@ -132,13 +132,16 @@ def library_of(rig: Rig, control: ControlName) -> list[Effect]:
     """Return the effects as a rig shows them.
 
     Where a bob weight hangs, it pulls by the load factor: a motion that is stamped late shows in
-    the loader, too.
+    the loader, too. A rig without a servo has other effects of one (`without_servo`).
     """
+    every = list(EFFECTS)
+    if rig.controls[control].loader.servo_frequency == 0.0:
+        every = without_servo(EFFECTS)
     if rig.flight is None or not rig.controls[control].loader.bob_weight:
-        return list(EFFECTS)
+        return every
     return [
         replace(one, outputs=(*one.shows_in, "loader")) if one.name == MOTION else one
-        for one in EFFECTS
+        for one in every
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, Signature
@@ -17,6 +18,7 @@ from coupled.gap.effects.entries import (
     value,
 )
 
+SERVO = "loader.servo_frequency_Hz"
 DAMPING_RATIO = replace(
     factor("loader.servo_damping_ratio", 1.0),
     name="damping_factor",
@@ -89,10 +91,16 @@ LINKAGE: tuple[Effect, ...] = (
         one(
             "linkage",
             "servo_lag",
-            factor("loader.servo_frequency_Hz", 0.8),
+            factor(SERVO, 0.8),
             *("speed", "deflection_left", "law", 0.8),
         ),
         tolerance=SETTING,
+    ),
+    one(
+        "linkage",
+        "no_servo",
+        switch(SERVO, 0.0),
+        *("speed", "deflection_left", "law", 0.8),
     ),
     one(
         "linkage",
@@ -123,7 +131,7 @@ LINKAGE: tuple[Effect, ...] = (
             (
                 added("delay_s", "loader.servo_delay_s", 0, 0.45, 0.02, 0.05, 0.1),
                 replace(
-                    factor("loader.servo_frequency_Hz", 1.0),
+                    factor(SERVO, 1.0),
                     starts=(1.0, 3.0, 8.0),
                     scanned=False,
                     may_end=True,
@@ -142,3 +150,23 @@ LINKAGE: tuple[Effect, ...] = (
         *("deflection", "deflection_left"),
     ),
 )
+
+
+def without_servo(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the linkage's effects for a rig without a servo.
+
+    A lag is that of a servo which the rig file lacks, by its frequency in place of a factor on it.
+    The rest of a servo has no meaning there, but for a dead time and a limit of the rate.
+    """
+    lag = limit("frequency_Hz", SERVO, 0.5, 1000, 10.0, 30.0)
+    found = []
+    for effect in effects:
+        keys = {p.key for p in effect.parameters}
+        others = tuple(p for p in effect.parameters if p.key != SERVO and p != DAMPING_RATIO)
+        if any(key.startswith("loader.servo_acceleration") for key in keys):
+            continue
+        if SERVO not in keys:
+            found.append(effect)
+        elif effect.free and len(others) + 1 == len(keys):
+            found.append(replace(effect, parameters=others or (lag,), tolerance=0.0))
+    return found

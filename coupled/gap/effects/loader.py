@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
 from coupled.gap.effects.frictions import FRICTIONS
 from coupled.gap.effects.ripples import ripples
+from coupled.gap.effects.stops import stops
 from coupled.gap.thresholds import CLOCK_s
+
+
+def _stop(side: str) -> Parameter:
+    """Return where a stop lies on one side; it may be beyond all that a record meets."""
+    number = limit(f"{side}_{{d}}", f"loader.stop_{side}_{{d}}", 1e-4, 10, 0.05)
+    return replace(number, may_end=True)
+
 
 LOADER: tuple[Effect, ...] = (
     *FRICTIONS,
@@ -109,6 +117,16 @@ LOADER: tuple[Effect, ...] = (
         "force_limit",
         limit("limit_N", "loader.force_limit_N", 0.001, 2000, 10.0, 60.0),
         *("computed", "missing"),
+    ),
+    Effect(
+        "travel",
+        "loader",
+        (
+            _stop("aft"),
+            _stop("forward"),
+        ),
+        Signature("computed", "missing"),
+        seen=stops,
     ),
     replace(
         one(

@@ -6,9 +6,13 @@ the machine (`nominal`), its file holds how well each number is known, and that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.entries import setting_of
 from coupled.gap.effects.library import EFFECTS
+from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
@@ -17,13 +21,22 @@ CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share
 MOST_ELASTIC = 0.95
 
 
-def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
-    """Return {the effect that frees the same number: the setting, free within its tolerance}."""
+def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> dict[str, Effect]:
+    """Return {the effect that frees the same number: the setting, free within its tolerance}.
+
+    Of the `outputs`, those of loader and linkage in series show the linkage's settings, too.
+    """
     known = ((effect, _ends(effect, rig, control)) for effect in EFFECTS)
-    return {
+    found = {
         effect.name: setting_of(effect, *ends, wide=_given(effect, rig, control))
         for effect, ends in known
         if ends is not None
+    }
+    if not any(output.in_series for output in outputs):
+        return found
+    return {
+        name: replace(one, outputs=("linkage", "loader")) if one.stage == "linkage" else one
+        for name, one in found.items()
     }
 
 
@@ -77,6 +90,8 @@ def _ends(effect: Effect, rig: Rig, control: ControlName) -> tuple[float, float,
     wide = rig.controls[control].tolerance.get(number.key_on(control))
     if wide is None and tolerance <= 0.0:
         return None
+    if number.mode == "factor" and not number.nominal(rig, control):
+        return None  # the rig has none of it, as a servo
     neutral = number.neutral(rig, control)
     if wide is not None:
         filed = float(number.nominal(rig, control))

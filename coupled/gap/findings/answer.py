@@ -24,6 +24,7 @@ from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice
 from coupled.gap.search.courses import course_in
 from coupled.gap.search.rivals import Found
+from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
@@ -95,10 +96,12 @@ def _held_together(
     return held / max(sum(sizes.values()), 1e-300)
 
 
-def settings_of(choice: Choice, rig: Rig, control: ControlName) -> tuple[SettingResult, ...]:
+def settings_of(
+    choice: Choice, rig: Rig, control: ControlName, outputs: Sequence[Output]
+) -> tuple[SettingResult, ...]:
     """Return what the settings of the nominal rig were found to be, over what is filed."""
     found = []
-    for setting in settings(rig, control).values():
+    for setting in settings(rig, control, outputs).values():
         for p in setting.free:
             value = choice.fit.values.get(setting.value_key(p))
             filed = p.nominal(rig, control) if value is not None else 0.0

@@ -128,16 +128,18 @@ class Judge:
     def _without_output(self, name: str) -> StageResult | None:
         """Return a stage that no output judges, None where the rig has none of it."""
         flown = self.rig.flight is not None
-        if name == "linkage" and self.readers[0].moved and name in self.blamed:
+        reader = self.readers[0]
+        with_loader = reader.moved or reader.in_series
+        if name == "linkage" and with_loader and name in self.blamed:
             gap = max(o.gap(self.rig) for o in self.outputs if o.stage == "loader")
             return StageResult(name, gap, guilty=True, shown_in=("loader",))
-        reader = self.readers[0]
         known = {"schedule": "constant gradient"}
-        known |= {"linkage": "see loader"} if reader.moved else {}
+        known |= {"linkage": "see loader"} if with_loader else {}
         known |= {"loader": "δc is a set point"} if reader.set_points else {}
         known |= {"surface": BY_LAWS} if flown else {}
         if name in known:
-            return StageResult(name, why=known[name])
+            shown = ("loader",) if name == "linkage" and with_loader else ()
+            return StageResult(name, why=known[name], shown_in=shown)
         if name == "airframe" and flown:
             lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
             return StageResult(name, missing=tuple(lacking))

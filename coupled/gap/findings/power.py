@@ -124,7 +124,7 @@ def _signature(
 def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
     """Return the signatures of a stage's settings, a column each."""
     columns = []
-    known = settings(nominal, control)
+    known = settings(nominal, control, [output])
     beside = [one for name, one in known.items() if name not in (effect.name, *effect.swallows)]
     for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
         if output.stage in setting.shows_in:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 
 from coupled.display import unit_in
 from coupled.gap.effects.effect import dotted
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import Shrink
@@ -144,9 +146,16 @@ def _set(found: Findings) -> str:
     """Return what to set, so that host and rig file have what was found."""
     if found.verdict not in ("effect", "mostly"):
         return ""
-    numbers = [p for effect in found.effects for p in effect.parameters]
+    numbers = [p for effect in found.effects for p in effect.parameters if not _is_none(p)]
     keys = [p.host or f"{dotted(p.key, found.control)} in the rig file" for p in numbers]
-    return " ".join(f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True))
+    said = [f"Set {key} to {_found(p)}." for key, p in zip(keys, numbers, strict=True)]
+    switches = [
+        p for one in found.effects for p in BY_NAME[one.name].parameters if p.mode == "switch"
+    ]
+    for one in switches:
+        key = dotted(one.key_on(found.control), found.control)
+        said.append(f"Set {key} in the rig file to {json.dumps(one.on)}.")
+    return " ".join(said)
 
 
 def _settings(found: Findings) -> str:
@@ -271,8 +280,20 @@ def _closes(shrink: Shrink) -> str:
 
 
 def _effect(effect: EffectResult) -> str:
-    numbers = ", ".join(change(parameter) for parameter in effect.parameters)
+    pairs = zip(labels(effect), effect.parameters, strict=True)
+    numbers = ", ".join(f"{label} {change(p)}".lstrip() for label, p in pairs)
     return f"{plain(effect.name)}, {numbers}" if numbers else plain(effect.name)
+
+
+def labels(effect: EffectResult) -> list[str]:
+    """Return what to call each number of an effect: nothing where its unit says which it is."""
+    units = [p.unit for p in effect.parameters]
+    return [p.name.partition("_")[0] if units.count(p.unit) > 1 else "" for p in effect.parameters]
+
+
+def _is_none(p: ParameterEstimate) -> bool:
+    """Tell whether a number is of a limit that is not filed, and that no record meets."""
+    return p.filed is None and p.found_low is None and p.found_high is None
 
 
 def _found(p: ParameterEstimate) -> str:
@@ -290,6 +311,8 @@ def figure(value: float) -> str:
 def change(p: ParameterEstimate) -> str:
     """Return a parameter as filed → found (change), with its unit."""
     unit = f" {p.unit}" if p.unit else ""
+    if _is_none(p):
+        return "none met"
     if p.filed is None:
         return f"none → {figure(p.found)}{unit}"
     more = p.found - p.filed

@@ -47,7 +47,7 @@ class Case:
     @cached_property
     def known(self) -> dict[str, Effect]:
         """The nominal rig's settings, by the effects that free the same numbers."""
-        return settings(self.nominal, self.control)
+        return settings(self.nominal, self.control, self.outputs)
 
     @cached_property
     def settings(self) -> dict[str, Effect]:

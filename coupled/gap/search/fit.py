@@ -228,7 +228,8 @@ def _fit(
     stuck &= ~np.array([p.may_end for p in frees]) & ~gone
     # A setting may well stand at its end where little would be gained beyond.
     stuck &= (known == 0.0) | (beyond(best, len(ours)) >= LEAST_GAIN)
-    stuck |= ~np.isfinite(half)
+    # Of a limit that the records do not meet, nothing is known, and the others stand without it.
+    stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in frees])
     lower, upper = values - half, values + half
     for k in swallows:
         span = (float(low[k]), float(high[k]))

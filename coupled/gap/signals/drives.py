@@ -5,8 +5,10 @@ for several frames, and they differ by more than one step of a converter: a moti
 repeats itself so only by its rounding. Where they come as fast as the record's frames, it is their
 noise that tells: a number that a computer made has none beside what the grip's transducer reads.
 
-Where the grip's motion and force are all there is, nothing says what a loader did with the force:
-the motion is taken as imposed, and the force as its answer.
+A record may have the grip's motion and force and no δc. Where a spring holds the loader, its answer
+to the force is predicted, and the linkage moves the grip in series with it (`stages.series`). A
+loader without a spring would drift in such a prediction: its motion is taken as imposed, and the
+force as its answer (`stages.imposed`).
 """
 
 from __future__ import annotations
@@ -24,9 +26,11 @@ from coupled.gap.thresholds import (
     HELD_SHARE,
     HELD_STEPS,
     HELD_WINDOW,
+    SLOW_LOADER_s,
 )
 from coupled.record.channels import ControlName, channel
 from coupled.record.record import Record
+from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
 
 
@@ -38,9 +42,30 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
     held = all(name in record and in_set_points(record[name]) for record in records)
     if held or any(_made(record, control) for record in records):
         return rig.changed({f"controls.{control}.drive": "setpoint"})
-    if all(name not in one and grip in one and force in one for one in records):
+    alone = all(name not in one and grip in one and force in one for one in records)
+    if alone and any(drifts(rig, control, softest_gradient(rig, control, one)) for one in records):
         return rig.changed({f"controls.{control}.drive": "displacement"})
     return rig
+
+
+def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
+    """Tell whether a loader has no spring to speak of: a prediction from its force would drift.
+
+    That is a period longer than `SLOW_LOADER_s` at a gradient in N/d.
+    """
+    mass = rig.controls[control].loader.mass
+    return max(gradient, 0.0) * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * mass
+
+
+def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
+    """Return the least gradient of a record, N/d: recorded, by its q̄, or the least of the table."""
+    gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
+    schedule = rig.controls[control].schedule
+    if gradient in record:
+        return float(np.min(record[gradient]))
+    if pressure in record:
+        return float(np.min(specified_gradient(schedule, record[pressure])))
+    return min(schedule.total_gradient)
 
 
 def _made(record: Record, control: ControlName) -> bool:

@@ -86,6 +86,7 @@ class Output:
     rms noises of what drives the stage, by the control's quantity. `unsure` is the part of the
     floor by which it may be too low, the colour of what drives the stage being what it may be.
     `shots` predicts by short replays, each begun as measured: what went before misleads none.
+    One is `in_series` that is predicted by the loader and the linkage behind it, from the force.
     """
 
     stage: str
@@ -105,6 +106,7 @@ class Output:
     rough: Predict | None = field(default=None, repr=False, compare=False)
     noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     unsure: float = 0.0
+    in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 

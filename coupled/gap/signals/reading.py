@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from coupled.gap.noise.noise import Noise, noise_of
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.driven import Drive
+from coupled.gap.signals.drives import drifts, softest_gradient
 from coupled.gap.signals.floors import floor_from, input_noise, noise_in
 from coupled.gap.signals.live import Assumed, Live, Mask, live_of
 from coupled.gap.signals.missed import Missed, missed_in
@@ -130,6 +131,11 @@ class Reading:
             loader = [self.name_of("force"), self.name_of(self.imposed), *self._gradient_from()]
             needs = {"schedule": needs["schedule"], "loader": loader}
             lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
+        if self.in_series:
+            del needs["linkage"]
+            needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
+            needs["loader"] += self._gradient_from()
+            lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
         if self.set_points:  # a bend is not to be seen without the force, but all else
             needless = self.name_of("force")
             lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
@@ -142,8 +148,27 @@ class Reading:
 
     @property
     def moved(self) -> bool:
-        """Whether the motion is imposed, and the force its answer."""
+        """Whether the motion is imposed, and the force is judged as its answer."""
+        return self.by_hand and not self.in_series
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether what moves the grip is outside of the rig: a bench that imposes the motion."""
         return self.rig.controls[self.control].drive == "displacement"
+
+    @property
+    def in_series(self) -> bool:
+        """Whether the record has F and δ without δc: loader and linkage are judged in series.
+
+        Of a bench that imposes the motion, only where a spring holds the loader.
+        """
+        if self.set_points or self.name_of("computed") in self.record:
+            return False
+        needed = (self.name_of(quantity) for quantity in ("force", "deflection"))
+        if not all(name in self.record for name in needed):
+            return False
+        softest = softest_gradient(self.rig, self.control, self.record)
+        return not self.by_hand or not drifts(self.rig, self.control, softest)
 
     @property
     def imposed(self) -> str:

@@ -1,31 +1,33 @@
 """A control whose motion is imposed, as on a test bench for dampers: the force is its answer.
 
-The grip's motion is imposed where the record has it, else δc; the force is held against what the
-loader's laws make of the motion. Play lies between the two (`rig.imposed`).
+The grip's motion is imposed where the record has it, else δc; the measured force is compared with
+the force by which the loader answers (`rig.imposed`). Between the grip and the loader lie the
+structure, which bends under the measured force, the servo, and play.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import with_error
 from coupled.gap.signals.output import Floats, Output, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import JUMP_COUNTED, PLAY_LEAST, PLAYS
-from coupled.record.channels import ControlName, unit_of
-from coupled.rig.imposed import answer_to
+from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS
+from coupled.record.channels import ControlName
+from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
 
-PLAY = "loader.play_{d}"
+OF_PLAY = "loader.play"  # its key in a rig file without the unit
 
 
 class Imposed:
@@ -37,18 +39,29 @@ class Imposed:
         self._level: Noise = reading.driving(reading.imposed)
         self._gradient = reading.gradient()
         self._load = reading.load()
+        self._force = reading.pulled()
+        self._others = {name: smoothed(other) for name, other in reading.others().items()}
 
-    def predict(self, motion: Floats | None = None) -> Predict:
-        """Return the prediction for a motion in d at each frame, as read; the record's own."""
+    def predict(self, motion: Floats | None = None, force: Floats | None = None) -> Predict:
+        """Return the prediction for a motion in d at each frame, as read; the record's own.
+
+        `force` in N bends the structure behind the grip; the record's own.
+        """
         reading = self._reading
-        imposed = Nodes(self._motion if motion is None else motion)
+        moved = self._motion if motion is None else motion
+        pulled = self._force.smooth if force is None else force
+        imposed = Nodes(moved)
+
+        def at_loader(rig: Rig) -> Floats:
+            read_as = reading.sensed(rig)
+            if reading.imposed == "deflection":
+                grip, bending = moved - read_as.zero, read_as.force(pulled)
+                return behind_linkage(rig, reading.control, grip, bending, self._others)
+            nodes = imposed.of(rig)
+            return np.asarray(nodes / read_as.scale_on_nodes(len(nodes)))
 
         def predicted(rig: Rig) -> Floats:
-            data, nodes = rig.controls[reading.control], imposed.of(rig)
-            read_as = reading.sensed(rig)
-            true = nodes / read_as.scale_on_nodes(len(nodes))
-            if reading.imposed == "deflection":
-                true = nodes - read_as.zero
+            data, true = rig.controls[reading.control], at_loader(rig)
             force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
             read = data.sensing.force_scale * force + data.sensing.force_zero
@@ -69,33 +82,46 @@ class Imposed:
 
     def noisy(self, rig: Rig, k: int) -> Floats:
         """Return the prediction with a sample of what is wrong with the smoothed motion."""
-        return self.predict(with_error(self._motion, k, self._level))(rig)
+        moved = with_error(self._motion, k, self._level)
+        return self.predict(moved, self._force.with_error(k + NOISE_TRIES))(rig)
 
 
-def under_motion(library: Sequence[Effect]) -> list[Effect]:
-    """Return a library for imposed motions: play shows in the force, the linkage's rest nowhere."""
+def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
+    """Return a library for imposed motions: the linkage's effects show in the force.
+
+    Only play does where δc is `imposed`, and none that is a limit of the servo: the motion of the
+    grip is given, whatever the servo can do.
+    """
     found = []
     for effect in library:
+        keys = [p.key for p in effect.parameters]
+        plays = [p for p in effect.parameters if p.key.rpartition("_")[0] == OF_PLAY]
         if effect.stage != "linkage":
-            found.append(effect)
-        elif [p.key for p in effect.parameters] == [PLAY]:
-            found.append(replace(effect, outputs=("loader",), seen=_plays))
+            sensed = imposed == "deflection" and "linkage" in effect.shows_in
+            found.append(replace(effect, outputs=("loader",)) if sensed else effect)
+        elif plays:
+            if len(keys) == 1:
+                found.append(replace(effect, outputs=("loader",), seen=partial(_plays, plays[0])))
+        elif imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys):
+            found.append(replace(effect, outputs=("loader",)))
     return found
 
 
-def _plays(outputs: Sequence[Output], rig: Rig, control: ControlName) -> list[dict[str, float]]:
+def _plays(
+    number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
+) -> list[dict[str, float]]:
     """Return the play that leaves least of the force, where a fit starts: by two scans.
 
     A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
     """
     ours = [output for output in outputs if output.stage == "loader"]
-    key = f"controls.{control}.{PLAY.format(d=unit_of(control))}"
+    key = dotted(number.key_on(control), control)
     filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
 
     def left(play: float) -> float:
-        other = rig.changed({key: filed + play})
+        other = rig.changed({key: number.entered(filed, play)})
         return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
 
     best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
     best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
-    return [{"play_{d}": best}]
+    return [{number.name: best}]

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.driven import Drive
+from coupled.gap.signals.drives import drifts
 from coupled.gap.signals.floors import (
     given_noise,
     left_noise,
@@ -45,6 +47,7 @@ from coupled.gap.stages.ratchet import (
     unratcheted,
     unwalked,
 )
+from coupled.gap.stages.series import Series
 from coupled.gap.stages.surfaces import filed_trim
 from coupled.gap.stages.trim import trim_of
 from coupled.gap.thresholds import (
@@ -57,7 +60,6 @@ from coupled.gap.thresholds import (
     ROUNDING_SPAN,
     SURFACE_KNOWN,
     RESTART_s,
-    SLOW_LOADER_s,
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
@@ -92,6 +94,9 @@ class Reader(Reading):
         }
         if self.moved:
             makers = {"schedule": self._schedule, "loader": self._answering}
+        if self.in_series:
+            makers["loader"] = self._series
+            del makers["linkage"]
         if self.set_points:
             del makers["loader"], makers["multiplier"]
         wanted = [make for stage, make in makers.items() if stage not in lacking]
@@ -168,7 +173,8 @@ class Reader(Reading):
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = self._restarts(round(RESTART_s * self.rig.frame_rate))
-        own_starts = every if (drifts := self._drifts(gradient)) else self._restarts()
+        restarted = drifts(self.rig, self.control, float(np.min(gradient)))
+        own_starts = every if restarted else self._restarts()
 
         def driven(f: Floats, seen: Floats, starts: Mask = own_starts) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start."""
@@ -204,21 +210,14 @@ class Reader(Reading):
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
-        if force.noise.rms > BROAD * float(np.std(force.recorded)):
-            share = felt(force.recorded, computed)
-            less = float(np.sqrt(max(1.0 - share, 0.0)))
-            level = replace(force.noise, rms=force.noise.rms * less)
-            if share > FELT:
-                level = given_noise(self.rig, self.name_of("force"), force.recorded)
-            smooth_enough = share <= HALF_FELT
-            force = replace(force, noise=level) if smooth_enough else force.unsmoothed(level)
+        force = self._without_what_was_felt(force, computed)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
         whole = self._made("loader", *made, judged=self.judged).under(force.noise)
-        if not drifts:
+        if not restarted:
             shot = driven(force.smooth, smooth, every)
             shots = self._judged(lambda rig: shot(rig, 0.0), computed)
             whole = replace(whole, shots=shots)
@@ -245,18 +244,32 @@ class Reader(Reading):
             return predict
         return lambda rig: np.where(judged, predict(rig), measured)
 
+    def _without_what_was_felt(self, force: Drive, answer: Floats) -> Drive:
+        """Return a broadband force with as much noise as its answer does not show."""
+        if force.noise.rms <= BROAD * float(np.std(force.recorded)):
+            return force
+        share = felt(force.recorded, answer)
+        less = float(np.sqrt(max(1.0 - share, 0.0)))
+        level = replace(force.noise, rms=force.noise.rms * less)
+        if share > FELT:
+            level = given_noise(self.rig, self.name_of("force"), force.recorded)
+        return replace(force, noise=level) if share <= HALF_FELT else force.unsmoothed(level)
+
+    def _series(self) -> list[Output]:
+        """Return the grip's motion under the force, where δc is not recorded."""
+        grip = self.signal("deflection")
+        series = Series(self, self._without_what_was_felt(self.pulled(), grip))
+        own = self.heard("deflection")
+        made = (self.name_of("deflection"), grip, series.predict(own), series.noisy, own, "force")
+        found = replace(self._made("loader", *made), in_series=True)
+        return [found.under(series.force.noise)]
+
     def _answering(self) -> list[Output]:
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
         made = (force, motion.predict(), motion.noisy, own, self.imposed)
         return [self._made("loader", self.name_of("force"), *made)]
-
-    def _drifts(self, gradient: Floats) -> bool:
-        """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
-        loader = self.rig.controls[self.control].loader
-        softest = float(np.min(np.maximum(gradient, 0.0)))
-        return softest * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * loader.mass
 
     def _multiplier(self) -> list[Output]:
         product = Product(self)

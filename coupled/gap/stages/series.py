@@ -1,0 +1,110 @@
+"""Loader and linkage in series, for a record of F and δ without δc.
+
+    F → loader → δc → servo, play → + bend(F) → δ
+
+The loader's answer to the measured force is predicted, and drives the linkage; what the transducer
+at the grip reads is compared with the record. Every effect of the loader and of the linkage shows
+in that one output. A static record gives one number only, the slope of δ over F,
+
+    dδ/dF = 1/(G_B + ΔG) + K
+
+so that a bend, a gradient and a scale of the force are the same law there. The loader's mass and
+damping distinguish them where the force is fast enough for both to matter.
+
+On a bench that imposes the motion, what moves the grip takes up a rigid play by the side of the
+force, δ = x + sgn(F)·play/2 + bend(F). Within the play no force acts, and δ may be anywhere in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupled.gap.noise.noise import Noise
+from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.driven import Drive
+from coupled.gap.signals.output import Floats, Predict
+from coupled.gap.signals.reading import Reading
+from coupled.gap.signals.served import services
+from coupled.gap.stages.ratchet import Driven, is_walked, unratcheted, unwalked
+from coupled.record.channels import unit_of
+from coupled.rig.hosted import Hosted
+from coupled.rig.nodes import Nodes
+from coupled.rig.replay import drive_series
+from coupled.rig.rig import Rig
+
+NO_FORCE = 3.0  # of the noise of F: within it, the force is none
+SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
+
+
+class Series:
+    """The grip's motion under a force, as measured and as a rig predicts it."""
+
+    def __init__(self, reading: Reading, force: Drive) -> None:
+        self._reading, self.force = reading, force
+        self._gradient, self._second = reading.gradient(), reading.second()
+        self._load = reading.load()
+        self._others = {name: smoothed(other) for name, other in reading.others().items()}
+        self._leaks = [Nodes(smoothed(other)) for other in reading.partner()]
+        self._trembling = force.passed(np.random.default_rng(SAMPLED))
+        self._trembling_nodes = Nodes(self._trembling)
+        self._walks: bool | None = None
+
+    def _driven(self, force: Floats) -> Driven:
+        """Return the answer to a force, N at the frames, and so many times its noise."""
+        reading, nodes = self._reading, Nodes(force)
+
+        def at(rig: Rig, times: float) -> Floats:
+            sensed = reading.sensed(rig)
+            pull = sensed.force_on_nodes(nodes.of(rig), force)
+            bending = sensed.force(force)
+            if times:
+                pull = pull + times * self._trembling_nodes.of(rig)
+                bending = bending + times * self._trembling
+            if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
+                pull = pull + share * self._leaks[0].of(rig)
+            host = Hosted(services(reading), reading.missed.under(rig, reading.control))
+            driven_by = (pull, self._gradient, bending, self._load(rig), self._second)
+            read = drive_series(rig, reading.control, *driven_by, host, self._others)
+            return sensed.zero + read
+
+        def taken_up(rig: Rig, times: float) -> Floats:
+            loader = rig.controls[reading.control].loader
+            if loader.play == 0.0 or loader.play_stiffness > 0.0:
+                return at(rig, times)
+            key = f"controls.{reading.control}.loader.play_{unit_of(reading.control)}"
+            held, half = at(rig.changed({key: 0.0}), times), 0.5 * loader.play
+            true = reading.sensed(rig).force(force)
+            free = np.clip(reading.signal("deflection"), held - half, held + half)
+            acts = np.abs(true) > NO_FORCE * self.force.noise.rms
+            return np.where(acts, held + half * np.sign(true), free)
+
+        return taken_up if reading.by_hand else at
+
+    def _predicted(self, force: Floats, times: float) -> Predict:
+        reading, at = self._reading, self._driven(force)
+        measured = reading.signal("deflection")
+
+        def predicted(rig: Rig) -> Floats:
+            loader = rig.controls[reading.control].loader
+            ratchets = loader.play > 0.0 and not reading.by_hand
+            if ratchets or loader.bend_hysteresis_share:
+                return unratcheted(rig, reading.control, at, measured)
+            if self._walks:
+                return unwalked(rig, reading.control, at, measured, times)
+            return at(rig, 0.0)
+
+        return predicted
+
+    def predict(self, own: Noise) -> Predict:
+        """Return the prediction of δ as read, in d at each frame; `own` is the noise of δ."""
+        force = self.force
+        if self._walks is None:
+            answer = self._driven(force.smooth)
+            walks = force.smooth is not force.recorded
+            given = (self._reading.rig, self._reading.control, answer, own.rms)
+            self._walks = walks and is_walked(*given)
+        return self._predicted(force.smooth, 1.0)
+
+    def noisy(self, rig: Rig, k: int) -> Floats:
+        """Return the prediction with sample number k of what is wrong with the smoothed force."""
+        return self._predicted(self.force.with_error(k), 2.0**0.5)(rig)
