@@ -28,12 +28,13 @@ from coupled.gap.search.search import search
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
-from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
+from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.imposed import under_motion
 from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import RIGS_KEPT
+from coupled.gap.trimmed import trim_speed, trimmed
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -75,6 +76,7 @@ def _diagnose(
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
@@ -143,6 +145,7 @@ def _diagnose(
         outputs=tuple(outputs),
         choice=choice,
         baseline=baseline,
+        trim=trim,
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
     )
 

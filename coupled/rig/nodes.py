@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from coupled.rig.compiled import long_entry
 from coupled.rig.rig import Rig
@@ -21,18 +23,34 @@ def on_nodes(rig: Rig, samples: Floats) -> Floats:
     return _on_nodes(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), rig.substeps)
 
 
-class Nodes:
-    """A signal on the nodes of any rig of its frame rate, however finely its loader is stepped."""
+def by_neighbours(rig: Rig, samples: Floats) -> Floats:
+    """Return a signal on the loader's nodes by another interpolant of the same order.
 
-    def __init__(self, samples: Floats) -> None:
-        self._samples = samples
+    Cubics whose slopes at the samples are those of their two neighbours (Catmull and Rom, 1974).
+    How far the spline departs from them says how well the signal is known between the frames.
+    """
+    frames = np.arange(len(samples))
+    nodes = np.arange((len(samples) - 1) * rig.substeps + 1) / rig.substeps
+    return np.asarray(CubicHermiteSpline(frames, samples, np.gradient(samples))(nodes))
+
+
+class Nodes:
+    """A signal on the nodes of any rig of its frame rate, however finely its loader is stepped.
+
+    `interpolate` is the spline (`on_nodes`), or `by_neighbours`.
+    """
+
+    def __init__(
+        self, samples: Floats, interpolate: Callable[[Rig, Floats], Floats] = on_nodes
+    ) -> None:
+        self._samples, self._interpolate = samples, interpolate
         self._known: dict[int, Floats] = {}
 
     def of(self, rig: Rig) -> Floats:
         """Return the signal on a rig's nodes, as `on_nodes`."""
         found = self._known.get(rig.substeps)
         if found is None:
-            found = self._known[rig.substeps] = on_nodes(rig, self._samples)
+            found = self._known[rig.substeps] = self._interpolate(rig, self._samples)
         return found
 
 

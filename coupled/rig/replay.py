@@ -86,8 +86,9 @@ def drive_loader(
 ) -> tuple[Floats, Floats]:
     """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
 
-    `nodes_N` has `rig.substeps` values a frame and one more. Services' force is straight between
-    frames; a digital product stays as it was in frames that the host missed. G_T is as given.
+    `nodes_N` has `rig.substeps` values a frame and one more. Of the services' force what the host
+    holds stays over a frame, and the rest runs along the spline. A digital product stays as it was
+    in frames that the host missed. G_T is as given.
     """
     p, s = _one(rig, control)
     level = np.ones_like(misread) if load_factor is None else load_factor
@@ -96,7 +97,9 @@ def drive_loader(
     every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
     given = np.stack((*both, misread, level, position, rate, *host.rows(len(misread))))
-    _loader(p, s, nodes_N, given, every, rig.substeps, h, out)
+    following = host.following()
+    served = np.zeros_like(nodes_N) if following is None else on_nodes(rig, following)
+    _loader(p, s, nodes_N, served, given, every, rig.substeps, h, out)
     return out[0], out[1]
 
 
@@ -202,19 +205,20 @@ def _loader(
     parameters: Any,
     states: Any,
     force: Floats,
+    served: Floats,
     given: Floats,
     every: int,
     substeps: int,
     h: float,
     out: Floats,
 ) -> None:
-    """Run the loader on what is `given`, shape (10, frames).
+    """Run the loader on what is `given`, shape (10, frames), and on forces at the nodes.
 
     G_T twice, misread δc, load factor, restarts' δc and its rate, and `Hosted.rows`.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
-    neutral, added, jammed, missed = given[6], given[7], given[8], given[9]
+    neutral, held, jammed, missed = given[6], given[7], given[8], given[9]
     start_loader(p.loader, s.loader, force[0])
     ends = (-p.loader.travel, p.loader.travel)
     frames, read = len(misread), 0.0
@@ -235,8 +239,7 @@ def _loader(
             if jammed[k] > 0.5:
                 here = (s.loader.computed, s.loader.computed)
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
-                share = (node - k * substeps - 0.5) / substeps
-                s.loader.external = base + (1.0 - share) * added[k] + share * added[k + 1]
+                s.loader.external = base + held[k] + served[node]
                 led = force[node]
                 if p.inertia.rows > 0:
                     led = lead_force(p.inertia, s.inertia, led)

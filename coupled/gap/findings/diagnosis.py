@@ -44,6 +44,8 @@ class Diagnosis(Findings):
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and where their floors come from.
     filtered: Mapping[str, str] = field(default_factory=dict)
+    # What of the trim was taken from the records or their manifests, in words; empty for nothing.
+    trim: str = ""
 
     @property
     def first(self) -> Record:
@@ -102,7 +104,8 @@ class Diagnosis(Findings):
         filtered = filtered_words(self.filtered)
         said = summary(self, self.shrink, flight, filtered, self.next_test)
         said += f" {CIRCLED}" if self.choice.circled else ""
-        return said if self.baseline is None else f"{self.baseline.words} {said}"
+        held = "" if self.baseline is None else self.baseline.words
+        return " ".join(words for words in (self.trim, held, said) if words)
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
         """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
@@ -122,6 +125,8 @@ class Diagnosis(Findings):
             found["circled"] = True
         if self.filtered:
             found["filtered"] = dict(self.filtered)
+        if self.trim:
+            found["trim"] = self.trim
         if self.baseline is not None:
             found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:

@@ -17,12 +17,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import (
     given_noise,
     left_noise,
@@ -60,7 +62,7 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
-from coupled.rig.nodes import Nodes
+from coupled.rig.nodes import Nodes, by_neighbours, on_nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -68,10 +70,25 @@ from coupled.rig.replay import (
     replay_surface,
 )
 from coupled.rig.rig import Rig
+from coupled.rig.serving import held_force
 
 Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
 SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
+
+
+class DrivenBy(NamedTuple):
+    """The quantity of a control that drives a stage.
+
+    `between` is by how much the prediction may be off, rms, since the inputs are not known between
+    the frames.
+    """
+
+    quantity: str = ""
+    between: float = 0.0
+
+
+UNDRIVEN = DrivenBy()
 
 
 @dataclass(frozen=True)
@@ -105,7 +122,7 @@ class Reader(Reading):
         predict: Predict,
         noisy: Callable[[Rig, int], Floats],
         own: Noise,
-        driven_by: str = "",
+        driven_by: DrivenBy = UNDRIVEN,
         judged: NDArray[np.bool_] | None = None,
         echo: Floats | None = None,
     ) -> Output:
@@ -119,15 +136,16 @@ class Reader(Reading):
         own = left_noise(own, measured, without_echo(measured - base, echo), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
         carried = float(np.sqrt(np.mean(np.square(tries))))
-        floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
+        known = REPLAY_KNOWN * float(np.ptp(measured))
+        floor = math.hypot(own.rms, carried, driven_by.between, known)
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        known = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
-        if not driven_by:
-            return known
-        noisiest = self.name_of(driven_by) if carried > own.rms else name
-        return replace(known, hides=Hides(floor / float(np.std(measured)), noisiest, name))
+        made = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
+        if not driven_by.quantity:
+            return made
+        noisiest = self.name_of(driven_by.quantity) if carried > own.rms else name
+        return replace(made, hides=Hides(floor / float(np.std(measured)), noisiest, name))
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
@@ -164,13 +182,17 @@ class Reader(Reading):
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
         load_of = self.load()
+        served, held = services(self), held_force(self.rig, self.record, self.control)
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
 
-        def driven(f: Floats, seen: Floats, every: int = every) -> Driven:
-            """Return the answer to a force, and so many times its noise, by where windows start."""
-            nodes = Nodes(f)
+        def driven(f: Floats, seen: Floats, every: int = every, otherwise: bool = False) -> Driven:
+            """Return the answer to a force, and so many times its noise, by where windows start.
+
+            `otherwise`: with as good a guess of what force and services did between the frames.
+            """
+            nodes = Nodes(f, by_neighbours if otherwise else on_nodes)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
@@ -186,7 +208,8 @@ class Reader(Reading):
                     pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
-                host = Hosted(services(self), self.missed.under(rig, self.control))
+                host = Hosted(served, self.missed.under(rig, self.control), held)
+                host = host.a_frame_late() if otherwise else host
                 driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
@@ -214,8 +237,10 @@ class Reader(Reading):
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
-        made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
-        whole = self._made("loader", *made).under(force.noise)
+        made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
+        other = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
+        between = float(np.sqrt(np.mean((other - answer(self.rig, 0.0)) ** 2)))
+        whole = self._made("loader", *made, DrivenBy("force", between)).under(force.noise)
         if not every:
             shot = driven(force.smooth, smooth, round(RESTART_s * self.rig.frame_rate))
             whole = replace(whole, shots=lambda rig: shot(rig, 0.0))
@@ -225,7 +250,7 @@ class Reader(Reading):
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
-        made = (force, motion.predict(), motion.noisy, own, self.imposed)
+        made = (force, motion.predict(), motion.noisy, own, DrivenBy(self.imposed))
         return [self._made("loader", self.name_of("force"), *made)]
 
     def _drifts(self, gradient: Floats) -> bool:
@@ -246,8 +271,8 @@ class Reader(Reading):
         rng = np.random.default_rng(SAMPLED)
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
-        def driven(c: Floats, f: Floats) -> Predict:
-            nodes = Nodes(c)
+        def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
+            nodes = Nodes(c, by_neighbours if otherwise else on_nodes)
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
@@ -262,8 +287,12 @@ class Reader(Reading):
             pulled = force.with_error(k + NOISE_TRIES)
             return driven(command.with_error(k), pulled)(rig)
 
-        made = (measured, driven(command.smooth, force.smooth), noisy, self.heard("deflection"))
-        linkage = self._made("linkage", self.name_of("deflection"), *made, "computed")
+        given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
+        other = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
+        between = float(np.sqrt(np.mean(other**2)))
+        made = (measured, predict, noisy, self.heard("deflection"))
+        driven_by = DrivenBy("computed", between)
+        linkage = self._made("linkage", self.name_of("deflection"), *made, driven_by)
         return [replace(linkage, noises={"force": force.noise.rms})]
 
     def _compensation(self) -> list[Output]:
@@ -282,16 +311,18 @@ class Reader(Reading):
         pressure = self.record["dynamic_pressure_Pa"]
         command = replay_surface(self.rig, self.control, estimate, pressure)
 
+        shift = trim_shift(self.record, self.control, 1.0 / self.rig.frame_rate)
+
         def position(wanted: Floats) -> Floats:
-            return np.interp(held + wanted, commands_at, positions)
+            """Return where the surface stands; a row answers to the one before it."""
+            asked = np.concatenate(([0.0], (wanted + shift)[:-1]))
+            return np.interp(held + asked, commands_at, positions)
 
         def predict(rig: Rig) -> Floats:
-            commands = replay_surface(rig, self.control, estimate, pressure)
-            # Row k is the answer to row k − 1; the first is the trim.
-            return position(np.concatenate(([0.0], commands[:-1])))
+            return position(replay_surface(rig, self.control, estimate, pressure))
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
-        left = measured - position(np.concatenate(([0.0], command[:-1])))
+        left = measured - position(command)
         own = left_noise(heard(left), measured, left)
         floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]

@@ -18,10 +18,12 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import heard
 from coupled.gap.stages.openloop import Moved, Points, about
 from coupled.gap.thresholds import (
+    HALF_FELT,
     SURFACE_SHAKE,
     SURFACE_GUST_m_per_s,
     SURFACE_MOVES_rad,
@@ -71,21 +73,27 @@ def _points(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether the aircraft moves a surface as the air rises and other controls are moved."""
+    """Tell whether a surface moves as the air rises and controls are held off neutral.
+
+    Under its own control it goes there within a frame, and stays: a tab or an actuator of the
+    model's own takes longer, or follows the air.
+    """
     at = motion_channels(controls, flown=True).index(surface_channel(control))
-    still, moved = airframe.motion()[at], 0.0
+    neutral, moved = airframe.motion()[at], 0.0
     airframe.set_gust(SURFACE_GUST_m_per_s)
     for i, other in enumerate(controls):
+        still = neutral if other != control else None
         for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
-            shaken = 0.0 if other == control else SURFACE_SHAKE
             airframe.step(
                 (
-                    shaken * (i == 0),
-                    shaken * (i == 1),
-                    shaken * (i == 2),
+                    SURFACE_SHAKE * (i == 0),
+                    SURFACE_SHAKE * (i == 1),
+                    SURFACE_SHAKE * (i == 2),
                 )
             )
-            moved = max(moved, abs(airframe.motion()[at] - still))
+            position = airframe.motion()[at]
+            still = position if still is None else still
+            moved = max(moved, abs(position - still))
     return moved > SURFACE_MOVES_rad
 
 
@@ -136,9 +144,15 @@ def moved(
         position, filed = record[name], filed_trim(rig, control)
         trim, jump = trims.get(control, (filed, 0.0))
         step = np.where(np.arange(len(position)) > 0, jump, 0.0)
-        smooth = smoothed(position - step) + step
-        level = left_noise(heard(position), position, position - _led(rig, record, control, trim))
-        error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
+        left = position - _led(rig, record, control, trim)
+        level = left_noise(heard(position), position, left)
+        if float(np.std(left)) < HALF_FELT * heard(position).rms:
+            # What is rough in it was commanded: it is the surface's motion, and no noise.
+            smooth, error = position, level.sample(len(position), rng)
+            error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))
+        else:
+            smooth = smoothed(position - step) + step
+            error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
         found.append(Moved(name, smooth, points, trim, filed))
         wrong.append(Moved(name, smooth + error, points, trim, filed))
     return found, wrong
@@ -149,7 +163,9 @@ def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
     points = surface_points(rig, control)
     assert points is not None
     held = about(trim, filed_trim(rig, control), points)
-    return np.interp(held + _asked(rig, record, control), *points)
+    shift = trim_shift(record, control, 1.0 / rig.frame_rate)
+    shift = np.concatenate(([0.0], shift[:-1]))
+    return np.interp(held + _asked(rig, record, control) + shift, *points)
 
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
