@@ -47,6 +47,7 @@ def manifest(
         "rig": rig_table(manoeuvre.rig),
         "seed": manoeuvre.seed,
         "conditions": _conditions(manoeuvre),
+        "reach": {n: r for n, p in manoeuvre.pilots.items() if (r := p.reach(n)) > 0.0},
         "channels": list(channels),
         "positive": _positive(manoeuvre),
         "rows": len(data),

@@ -21,10 +21,10 @@ from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
+from coupled.gap.refuted import search_unrefuted
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.contact import allowing_for_contact
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.search import search
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
@@ -112,7 +112,7 @@ def _diagnose(
         return held
 
     case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
-    case, choice = search(case, library)
+    case, choice = search_unrefuted(case, library)
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
     stages = judge.stages()

@@ -16,12 +16,14 @@ Mask = NDArray[np.bool_]
 class Hosted(NamedTuple):
     """What a record holds of the loader's services, and the frames that its host missed.
 
-    `held` is what of the services' force the host holds over each frame, N (`serving.held_force`).
+    `held` is what of the services' force the host holds over each frame, N (`serving.held_force`),
+    `reach` where a stop of the cab stops the grip, d, 0 for nowhere.
     """
 
     services: ServiceRows | None = None
     missed: Mask | None = None
     held: Floats | None = None
+    reach: float = 0.0
 
     def rows(self, frames: int) -> tuple[Floats, ...]:
         """Return x₀ in d, the held force in N and jams of services, and misses, at each frame."""

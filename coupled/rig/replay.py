@@ -24,6 +24,7 @@ from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import set_gradients
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import crossed_bends, pack
+from coupled.rig.reach import bounds, set_reach
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import scale_at
@@ -97,6 +98,7 @@ def drive_loader(
     every, position, rate = (0, misread, misread) if restart is None else restart
     both = (gradient, gradient if second is None else second)
     given = np.stack((*both, misread, level, position, rate, *host.rows(len(misread))))
+    p[0]["reach"]["reach"] = host.reach
     following = host.following()
     served = np.zeros_like(nodes_N) if following is None else on_nodes(rig, following)
     _loader(p, s, nodes_N, served, given, every, rig.substeps, h, out)
@@ -220,7 +222,6 @@ def _loader(
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
     neutral, held, jammed, missed = given[6], given[7], given[8], given[9]
     start_loader(p.loader, s.loader, force[0])
-    ends = (-p.loader.travel, p.loader.travel)
     frames, read = len(misread), 0.0
     for k in range(frames):
         m = s.modification
@@ -235,11 +236,17 @@ def _loader(
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
-            base, here = s.loader.external, ends
-            if jammed[k] > 0.5:
-                here = (s.loader.computed, s.loader.computed)
+            base = s.loader.external
+            s.loader.external = base + held[k]
+            if p.reach.reach > 0.0:
+                set_reach(
+                    p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage
+                )
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
                 s.loader.external = base + held[k] + served[node]
+                here = bounds(p.reach, s.reach, p.loader, p.linkage, s.loader.computed)
+                if jammed[k] > 0.5:
+                    here = (s.loader.computed, s.loader.computed)
                 led = force[node]
                 if p.inertia.rows > 0:
                     led = lead_force(p.inertia, s.inertia, led)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.entries import setting_of
-from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
 CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
 MOST_ELASTIC = 0.95
+LAG = "transport_delay"
 
 
 def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
@@ -25,6 +26,16 @@ def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:
         for effect, ends in known
         if ends is not None
     }
+
+
+def lag_within_a_step(rig: Rig, control: ControlName) -> Effect:
+    """Return the setting by which the force may act late on the loader alone, within one step.
+
+    A simulated hand and loader exchange force and motion once a step of the loader: the force then
+    acts as it stood at the step before.
+    """
+    step_s = 1.0 / (rig.frame_rate * rig.substeps)
+    return setting_of(BY_NAME[LAG], 0.0, step_s, 0.0)
 
 
 def _given(effect: Effect, rig: Rig, control: ControlName) -> bool:

@@ -36,6 +36,13 @@ def conditions_of(record: Record) -> Conditions:
     return Conditions(**tables)
 
 
+def reach_of(record: Record, control: ControlName) -> float:
+    """Return where the cab stopped the grip in a record's flight, d; 0 where nothing did."""
+    given = record.manifest.get("reach")
+    reach = given.get(control) if isinstance(given, Mapping) else None
+    return reach if isinstance(reach, float) and reach > 0.0 else 0.0
+
+
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
     """Return the conditions of a record as what is put around an aircraft."""
     seed = record.manifest.get("seed")

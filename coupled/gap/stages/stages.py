@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
-from coupled.gap.signals.conditions import trim_shift
+from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.floors import (
     given_noise,
     left_noise,
@@ -62,7 +62,7 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
-from coupled.rig.nodes import Nodes, by_neighbours, on_nodes
+from coupled.rig.nodes import Nodes, coarsely, on_nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -135,7 +135,7 @@ class Reader(Reading):
         base = predict(self.rig)
         own = left_noise(own, measured, without_echo(measured - base, echo), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
-        carried = float(np.sqrt(np.mean(np.square(tries))))
+        carried = _rms(np.array(tries))
         known = REPLAY_KNOWN * float(np.ptp(measured))
         floor = math.hypot(own.rms, carried, driven_by.between, known)
         made = self._output(stage, name, measured, predict, floor)
@@ -181,8 +181,7 @@ class Reader(Reading):
     def _loader(self) -> list[Output]:
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
-        load_of = self.load()
-        served, held = services(self), held_force(self.rig, self.record, self.control)
+        load_of, hosted = self.load(), self._hosted()
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = round(RESTART_s * self.rig.frame_rate) if self._drifts(gradient) else 0
@@ -190,9 +189,9 @@ class Reader(Reading):
         def driven(f: Floats, seen: Floats, every: int = every, otherwise: bool = False) -> Driven:
             """Return the answer to a force, and so many times its noise, by where windows start.
 
-            `otherwise`: with as good a guess of what force and services did between the frames.
+            `otherwise`: with less known of what force and services did between the frames.
             """
-            nodes = Nodes(f, by_neighbours if otherwise else on_nodes)
+            nodes = Nodes(f, coarsely if otherwise and not rough else on_nodes)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if every else seen
 
@@ -208,8 +207,8 @@ class Reader(Reading):
                     pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
-                host = Hosted(served, self.missed.under(rig, self.control), held)
-                host = host.a_frame_late() if otherwise else host
+                host = hosted.a_frame_late() if otherwise else hosted
+                host = host._replace(missed=self.missed.under(rig, self.control))
                 driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
@@ -235,12 +234,13 @@ class Reader(Reading):
             force = replace(force, noise=level) if smooth_enough else force.unsmoothed(level)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
+        rough = force.smooth is force.recorded and force.noise.rms > 0.0
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
-        other = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
-        between = float(np.sqrt(np.mean((other - answer(self.rig, 0.0)) ** 2)))
-        whole = self._made("loader", *made, DrivenBy("force", between)).under(force.noise)
+        between = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
+        driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
+        whole = self._made("loader", *made, driven_by).under(force.noise)
         if not every:
             shot = driven(force.smooth, smooth, round(RESTART_s * self.rig.frame_rate))
             whole = replace(whole, shots=lambda rig: shot(rig, 0.0))
@@ -252,6 +252,11 @@ class Reader(Reading):
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
         made = (force, motion.predict(), motion.noisy, own, DrivenBy(self.imposed))
         return [self._made("loader", self.name_of("force"), *made)]
+
+    def _hosted(self) -> Hosted:
+        """Return what is known of the services, and of where the cab stopped the grip."""
+        held = held_force(self.rig, self.record, self.control)
+        return Hosted(services(self), None, held, reach_of(self.record, self.control))
 
     def _drifts(self, gradient: Floats) -> bool:
         """Tell whether the loader has no spring to speak of: an open-loop replay would drift."""
@@ -272,7 +277,7 @@ class Reader(Reading):
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
-            nodes = Nodes(c, by_neighbours if otherwise else on_nodes)
+            nodes = Nodes(c, coarsely if otherwise else on_nodes)
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
@@ -288,10 +293,9 @@ class Reader(Reading):
             return driven(command.with_error(k), pulled)(rig)
 
         given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
-        other = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
-        between = float(np.sqrt(np.mean(other**2)))
+        between = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
         made = (measured, predict, noisy, self.heard("deflection"))
-        driven_by = DrivenBy("computed", between)
+        driven_by = DrivenBy("computed", _rms(between))
         linkage = self._made("linkage", self.name_of("deflection"), *made, driven_by)
         return [replace(linkage, noises={"force": force.noise.rms})]
 
@@ -326,3 +330,8 @@ class Reader(Reading):
         own = left_noise(heard(left), measured, left)
         floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
+
+
+def _rms(signal: Floats) -> float:
+    """Return the root of a signal's mean square."""
+    return float(np.sqrt(np.mean(np.square(signal))))
