@@ -117,6 +117,8 @@ def diagnose(
         keep_json(table, json_file, outputs)
         _report(report, outputs, inputs, whole, power)
     if json_file != "-":
+        if rig_file is None:
+            say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
         _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if worse:

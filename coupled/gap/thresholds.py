@@ -60,7 +60,6 @@ BROAD = 0.1  # chosen: of its spread, from which a force's noise may be the forc
 FELT_FRAMES = 4  # chosen: to either side, over which an answer says what was felt of a force
 FELT, HALF_FELT = 0.9, 0.5  # chosen: share of a force's roughness in its answer, from which it is
 # no noise, and from which to smooth it would take more than it gives
-LOST_FRAMES = 60  # chosen: half a second at 120 Hz, over which what a smoother loses is averaged
 UNCORRELATED = 0.05  # chosen: correlation from which a residual has forgotten itself
 
 # Halves of a record: fitted and held out (`output`).

@@ -7,6 +7,7 @@ What else the rig of a manifest differs in (a mass, a moment, a bend) stays as t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -73,13 +74,21 @@ def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
     source = f"the manifest of {first}"
     if taken is None:
         taken, source = _measured_trim(rig, records[first], first), f"the first rows of {first}"
-    new = {key: value for key, value in taken.items() if value != getattr(rig.flight, _FIELDS[key])}
+    new = {key: value for key, value in taken.items() if not _same(rig.flight, key, value)}
     if not new:
         return rig, ""
     was = ", ".join(_change(rig.flight, key, value) for key, value in new.items())
     return rig.changed({f"flight.{key}": value for key, value in new.items()}), (
         f"Trim taken from {source}, not from the rig file: {was}."
     )
+
+
+def _same(flight: Flight, key: str, value: Any) -> bool:
+    """Tell whether a rig file has a key as it was flown, to what an instrument would show."""
+    filed = getattr(flight, _FIELDS[key])
+    if isinstance(value, float) and isinstance(filed, float):
+        return math.isclose(value, filed, rel_tol=1e-6, abs_tol=1e-9)
+    return bool(value == filed)
 
 
 def _change(flight: Flight, key: str, value: Any) -> str:

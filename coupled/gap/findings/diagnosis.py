@@ -14,7 +14,7 @@ from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.findings.result import FORMAT, Findings
 from coupled.gap.findings.shrink import Shrink
-from coupled.gap.findings.summary import filtered_words, summary
+from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice
 from coupled.gap.signals.output import Output
@@ -102,7 +102,9 @@ class Diagnosis(Findings):
         """What is wrong, how large, how sure, how much it explains, and what to record next."""
         flight = "" if self.in_flight is None else in_words(self.in_flight)
         filtered = filtered_words(self.filtered)
-        said = summary(self, self.shrink, flight, filtered, self.next_test)
+        missed = self.baseline is not None and self.baseline.missed
+        floor = MISFIT if missed else NOISE
+        said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
         said += f" {CIRCLED}" if self.choice.circled else ""
         held = "" if self.baseline is None else self.baseline.words
         return " ".join(words for words in (self.trim, held, said) if words)

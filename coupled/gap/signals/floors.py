@@ -12,7 +12,7 @@ from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.quiet import noise_of_input, quiet_noise
 from coupled.gap.noise.smooth import Smoother
 from coupled.gap.signals.output import heard, rounding
-from coupled.gap.thresholds import LEAST_NOISE, LOST_FRAMES, LOUDER
+from coupled.gap.thresholds import LEAST_NOISE, LOUDER
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -74,21 +74,10 @@ def _no_less(found: Noise, signal: Floats) -> Noise:
 
 
 def with_error(signal: Floats, k: int, level: Noise) -> Floats:
-    """Return a smoothed signal with a sample of its error: noise passed, and signal lost.
-
-    A Wiener filter's error is even over the record. Where a signal moves in a small part of it, the
-    smoother loses more there: what it takes off the smoothed signal once more, beyond that error,
-    is added.
-    """
+    """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
-    smoother = Smoother.of(raw, noise=level)
-    error = smoother.wiener_error(level, len(signal), rng)
-    lost = smoother.smooth(signal) - signal
-    window = min(LOST_FRAMES, len(signal))
-    local = np.convolve(lost**2, np.full(window, 1.0 / window), mode="same")
-    even = float(np.mean(error**2))
-    return signal + error + lost * np.sqrt(np.maximum(1.0 - even / np.maximum(local, 1e-300), 0.0))
+    return signal + Smoother.of(raw, noise=level).wiener_error(level, len(signal), rng)
 
 
 def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:

@@ -162,7 +162,7 @@ def airframe_outputs(
         noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
         floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
-        loose = spread([carried[:, i]], own, noise.memory)
+        loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
 
         def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
             assert other.flight is not None

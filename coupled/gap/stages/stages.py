@@ -141,7 +141,11 @@ class Reader(Reading):
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        made = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
+        made = replace(
+            made,
+            spread=spread(tries, own.rms, own.memory, self.rig.frame_rate),
+            smoothed=carried / floor,
+        )
         if not driven_by.quantity:
             return made
         noisiest = self.name_of(driven_by.quantity) if carried > own.rms else name
@@ -297,7 +301,9 @@ class Reader(Reading):
         made = (measured, predict, noisy, self.heard("deflection"))
         driven_by = DrivenBy("computed", _rms(between))
         linkage = self._made("linkage", self.name_of("deflection"), *made, driven_by)
-        return [replace(linkage, noises={"force": force.noise.rms})]
+        # A bend adds to δc; of set points the whole way is the servo's.
+        handed_on = None if self.set_points else computed
+        return [replace(linkage, noises={"force": force.noise.rms}, handed_on=handed_on)]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""
