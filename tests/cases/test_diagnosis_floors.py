@@ -15,6 +15,9 @@ from coupled.flight.runfile import read_run
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.thresholds import STATED_MOST, SHORTEST_RECORD_s
+from coupled.live.attach import rig_live
+from coupled.live.host import Plan
+from coupled.live.session import fly_live
 from coupled.record.channels import ControlName, channel, unit_of
 from coupled.record.record import Record, read_record
 from coupled.resources import shipped_runs
@@ -183,3 +186,35 @@ def test_no_effect_is_stated_to_be_surer_than_was_measured() -> None:
     assert right / of - 0.01 < STATED_MOST <= right / of
     found = api.diagnose(MACHINE, pushed(MACHINE, CHANGED, 3))
     assert [effect.probability for effect in found.effects] == [STATED_MOST]
+
+
+class Mouse:
+    """Wants the column where a mouse draws it: events thirty times a second, with rests."""
+
+    name = "mouse"
+
+    def __init__(self) -> None:
+        rng, at = np.random.default_rng(3), 0.0
+        self._places: list[float] = []
+        for _ in range(14):
+            to = rng.uniform(-0.35, 0.35) if rng.random() < 0.75 else 0.0
+            for _ in range(rng.integers(4, 40)):
+                at += 0.25 * (to - at)
+                self._places += [round(at, 3)] * 4
+            self._places += [self._places[-1]] * int(rng.integers(20, 120))
+        self._read = 0
+
+    def read(self, control: str) -> float:
+        self._read += 1
+        return self._places[min(self._read, len(self._places) - 1)]
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_a_live_flight_by_mouse_has_no_gap() -> None:
+    """The hand's force comes in steps: what a smoother takes off that is no noise."""
+    live = rig_live("report-column", 25.0)
+    record = fly_live(live, Plan(paced=False, wishes=Mouse())).record
+    found = api.diagnose("report-column", record)
+    assert (found.verdict, found.guilty) == ("no_gap", ())

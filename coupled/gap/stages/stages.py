@@ -228,7 +228,7 @@ class Reader(Reading):
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
-        if force.noise.rms > BROAD * float(np.std(force.recorded)):
+        if rough := force.noise.rms > BROAD * float(np.std(force.recorded)):
             share = felt(force.recorded, computed)
             less = float(np.sqrt(max(1.0 - share, 0.0)))
             level = replace(force.noise, rms=force.noise.rms * less)
@@ -238,7 +238,6 @@ class Reader(Reading):
             force = replace(force, noise=level) if smooth_enough else force.unsmoothed(level)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
-        rough = force.smooth is force.recorded and force.noise.rms > 0.0
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
         made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
