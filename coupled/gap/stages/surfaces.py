@@ -73,28 +73,28 @@ def _points(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether a surface moves as the air rises and controls are held off neutral.
+    """Tell whether a surface moves as the air rises and other controls are moved.
 
-    Under its own control it goes there within a frame, and stays: a tab or an actuator of the
-    model's own takes longer, or follows the air.
+    Or goes on under its own control after a frame, as with a tab or an actuator of the model's own.
     """
     at = motion_channels(controls, flown=True).index(surface_channel(control))
-    neutral, moved = airframe.motion()[at], 0.0
+    own, frames = controls.index(control), round(SURFACE_SHAKE_s * rate_Hz)
+
+    def goes(moved: int) -> list[float]:
+        """Return where the surface stands, frame by frame, as a control is held off neutral."""
+        places = []
+        for _ in range(frames):
+            first, second, third = (SURFACE_SHAKE * (i == moved) for i in range(3))
+            airframe.step((first, second, third))
+            places.append(airframe.motion()[at])
+        return places
+
+    still = airframe.motion()[at]
     airframe.set_gust(SURFACE_GUST_m_per_s)
-    for i, other in enumerate(controls):
-        still = neutral if other != control else None
-        for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
-            airframe.step(
-                (
-                    SURFACE_SHAKE * (i == 0),
-                    SURFACE_SHAKE * (i == 1),
-                    SURFACE_SHAKE * (i == 2),
-                )
-            )
-            position = airframe.motion()[at]
-            still = position if still is None else still
-            moved = max(moved, abs(position - still))
-    return moved > SURFACE_MOVES_rad
+    left_alone = goes(-1) + [place for i in range(len(controls)) if i != own for place in goes(i)]
+    led = goes(own)
+    moved = [*(place - still for place in left_alone), *(place - led[0] for place in led)]
+    return max(map(abs, moved)) > SURFACE_MOVES_rad
 
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
