@@ -55,5 +55,5 @@ def trim_shift(record: Record, control: ControlName, frame_s: float) -> Floats:
 
     As a command of the surface: positive as JSBSim has it.
     """
-    times = np.arange(len(record)) * frame_s
+    times = np.arange(len(record), dtype=np.float64) * frame_s
     return trim_moved(conditions_of(record).event, control, times)
