@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.entries import setting_of
-from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
 CONTACT = ("loader.friction_stiffness_N_per_{d}", "loader.friction_elastic_share")
 MOST_ELASTIC = 0.95
-LAG = "transport_delay"
 
 
 def settings(rig: Rig, control: ControlName) -> dict[str, Effect]:

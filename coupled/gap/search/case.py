@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from coupled.gap.effects.effect import Effect, possible
-from coupled.gap.effects.settings import LAG, contact, is_dry, lag_within_a_step, settings
+from coupled.gap.effects.library import LAG, STAMP
+from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
 from coupled.gap.search.course import Bounds
 from coupled.gap.search.descent import WHOLE, Descent
@@ -52,13 +53,14 @@ class Case:
         is fitted to that output, too. If it is the stamp of the force, the loader may have the
         force late by itself, within one step.
         """
-        found = settings(self.nominal, self.control)
-        for name, one in found.items():
+        filed = settings(self.nominal, self.control)
+        found = dict(filed)
+        for name, one in filed.items():
             spoiled = self._spoiled(one) if one.stage == "sensing" else ()
             if spoiled:
                 found[name] = replace(one, outputs=(*one.shows_in, *spoiled))
-                if name == "force_skew":
-                    return found | {LAG: lag_within_a_step(self.nominal, self.control)}
+        if found.get(STAMP) not in (None, filed.get(STAMP)):
+            found[LAG] = lag_within_a_step(self.nominal, self.control)
         return found
 
     def _spoiled(self, setting: Effect) -> tuple[str, ...]:
