@@ -20,10 +20,8 @@ from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 MOTION = "motion_skew"
-STAMP, LAG = (
-    "force_skew",
-    "transport_delay",
-)  # a force that is stamped late, and one that comes late
+# A force that is stamped late, and one that comes late.
+STAMP, LAG = "force_skew", "transport_delay"
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
 
