@@ -14,6 +14,8 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.stages.airframe import airframe_outputs
+from coupled.gap.stages.stages import Reader
+from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import STATED_MOST, SHORTEST_RECORD_s
 from coupled.live.attach import rig_live
 from coupled.live.host import Plan
@@ -104,6 +106,16 @@ def test_wind_that_no_manifest_tells_of_is_a_gap_of_the_airframe() -> None:
     for known, clean in ((record, True), (bare, False)):
         outputs = airframe_outputs(case.rig, known)
         assert all(output.gap(case.rig) < output.limit for output in outputs) == clean
+
+
+def test_a_force_that_the_host_holds_over_a_frame_is_replayed_so() -> None:
+    """An envelope's force goes in steps of a frame: δc is reproduced to rounding of a spline."""
+    case = read_run("soft-limits")[2]
+    record, _ = flown(case)
+    outputs = Reader(case.rig, record, "column", surface_points).outputs()
+    [loader] = [output for output in outputs if output.stage == "loader"]
+    off = loader.gap(case.rig) * loader.floor
+    assert off < 2e-6 * float(np.ptp(record["column_computed_m"]))
 
 
 def pushed(rig: Rig, bend_m_per_N: float, seed: int) -> Record:
