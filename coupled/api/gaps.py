@@ -11,6 +11,7 @@ from coupled.api.rigs import load_rig
 from coupled.errors import InputError
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
+from coupled.gap.trimmed import rig_of_manifests
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -19,7 +20,7 @@ Given = Record | str | PathLike[str]
 
 
 def diagnose(
-    rig: Rig | str | PathLike[str],
+    rig: Rig | str | PathLike[str] | None,
     records: Given | Sequence[Given] | Mapping[str, Record],
     control: ControlName = "column",
     progress: Callable[[str, int, int], None] | None = None,
@@ -28,7 +29,8 @@ def diagnose(
     """Diagnose a mismatch between simulation and record: where, which effect, how large.
 
     `rig` is the rig that the records should be of: a rig, its file, or the name of a shipped
-    one. `records` is one record or several of that rig, as `Record`, as files, or by name;
+    one; None for that of the manifest beside the records. Its aircraft is trimmed as the records
+    begin. `records` is one record or several of that rig, as `Record`, as files, or by name;
     each needs `time_s` and what its stages need (force and deflections of the control, q̄).
     `healthy` are records of the machine when it was well; what differs from those is judged.
 
@@ -52,9 +54,13 @@ def diagnose(
     if control not in CONTROL_NAMES:
         problem = f"is {control!r}; one of {', '.join(CONTROL_NAMES)}"
         raise InputError("diagnose", "control", problem)
-    nominal = rig if isinstance(rig, Rig) else load_rig(rig)
+    named = named_records(records)
+    if rig is None:
+        nominal = rig_of_manifests(named)
+    else:
+        nominal = rig if isinstance(rig, Rig) else load_rig(rig)
     well = None if healthy is None else named_records(healthy)
-    return diagnose_records(nominal, named_records(records), control, progress, well)
+    return diagnose_records(nominal, named, control, progress, well)
 
 
 def named_records(records: Given | Sequence[Given] | Mapping[str, Record]) -> dict[str, Record]:

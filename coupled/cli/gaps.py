@@ -38,7 +38,13 @@ def diagnose(
             help=f"Records of one rig, {RECORDS}; or a folder whose records.toml names each's.",
         ),
     ],
-    rig: Annotated[str, typer.Option(help="Its rig file, or the name of a shipped one.")] = "",
+    rig: Annotated[
+        str,
+        typer.Option(
+            help="Its rig file, or the name of a shipped one. (default: the rig in the manifest"
+            " beside the record)"
+        ),
+    ] = "",
     control: ControlOption = "column",
     healthy: Annotated[
         list[Path] | None,
@@ -90,9 +96,7 @@ def diagnose(
         raise InputError(records[0], option, "is for a folder of records")
     if output is not None:
         raise InputError(output, "--output", "is for a folder of records; give --json FILE")
-    if not rig:
-        raise InputError(records[0], "--rig", "is missing: the rig file to hold the record against")
-    rig_file = find(rig, shipped_rigs(), "rig")
+    rig_file = find(rig, shipped_rigs(), "rig") if rig else None
     inputs = files_read([*records, *(healthy or [])], rig_file)
     drawn = _plot_targets(plots)
     for target in drawn:
@@ -113,6 +117,8 @@ def diagnose(
         keep_json(table, json_file, outputs)
         _report(report, outputs, inputs, whole, power)
     if json_file != "-":
+        if rig_file is None:
+            say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
         _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if worse:
@@ -127,14 +133,16 @@ def _refuse_for_folders(records: list[Path], asked: dict[str, object]) -> None:
 
 
 def _diagnose(
-    files: list[Path], rig_file: Path, control: ControlName, healthy: list[Path]
+    files: list[Path], rig_file: Path | None, control: ControlName, healthy: list[Path]
 ) -> tuple[Diagnosis, dict[str, Record]]:
     from coupled.gap.diagnose import diagnose as find_gap
+    from coupled.gap.trimmed import rig_of_manifests
     from coupled.rig.rigfile import read_rig
 
-    nominal = read_rig(rig_file)
+    nominal = None if rig_file is None else read_rig(rig_file)
     read = read_each([*files, *healthy])
     well = {str(file): read.pop(str(file)) for file in healthy}
+    nominal = rig_of_manifests(read) if nominal is None else nominal
     with progress() as advance:
         whole = find_gap(nominal, read, control, advance, well)
         advance("flying again, and looking for the next test", 0, 1)
@@ -171,21 +179,30 @@ def _print(
 
 
 def _write_improved(
-    path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
+    path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
 ) -> None:
     from coupled.files import read_text
     from coupled.gap.findings.summary import change
+    from coupled.gap.trimmed import rig_of_manifests, trimmed
     from coupled.rig.rigedit import differences, edited
     from coupled.rig.rigfile import read_rig
+    from coupled.rig.rigwrite import rig_text
 
     names = ", ".join(shown(Path(name).name) for name in records)
-    remark = f"{shown(rig_file.name)} with what was found in {names}:\n{whole.summary}\n"
+    if rig_file is None:
+        filed, held = rig_of_manifests(records), "the manifest's rig"
+        text = rig_text(filed)
+    else:
+        filed, held = read_rig(rig_file), shown(rig_file.name)
+        text = read_text(rig_file, "a rig file is wanted")
+    remark = f"{held} with what was found in {names}:\n{whole.summary}\n"
     for effect in whole.effects:
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
-    changes = differences(read_rig(rig_file), whole.improved)
-    write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))
+    # The trim was taken from the record, and is no change of the rig file.
+    changes = differences(trimmed(filed, records)[0], whole.improved)
+    write_text(path, edited(text, changes, remark))
 
 
 def _plot_targets(folder: Path | None) -> list[Path]:

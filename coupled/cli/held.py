@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 RECORDS = "CSV or Parquet"  # what a record's file is, for help texts
 
 
-def files_read(records: Sequence[Path], rig_file: Path) -> list[Path]:
-    """Return the files that are read: records, their manifests, the rig's."""
+def files_read(records: Sequence[Path], rig_file: Path | None) -> list[Path]:
+    """Return the files that are read: records, their manifests, the rig's if one is given."""
     from coupled.record.record import manifest_path
 
-    return [*records, *map(manifest_path, records), rig_file]
+    own = [] if rig_file is None else [rig_file]
+    return [*records, *map(manifest_path, records), *own]
 
 
 def check_rig_target(

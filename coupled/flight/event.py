@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from coupled.errors import InputError
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.record.channels import SURFACES, ControlName
@@ -22,6 +25,7 @@ _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
 # Fuel cut and magnetos off, for the engine that JSBSim has picked; −1 picks all.
 OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
 PICK = "propulsion/active_engine"
+EARLY = 1e-6  # of a frame: one that starts at the time itself has met it
 
 
 class Event(Section):
@@ -85,7 +89,7 @@ def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
 
     def happen() -> None:
         nonlocal frame, moves
-        time = (frame + 1e-6) * frame_s  # a frame that starts at the time itself has met it
+        time = (frame + EARLY) * frame_s
         frame += 1
         for event, move in moves:
             if time >= event.at:
@@ -114,6 +118,19 @@ def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move
         lead(controls, names, control, service, begun + (to - begun) * share)
 
     return move
+
+
+def trim_moved(
+    events: Mapping[str, Event], control: ControlName, times_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return by how much events have moved a control's trim at some times, as a JSBSim command."""
+    moved = np.zeros_like(times_s)
+    for event in events.values():
+        if event.trim == control and event.by is not None:
+            since = times_s + EARLY * (times_s[1] - times_s[0]) - event.at
+            share = np.clip(since / event.over, 0.0, 1.0) if event.over > 0.0 else since >= 0.0
+            moved += COMMAND_SIGN[SURFACES[control]] * event.by * share
+    return moved
 
 
 def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:

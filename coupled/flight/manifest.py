@@ -18,7 +18,7 @@ from coupled.flight.pilot import ForceTable
 from coupled.record.channels import TIME, channel
 from coupled.record.record import EndedEarly
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.rigwrite import rig_table
+from coupled.rig.rigwrite import rig_table, section_table
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +46,8 @@ def manifest(
         "case": manoeuvre.label,
         "rig": rig_table(manoeuvre.rig),
         "seed": manoeuvre.seed,
+        "conditions": _conditions(manoeuvre),
+        "reach": {n: r for n, p in manoeuvre.pilots.items() if (r := p.reach(n)) > 0.0},
         "channels": list(channels),
         "positive": _positive(manoeuvre),
         "rows": len(data),
@@ -54,6 +56,17 @@ def manifest(
         "inputs_sha256": {path.name: sha256(path) for path in files},
         "versions": dict(versions()),
     }
+
+
+def _conditions(manoeuvre: Manoeuvre) -> dict[str, Any]:
+    """Return the wind, gust, turbulence and events of a flight, by the keys of a run file."""
+    given = manoeuvre.conditions
+    tables = {key: getattr(given, key) for key in ("wind", "gust", "turbulence")}
+    found: dict[str, Any] = {
+        key: section_table(table, "m") for key, table in tables.items() if table is not None
+    }
+    events = {name: section_table(event, "m") for name, event in given.event.items()}
+    return found | ({"event": events} if events else {})
 
 
 _PULLS = {"column": "a pull", "wheel": "clockwise", "pedals": "right foot forward"}

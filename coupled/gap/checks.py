@@ -18,6 +18,9 @@ from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
 from coupled.rig.rig import Rig
 
+SPEED = "true_airspeed_m_per_s"
+START_ROWS = 12  # chosen: a tenth of a second at 120 Hz, before a pilot has changed the motion
+
 
 def check_record(rig: Rig, record: Record, control: ControlName, file: object) -> None:
     """Refuse a record that cannot be held against this rig, and say why."""
@@ -87,17 +90,18 @@ def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object
 
 def check_trim(trim_speed_m_per_s: float, record: Record, file: object) -> None:
     """Refuse a record that does not start at the speed where the rig's aircraft is trimmed."""
-    name = "true_airspeed_m_per_s"
-    if name not in record:
+    if SPEED not in record:
         return
-    start = float(np.median(record[name][:12]))
+    start = start_of(record, SPEED)
     if abs(start / trim_speed_m_per_s - 1.0) > OTHER_SPEED:
-        raise InputError(
-            file,
-            name,
-            f"starts at {start:.4g}, the rig's aircraft at {trim_speed_m_per_s:.4g}:"
-            " another rig's file?",
-        )
+        problem = f"starts at {start:.4g}, and the aircraft is trimmed at {trim_speed_m_per_s:.4g}"
+        remedy = "give records from their trim on, and those of another trim by themselves"
+        raise InputError(file, SPEED, f"{problem}: {remedy}")
+
+
+def start_of(record: Record, name: str) -> float:
+    """Return where a channel stands at the start of a record, in its unit."""
+    return float(np.median(record[name][:START_ROWS]))
 
 
 def _check_force_unit(rig: Rig, record: Record, control: ControlName, file: object) -> None:

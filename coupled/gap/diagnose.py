@@ -21,20 +21,21 @@ from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
+from coupled.gap.refuted import search_unrefuted
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.contact import allowing_for_contact
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.search import search
 from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
-from coupled.gap.stages.airframe import Flights, airframe_outputs, trim_speed
+from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.setpoints import under_set_points
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import RIGS_KEPT
+from coupled.gap.trimmed import trim_speed, trimmed
 from coupled.parallel import in_threads, threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -78,6 +79,7 @@ def _diagnose(
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
+    rig, trim = trimmed(rig, records)
     for file, record in records.items():
         check_record(rig, record, control, file)
         if rig.flight is not None:
@@ -113,7 +115,7 @@ def _diagnose(
         return held
 
     case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
-    case, choice = search(case, library)
+    case, choice = search_unrefuted(case, library)
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
     stages = judge.stages()
@@ -146,6 +148,7 @@ def _diagnose(
         outputs=tuple(outputs),
         choice=choice,
         baseline=baseline,
+        trim=trim,
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
         left_out=tuple(dict.fromkeys(words for one in live for words in one.left_out)),
     )

@@ -16,20 +16,44 @@ Mask = NDArray[np.bool_]
 class Hosted(NamedTuple):
     """What a record holds of the loader's services, and of its host.
 
-    `missed` are the frames that the host missed, `assumed` is how far its K̂ in ΔG was another than
-    its first, d/N.
+    `missed` are the frames that the host missed, `held` is what of the services' force the host
+    holds over each frame, N (`serving.held_force`), `reach` where a stop of the cab stops the grip,
+    d, 0 for nowhere, `assumed` how far the host's K̂ in ΔG was another than its first, d/N.
     """
 
     services: ServiceRows | None = None
     missed: Mask | None = None
+    held: Floats | None = None
+    reach: float = 0.0
     assumed: Floats | None = None
 
     def rows(self, frames: int) -> tuple[Floats, ...]:
-        """Return neutral x₀ in d, force in N and jams of services, misses and K̂, at each frame."""
+        """Return x₀ in d, the held force in N and jams of services, misses and K̂, at each frame."""
         none = np.zeros(frames)
-        served = (none, none, none) if self.services is None else self.services[:3]
+        neutral, jammed = none, none
+        if self.services is not None:
+            neutral, jammed = self.services.neutral, self.services.jammed
+        held = none if self.held is None else self.held
         missed = none if self.missed is None else self.missed.astype(np.float64)
-        return (*served, missed, none if self.assumed is None else self.assumed)
+        return neutral, held, jammed, missed, none if self.assumed is None else self.assumed
+
+    def a_frame_late(self) -> Hosted:
+        """Return the same with the services' rows a frame late."""
+        if self.services is None:
+            return self
+        late = (np.concatenate((row[:1], row[:-1])) for row in self.services)
+        return self._replace(services=ServiceRows(*late))
+
+    def following(self) -> Floats | None:
+        """Return the services' force that follows the motion, N at each frame; None without any.
+
+        A row holds what the host held until then.
+        """
+        if self.services is None:
+            return None
+        if self.held is None:
+            return self.services.force
+        return self.services.force - np.concatenate(([0.0], self.held[:-1]))
 
 
 HOSTED = Hosted()

@@ -24,6 +24,7 @@ from coupled.rig.loader import move_loader, set_external, start_loader
 from coupled.rig.modification import assume, assumed_bend, set_gradients
 from coupled.rig.nodes import on_nodes
 from coupled.rig.packing import crossed_bends, pack
+from coupled.rig.reach import bounds, set_reach
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import scale_at
@@ -86,8 +87,9 @@ def drive_loader(
 ) -> tuple[Floats, Floats]:
     """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
 
-    `nodes_N` has `rig.substeps` values a frame and one more. Services' force is straight between
-    frames; a digital product stays as it was in frames that the host missed. G_T is as given.
+    `nodes_N` has `rig.substeps` values a frame and one more. Of the services' force what the host
+    holds stays over a frame, and the rest runs along the spline. A digital product stays as it was
+    in frames that the host missed. G_T is as given.
     """
     p, s = _one(rig, control)
     level = np.ones_like(misread) if load_factor is None else load_factor
@@ -97,8 +99,16 @@ def drive_loader(
     begun, position, rate = (none, none, none) if restart is None else restart
     both = (gradient, gradient if second is None else second)
     rows = (*both, misread, level, position, rate, *host.rows(len(misread)), begun)
-    _loader(p, s, nodes_N, np.stack(rows), rig.substeps, h, out, np.empty(0))
+    served = _served(rig, p, nodes_N, host)
+    _loader(p, s, nodes_N, served, np.stack(rows), rig.substeps, h, out, np.empty(0))
     return out[0], out[1]
+
+
+def _served(rig: Rig, p: Any, nodes_N: Floats, host: Hosted) -> Floats:
+    """Return the services' force that follows the motion, N at each node; set the cab's reach."""
+    p[0]["reach"]["reach"] = host.reach
+    following = host.following()
+    return np.zeros_like(nodes_N) if following is None else on_nodes(rig, following)
 
 
 def drive_series(
@@ -126,7 +136,8 @@ def drive_series(
     both = (gradient, gradient if second is None else second)
     given = np.stack((*both, none, level, none, none, *host.rows(frames), none))
     computed = np.empty((frames - 1) * rig.substeps + 1)
-    _loader(p, s, nodes_N, given, rig.substeps, h, np.empty((2, frames)), computed)
+    served = _served(rig, p, nodes_N, host)
+    _loader(p, s, nodes_N, served, given, rig.substeps, h, np.empty((2, frames)), computed)
     return drive_linkage(rig, control, computed, force_N, others_N)
 
 
@@ -249,24 +260,24 @@ def _loader(
     parameters: Any,
     states: Any,
     force: Floats,
+    served: Floats,
     given: Floats,
     substeps: int,
     h: float,
     out: Floats,
     fine: Floats,
 ) -> None:
-    """Run the loader on what is `given`, shape (12, frames).
+    """Run the loader on what is `given`, shape (12, frames), and on forces at the nodes.
 
     G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, and restarts.
     Write δc and F_mod at the frames to `out`, and δc at every node to `fine`, unless that is empty.
     """
     p, s = parameters[0], states[0]
     gradient, misread, level, position, rate = given[:2], given[2], given[3], given[4], given[5]
-    neutral, added, jammed, missed = given[6], given[7], given[8], given[9]
+    neutral, held, jammed, missed = given[6], given[7], given[8], given[9]
     assumed, begun = given[10], given[11]
     bend = assumed_bend(p.modification)
     start_loader(p.loader, s.loader, force[0])
-    ends = (-p.loader.forward, p.loader.aft)
     frames, read = len(misread), 0.0
     if len(fine) > 0:
         fine[0] = s.loader.computed
@@ -284,12 +295,17 @@ def _loader(
         out[0, k] = s.loader.computed
         set_external(p.loader, s.loader, level[k])
         if k + 1 < frames:
-            base, here = s.loader.external, ends
-            if jammed[k] > 0.5:
-                here = (s.loader.computed, s.loader.computed)
+            base = s.loader.external
+            s.loader.external = base + held[k]
+            if p.reach.reach > 0.0:
+                set_reach(
+                    p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage
+                )
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
-                share = (node - k * substeps - 0.5) / substeps
-                s.loader.external = base + (1.0 - share) * added[k] + share * added[k + 1]
+                s.loader.external = base + held[k] + served[node]
+                here = bounds(p.reach, s.reach, p.loader, p.linkage, s.loader.computed)
+                if jammed[k] > 0.5:
+                    here = (s.loader.computed, s.loader.computed)
                 led = force[node]
                 if p.inertia.rows > 0:
                     led = lead_force(p.inertia, s.inertia, led)

@@ -35,18 +35,18 @@ def rig_table(rig: Rig) -> dict[str, Any]:
 
     What the rig has not, as a flight on a bench, is left out: the tables read back as the rig.
     """
-    table = _whole(rig, "m")
-    controls = {name: _whole(each, unit_of(name)) for name, each in rig.controls.items()}
+    table = section_table(rig, "m")
+    controls = {name: section_table(each, unit_of(name)) for name, each in rig.controls.items()}
     return table | {"controls": controls}
 
 
-def _whole(section: Section, d: str) -> dict[str, Any]:
-    """Return a section's values by their keys in a file."""
+def section_table(section: Section, d: str) -> dict[str, Any]:
+    """Return a section's values by their keys in a file, for deflections in unit `d`."""
     found = {}
     for key, field in file_keys(type(section), d).items():
         value = getattr(section, field)
         if value is not None:
-            found[key] = _whole(value, d) if isinstance(value, Section) else value
+            found[key] = section_table(value, d) if isinstance(value, Section) else value
     return found
 
 

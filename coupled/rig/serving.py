@@ -7,13 +7,13 @@ what its kernels last wrote of the services, as the channels of `service_channel
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError, nearest
-from coupled.record.channels import unit_of
+from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.control import ControlArray
 from coupled.rig.parameters import Control, Services
@@ -75,6 +75,35 @@ def service_rows(record: Record, control: str) -> ServiceRows | None:
     if any(name not in record for name in names):
         return None
     return ServiceRows(*(record[name] for name in names))
+
+
+def held_force(rig: Rig, record: Record, control: str) -> Floats | None:
+    """Return the services' force that the host holds over each frame, N, as `begin_services` does.
+
+    Of pusher, hinge moments and envelope, by the motion as recorded. None where the rig has none of
+    them, or the record lacks a channel for it.
+    """
+    of, d = rig.controls[cast(ControlName, control)].services, unit_of(control)
+    names = {"pusher": f"{control}_pusher", "asked": f"{control}_asked_{d}"}
+    names |= {"q": "dynamic_pressure_Pa", "alpha": "alpha_rad", "load": "load_factor"}
+    needed = ["pusher"] if of.pusher else []
+    needed += ["q", "alpha", "asked"] if of.hinge_alpha or of.hinge_surface else []
+    needed += ["load"] if of.envelope or of.envelope_push else []
+    if not needed or any(names[one] not in record for one in needed):
+        return None
+    rows = {one: record[names[one]] for one in needed}
+    held = np.zeros(len(record))
+    if "pusher" in rows:
+        held -= of.pusher * rows["pusher"]
+    if "asked" in rows:
+        asked = np.concatenate(([0.0], rows["asked"][:-1]))  # as it stood when the frame began
+        moment = of.hinge_alpha * (rows["alpha"] - rows["alpha"][0])
+        travel = rig.controls[cast(ControlName, control)].travel
+        held -= rows["q"] * (moment + of.hinge_surface * asked / travel)
+    if "load" in rows:
+        held -= of.envelope * np.maximum(rows["load"] - of.envelope_above, 0.0)
+        held += of.envelope_push * np.maximum(of.envelope_below - rows["load"], 0.0)
+    return held
 
 
 def has_services(control: Control) -> bool:

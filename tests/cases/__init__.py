@@ -1,0 +1,1 @@
+"""Inputs of users that failed: what is printed for each, and what is right."""

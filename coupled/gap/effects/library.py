@@ -20,6 +20,8 @@ from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
 
 MOTION = "motion_skew"
+# A force that is stamped late, and one that comes late.
+STAMP, LAG = "force_skew", "transport_delay"
 WHOLE_s = 1e4  # a zoom that shows the whole record
 
 
@@ -122,7 +124,7 @@ BY_NAME = {effect.name: effect for effect in EFFECTS}
 # is all of the angle of attack.
 ONE_LAW = (
     ("force_zero", "force_offset"),
-    ("force_skew", "transport_delay"),
+    (STAMP, LAG),
     ("viscous_damping", "modifying_lag"),
     ("mass", "lift_slope"),
 )

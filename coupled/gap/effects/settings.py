@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, Parameter, Signature
 from coupled.gap.effects.entries import setting_of
-from coupled.gap.effects.library import EFFECTS
+from coupled.gap.effects.library import BY_NAME, EFFECTS, LAG
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import YIELDS_m, YIELDS_rad
 from coupled.record.channels import ControlName, unit_of
@@ -38,6 +38,16 @@ def settings(rig: Rig, control: ControlName, outputs: Sequence[Output] = ()) -> 
         name: replace(one, outputs=("linkage", "loader")) if one.stage == "linkage" else one
         for name, one in found.items()
     }
+
+
+def lag_within_a_step(rig: Rig, control: ControlName) -> Effect:
+    """Return the setting by which the force may act late on the loader alone, within one step.
+
+    A simulated hand and loader exchange force and motion once a step of the loader: the force then
+    acts as it stood at the step before.
+    """
+    step_s = 1.0 / (rig.frame_rate * rig.substeps)
+    return setting_of(BY_NAME[LAG], 0.0, step_s, 0.0)
 
 
 def _given(effect: Effect, rig: Rig, control: ControlName) -> bool:

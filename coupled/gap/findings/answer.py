@@ -26,7 +26,7 @@ from coupled.gap.search.courses import course_in
 from coupled.gap.search.rivals import Found
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, SURE, UNDERSTATED
+from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, STATED_MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -125,7 +125,7 @@ def effects_of(
     """Return the effects found, the largest first.
 
     What drifts, or stands beside a remainder, may only imitate what is missing: the less credible
-    it is, the less sure.
+    it is, the less sure. None is stated to be surer than the surest were right (`STATED_MOST`).
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
@@ -137,7 +137,7 @@ def effects_of(
         sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
-        probability = step.probability * sure
+        probability = min(step.probability * sure, STATED_MOST)
         course = course_in(effect, case, choice.fit, records)
         return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
 

@@ -14,7 +14,7 @@ from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.findings.result import FORMAT, Findings
 from coupled.gap.findings.shrink import Shrink
-from coupled.gap.findings.summary import filtered_words, summary
+from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice
 from coupled.gap.signals.output import Output
@@ -46,6 +46,8 @@ class Diagnosis(Findings):
     filtered: Mapping[str, str] = field(default_factory=dict)
     # What of live records is not judged, or not as it was recorded; a sentence each.
     left_out: tuple[str, ...] = ()
+    # What of the trim was taken from the records or their manifests, in words; empty for nothing.
+    trim: str = ""
 
     @property
     def first(self) -> Record:
@@ -102,10 +104,12 @@ class Diagnosis(Findings):
         """What is wrong, how large, how sure, how much it explains, and what to record next."""
         flight = "" if self.in_flight is None else in_words(self.in_flight)
         filtered = filtered_words(self.filtered)
-        said = summary(self, self.shrink, flight, filtered, self.next_test)
+        missed = self.baseline is not None and self.baseline.missed
+        floor = MISFIT if missed else NOISE
+        said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
         said += f" {CIRCLED}" if self.choice.circled else ""
-        said = " ".join((said, *self.left_out))
-        return said if self.baseline is None else f"{self.baseline.words} {said}"
+        held = "" if self.baseline is None else self.baseline.words
+        return " ".join(words for words in (self.trim, held, said, *self.left_out) if words)
 
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
         """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
@@ -127,6 +131,8 @@ class Diagnosis(Findings):
             found["filtered"] = dict(self.filtered)
         if self.left_out:
             found["left_out"] = list(self.left_out)
+        if self.trim:
+            found["trim"] = self.trim
         if self.baseline is not None:
             found["healthy"] = self.baseline.as_dict()
         if self.closed_loop is not None:

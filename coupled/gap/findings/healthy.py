@@ -3,7 +3,9 @@
 A nominal rig never describes a machine fully. Records of the machine when it was well are
 diagnosed first: with the effects found in them, the rig is what the machine was. What that leaves
 of them is the model's own error; a channel's floor is then that error beside the noise, and how far
-it scatters from record to record says what may be left of a machine that is as it was. An effect
+it scatters from record to record says what may be left of a machine that is as it was. That error
+is no noise: a stage whose floor it raises to over a tenth of what the stage does is not judged, and
+the rig is to be fitted to the healthy records first. An effect
 found then may only imitate what the model lacks, and be of another size in another record: how far
 its number scatters is its tolerance.
 """
@@ -18,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.display import unit_in
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
-from coupled.gap.signals.output import Output, Part
+from coupled.gap.signals.output import Hides, Output, Part
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.rig.rig import Rig
 
@@ -34,7 +37,8 @@ class ModelError:
 
     `rms` and `moves`, the channel's standard deviation, are in its unit, `rate` that of its change
     from frame to frame. `by_stretch` and `by_record` are relative standard deviations of the rms:
-    of one stretch, and of one record.
+    of one stretch, and of one record. `misses` is by how many times its noise the rig misses a
+    record at most, and 0 where no record shows more than noise.
     """
 
     rms: float
@@ -42,6 +46,7 @@ class ModelError:
     rate: float
     by_stretch: float
     by_record: float
+    misses: float = 0.0
 
     @classmethod
     def of(cls, outputs: Sequence[Output], rig: Rig) -> ModelError:
@@ -62,6 +67,7 @@ class ModelError:
             rate=math.sqrt(float(np.mean([_rate(output) ** 2 for output in outputs]))),
             by_stretch=0.5 * float(np.std(blocks) / max(np.mean(blocks), 1e-300)),
             by_record=max(scatter, few),
+            misses=max((o.gap(rig) for o in outputs if o.gap(rig) > o.limit), default=0.0),
         )
 
     def raised(self, output: Output) -> Output:
@@ -75,6 +81,8 @@ class ModelError:
         error = self.rms * larger
         floor = math.hypot(output.floor, error)
         share = (error / floor) ** 2
+        hidden = floor / max(output.does, 1e-300)
+        hides = Hides(hidden, output.channel, output.channel, self.misses) if self.misses else None
         stretches = max(len(np.unique(output.stretches)), 1)
         scatter = math.hypot(self.by_stretch / math.sqrt(stretches), self.by_record)
         return replace(
@@ -83,7 +91,7 @@ class ModelError:
             spread=math.hypot((1.0 - share) * output.spread, share * scatter),
             smoothed=(1.0 - share) * output.smoothed,
             unsure=(1.0 - share) * output.unsure,
-            hides=None,  # what the healthy machine stayed within is a measure of its own
+            hides=hides,
             _known=[],
         )
 
@@ -159,16 +167,33 @@ class Baseline:
         ]
 
     @property
+    def missed(self) -> dict[str, ModelError]:
+        """The channels in which the rig misses the healthy records by more than noise."""
+        return {name: one for name, one in self.errors.items() if one.misses}
+
+    @property
     def words(self) -> str:
         """What the records are held against."""
         count = f"{len(self.files)} records" if len(self.files) > 1 else "a record"
         found = ", ".join(name.replace("_", " ") for name in self.effects)
         had = f", which had {found}" if found else ""
-        return f"Held against the machine of {count} when it was well{had}."
+        said = f"Held against the machine of {count} when it was well{had}."
+        if not (missed := self.missed):
+            return said
+        each = ", ".join(
+            f"{name} by {one.misses:.3g} times its noise (rms {one.rms:.3g} {unit_in(name)})"
+            for name, one in missed.items()
+        )
+        them = "them" if len(self.files) > 1 else "it"
+        return (
+            f"{said} The rig misses {them} in {each}: a smaller change does not show there."
+            f" Fit the rig to {them} first (coupled fit)."
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         errors = {
-            name: {"rms": one.rms, "by_record": one.by_record} for name, one in self.errors.items()
+            name: {"rms": one.rms, "by_record": one.by_record, "misses": one.misses}
+            for name, one in self.errors.items()
         }
         return {"records": list(self.files), "effects": list(self.effects), "errors": errors}

@@ -168,7 +168,7 @@ def in_one_line(
 ) -> str:
     """Return what to record next, in a sentence, or nothing where nothing would help.
 
-    `lacking` are channels, `wanted` what would lift a stage out of its floor.
+    `lacking` are channels, `wanted` sentences on what would lift a stage out of its floor.
     """
     if tests_found:
         best = tests_found[0]
@@ -177,7 +177,7 @@ def in_one_line(
             return f"No test tried would tell {one} from {other}: they act alike on this rig."
         return f"To tell {one} from {other}, record {best.text}."
     if wanted:
-        return f"Record {wanted[0]}."
+        return wanted[0]
     if lacking:
         return f"Record {', '.join(lacking)} too: without it stages cannot be judged."
     return ""

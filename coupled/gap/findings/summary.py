@@ -55,12 +55,24 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
     return " ".join(said)
 
 
-def summary(found: Findings, shrink: Shrink, in_flight: str, filtered: str, next_test: str) -> str:
+NOISE = "noise"
+MISFIT = "no more than the healthy machine left"
+
+
+def summary(
+    found: Findings,
+    shrink: Shrink,
+    in_flight: str,
+    filtered: str,
+    next_test: str,
+    floor: str = NOISE,
+) -> str:
     """Return what is wrong, how large, how sure, how much it explains, and what to record next.
 
-    `in_flight` says what it does to the flight, `filtered` which logs were filtered.
+    `in_flight` says what it does to the flight, `filtered` which logs were filtered, `floor` what
+    a stage without a gap leaves: `NOISE`, or `MISFIT`.
     """
-    said = [_what(found), _set(found), _settings(found)]
+    said = [_what(found, floor), _set(found), _settings(found)]
     if found.verdict == "no_gap":
         said.append(_not_judged(found))
     else:
@@ -82,10 +94,10 @@ def _not_judged(found: Findings) -> str:
     return f"Not judged: {', '.join(names)}." if names else ""
 
 
-def _what(found: Findings) -> str:
+def _what(found: Findings, floor: str) -> str:
     if found.verdict == "no_gap":
-        within = "every stage that could be judged stays within its noise"
-        return f"No gap in the {found.control}: {within}."
+        within = "stays within its noise" if floor == NOISE else f"leaves {floor}"
+        return f"No gap in the {found.control}: every stage that could be judged {within}."
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
@@ -100,7 +112,7 @@ def _what(found: Findings) -> str:
     stages = [found.stage(name) for name in found.guilty]
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
     return " ".join(
-        _explained(acting[stage.name], stage, budgets.get(stage.name))
+        _explained(acting[stage.name], stage, budgets.get(stage.name), floor)
         for stage in sorted(stages, key=lambda one: not acting[one.name])
     )
 
@@ -113,7 +125,7 @@ def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> 
 
 
 def _explained(
-    acting: Sequence[EffectResult], stage: StageResult, budget: StageBudget | None
+    acting: Sequence[EffectResult], stage: StageResult, budget: StageBudget | None, floor: str
 ) -> str:
     """Return which effects explain how much of a stage's gap, and what remains of it."""
     if budget is None:
@@ -125,7 +137,7 @@ def _explained(
     shares = [f"{_effect(e)}, explains {_per_cent(budget.of(e.name))}" for e in acting]
     said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
     if not stage.unexplained or stage.remains is None:
-        return f"{said}; what remains is noise."
+        return f"{said}; what remains is {floor}."
     near = stage.remains.reversals
     where = "" if near is None else f", within {1000 * near.within_s:.0f} ms of each reversal,"
     rest = f"{_per_cent(budget.remains)} remains{where}"

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from coupled.gap.effects.effect import Effect, possible
-from coupled.gap.effects.settings import contact, is_dry, settings
+from coupled.gap.effects.library import LAG, STAMP
+from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
 from coupled.gap.search.course import Bounds
 from coupled.gap.search.descent import WHOLE, Descent
@@ -46,8 +47,43 @@ class Case:
 
     @cached_property
     def known(self) -> dict[str, Effect]:
-        """The nominal rig's settings, by the effects that free the same numbers."""
-        return settings(self.nominal, self.control, self.outputs)
+        """The nominal rig's settings, by the effects that free the same numbers.
+
+        A sensor's setting that would drive an output beyond its limit, in which it is not fitted,
+        is fitted to that output, too. If it is the stamp of the force, the loader may have the
+        force late by itself, within one step.
+        """
+        filed = settings(self.nominal, self.control, self.outputs)
+        found = dict(filed)
+        for name, one in filed.items():
+            spoiled = self._spoiled(one) if one.stage == "sensing" else ()
+            if spoiled:
+                found[name] = replace(one, outputs=(*one.shows_in, *spoiled))
+        if found.get(STAMP) not in (None, filed.get(STAMP)):
+            found[LAG] = lag_within_a_step(self.nominal, self.control)
+        return found
+
+    def _spoiled(self, setting: Effect) -> tuple[str, ...]:
+        """Return the outputs within their limits that a setting drives beyond them at an end."""
+        if not self._unsettled & {*setting.shows_in}:
+            return ()
+        (number,) = setting.free
+        clean = [
+            output
+            for output in self.outputs
+            if output.stage not in setting.shows_in and output.gap(self.nominal) <= output.limit
+        ]
+        ends = [
+            possible(self.nominal, self.control, [setting], {setting.value_key(number): end})
+            for end in (number.low, number.high)
+        ]
+        return tuple(
+            dict.fromkeys(
+                output.stage
+                for output in clean
+                if any(rig is not None and output.gap(rig) > output.limit for rig in ends)
+            )
+        )
 
     @cached_property
     def settings(self) -> dict[str, Effect]:

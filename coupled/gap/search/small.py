@@ -66,7 +66,8 @@ def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[C
     """Return the candidate that an output shows by its mark, though it is within its limit.
 
     Its gain is what that output says alone: there the mark is known, and has no number to fit. None
-    that needs a setting at the end of its tolerance which did not stand there before.
+    that leaves more of the output on the whole record, nor one that needs a setting at the end of
+    its tolerance which did not stand there before.
     """
     for effect in library:
         ours = [output for output in case.outputs if output.stage == effect.mark]
@@ -75,7 +76,8 @@ def shown_by_mark(case: Case, current: Fit, library: Sequence[Effect]) -> list[C
         effects = (*current.effects, effect)
         beside = (*effects, *case.nuisances(effects))
         rig = possible(case.nominal, case.control, beside, {**case.neutral, **current.values})
-        shown = [] if rig is None else [(effect, replace(current, rig=rig))]
+        worse = rig is None or any(one.gap(rig) > one.gap(current.rig) for one in ours)
+        shown = [] if worse or rig is None else [(effect, replace(current, rig=rig))]
         if shown and ranked_by_gain(ours, current, shown)[0].gain >= LEAST_GAIN:
             fitted = case.fit(effects, "fitted", current.values, effect)
             # A mark that the other outputs contradict, by settings that it drives to their ends.

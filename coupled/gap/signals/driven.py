@@ -11,6 +11,7 @@ from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.resting import Rest, rest_of
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.signals.floors import unsmoothed, with_error
+from coupled.gap.thresholds import LOUDER
 
 Floats = NDArray[np.float64]
 
@@ -26,9 +27,16 @@ class Drive:
 
     @classmethod
     def of(cls, signal: Floats, noise: Noise) -> Drive:
-        """Return a signal smoothed, and held where it rests; one without noise as it is."""
+        """Return a signal smoothed, and held where it rests; one without noise as it is.
+
+        So is one of which the smoother would take far more than its noise: that is signal, as of a
+        hand that moves in steps.
+        """
         rest = rest_of(signal, noise)
-        return cls(signal, rest.held(smoothed(signal, noise)) if noise.rms else signal, noise, rest)
+        smooth = rest.held(smoothed(signal, noise)) if noise.rms else signal
+        made = cls(signal, smooth, noise, rest)
+        taken = float(np.sqrt(np.mean((signal - smooth) ** 2)))
+        return made.unsmoothed(noise) if taken > LOUDER * noise.rms else made
 
     def unsmoothed(self, noise: Noise) -> Drive:
         """Return it as recorded: what is rough in it is no noise."""

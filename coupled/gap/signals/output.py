@@ -38,12 +38,14 @@ _KEPT = 8  # predictions remembered: threads fit different effects at once
 class Hides:
     """What a floor hides of an output: its share of what the channel does, rms over rms.
 
-    `noisiest` is the channel whose noise makes most of the floor, `channel` the output's.
+    `noisiest` is the channel whose noise makes most of the floor, `channel` the output's. `misses`
+    is not 0 where the floor is the misfit of a healthy record: by so many times the noise.
     """
 
     share: float
     noisiest: str
     channel: str
+    misses: float = 0.0
 
     @property
     def much(self) -> bool:
@@ -53,22 +55,28 @@ class Hides:
     @property
     def still(self) -> bool:
         """Whether the channel shows little but its own noise: breakout and friction held it."""
-        return self.noisiest == self.channel and self.share > NOISE_ALONE
+        return not self.misses and self.noisiest == self.channel and self.share > NOISE_ALONE
 
     @property
     def words(self) -> str:
         """What hides how much."""
         if self.still:
             return f"{self.channel} shows little but noise"
-        return f"noise of {self.noisiest} is {100 * self.share:.0f} % of what {self.channel} does"
+        share = f"{100 * self.share:.0f} %"
+        if self.misses:
+            missed = f"the rig misses the healthy record there by {self.misses:.3g} times the noise"
+            return f"{missed}, {share} of what the stage does"
+        return f"noise of {self.noisiest} is {share} of what {self.channel} does"
 
     @property
     def wanted(self) -> str:
-        """What to record instead."""
+        """What to do about it, in a sentence."""
+        if self.misses:
+            return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
         if self.still:
-            return f"a push that moves {self.channel}, or {self.noisiest} with less noise"
+            return f"Record a push that moves {self.channel}, or {self.noisiest} with less noise."
         times = math.ceil(self.share / FLOOR_SHARE)
-        return f"a motion {times} times as large, or {self.noisiest} with less noise"
+        return f"Record a motion {times} times as large, or {self.noisiest} with less noise."
 
 
 @dataclass(frozen=True)
@@ -87,6 +95,8 @@ class Output:
     floor by which it may be too low, the colour of what drives the stage being what it may be.
     `shots` predicts by short replays, each begun as measured: what went before misleads none.
     One is `in_series` that is predicted by the loader and the linkage behind it, from the force.
+    `handed_on` is the part of what was measured that the stage hands on from its input: what the
+    stage does is the rest.
     """
 
     stage: str
@@ -108,6 +118,7 @@ class Output:
     unsure: float = 0.0
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)
+    handed_on: Floats | None = field(default=None, repr=False, compare=False)
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
@@ -194,6 +205,13 @@ class Output:
         noise = 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
         return max(GUILTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
 
+    @property
+    def does(self) -> float:
+        """What the stage does in this record: the rms about the mean, in the channel's unit."""
+        return float(
+            np.std(self.measured if self.handed_on is None else self.measured - self.handed_on)
+        )
+
     def gap(self, rig: Rig) -> float:
         """Return the rms residual over the floor."""
         return float(np.sqrt(np.mean(self.residual(rig) ** 2)))
@@ -225,10 +243,13 @@ def rounding(signal: Floats, noise: float) -> float:
     return error if error < ROUNDED * noise else 0.0
 
 
-def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:
+def spread(
+    carried: Sequence[Floats], own: float, memory: float = 0.0, rate_Hz: float = 120.0
+) -> float:
     """Return the relative standard deviation of noise's rms: `carried` of some tries, and its own.
 
-    The own noise is white, or correlates by `memory` from frame to frame.
+    The own noise is white, or correlates by `memory` from frame to frame. Where a stage lets noise
+    pass in a part of the record alone, as where nothing else moves, only that part counts.
 
     The mean square of N values of Gaussian noise varies by √(2·Σρ²/N) of itself (Bartlett), its
     root by half of that. The less noise a stage and its smoother let pass, the fewer values count.
@@ -239,7 +260,11 @@ def spread(carried: Sequence[Floats], own: float, memory: float = 0.0) -> float:
     alone = own**2 * (1.0 - memory**2) / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
     total = float(np.mean(power + alone))
     square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
-    return float(np.sqrt(0.5 * square / total**2 / len(carried[0])))
+    frames = max(1, round(STRETCH_s * rate_Hz))
+    starts = np.arange(0, len(carried[0]), frames)
+    local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts)
+    crowd = float(np.mean(local) ** 2 / np.mean(local**2)) if total > 0.0 else 1.0
+    return float(np.sqrt(0.5 * square / total**2 / (crowd * len(carried[0]))))
 
 
 def memory(residual: Floats) -> float:

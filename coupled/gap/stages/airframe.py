@@ -22,18 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.flight.aircraft import make_aircraft
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.air import Air, vertical_air
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import Output, heard, spread, white
-from coupled.gap.stages.openloop import Flown, Moved, fly_open_loop
+from coupled.gap.stages.openloop import Flown, Moved, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
 from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
-from coupled.record.channels import SPEED, motion_channels
+from coupled.record.channels import motion_channels
 from coupled.record.record import Record
-from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
@@ -81,6 +79,7 @@ class Model:
     """The aircraft of one record, flown by its surfaces; remembers its last flights."""
 
     rig: Rig
+    record: Record
     moved: Sequence[Moved]
     compared: tuple[str, ...]
     air: Air | None
@@ -117,7 +116,8 @@ class Model:
             moves = stamped(moves + self.air.error if with_error else moves, -late)
             air = (*moves[1:].tolist(), 0.0)  # row k + 1 holds the air over the frame before
         controls, rate_Hz = list(self.rig.controls), self.rig.frame_rate
-        return fly_open_loop(flight, rate_Hz, controls, moved, self.compared, air)
+        given = (flight, rate_Hz, controls, moved, self.compared, air)
+        return fly_open_loop(*given, *flown_in(self.record, controls, rate_Hz))
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
@@ -153,7 +153,7 @@ def airframe_outputs(
     places = {control: (trim.position, trim.jump) for control, trim in trims.items()}
     right, wrong = moved(rig, record, places, np.random.default_rng(43))
     air = vertical_air(record, 1.0 / rig.frame_rate)
-    model = Model(rig, right, compared, air, Flights() if flights is None else flights)
+    model = Model(rig, record, right, compared, air, Flights() if flights is None else flights)
     flown = model.flown(rig)
     assert flown is not None  # as the rig is filed, it trims
     carried = model.carried(wrong, flown)
@@ -162,7 +162,7 @@ def airframe_outputs(
         noise = left_noise(heard(record[name]), record[name], record[name] - flown.motion[:, i])
         own = float(np.hypot(noise.rms, FLIGHT_KNOWN * np.ptp(record[name])))
         floor = float(np.hypot(own, np.sqrt(np.mean(carried[:, i] ** 2))))
-        loose = spread([carried[:, i]], own, noise.memory)
+        loose = spread([carried[:, i]], own, noise.memory, rig.frame_rate)
 
         def predict(other: Rig, i: int = i, name: str = name, floor: float = floor) -> Floats:
             assert other.flight is not None
@@ -197,11 +197,3 @@ def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Outpu
 
     rate_Hz = model.rig.frame_rate
     return Output("airframe", TRIM, trim.measured + noise, predict, floor, rate_Hz, number)
-
-
-def trim_speed(rig: Rig) -> float:
-    """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
-    assert rig.flight is not None
-    frame_s = 1.0 / rig.frame_rate
-    airframe = make_aircraft(rig.flight, frame_s, ["column"], [aircraft_folder()])
-    return airframe.motion()[SPEED]

@@ -18,8 +18,11 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.everyframe import PROPERTIES
 from coupled.flight.gusts import Gusts
+from coupled.flight.wrapper import Wrapper
+from coupled.gap.signals.conditions import trim_shift, wrappers_of
 from coupled.gap.thresholds import LOST_MOTION, SAME_TRIM_rad
 from coupled.record.channels import ControlName, motion_channels
+from coupled.record.record import Record
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 from coupled.schema import changed
@@ -76,6 +79,15 @@ class Flown:
     trim: tuple[float, ...]  # rad, in the order of the controls
 
 
+def flown_in(
+    record: Record, controls: Sequence[ControlName], frame_rate_Hz: float
+) -> tuple[list[Wrapper], Floats]:
+    """Return the conditions of a record's flight and how they move the trims (`fly_open_loop`)."""
+    frame_s = 1.0 / frame_rate_Hz
+    trims = np.column_stack([trim_shift(record, control, frame_s) for control in controls])
+    return wrappers_of(record, frame_s), trims
+
+
 def fly_open_loop(
     flight: Flight,
     frame_rate_Hz: float,
@@ -83,22 +95,31 @@ def fly_open_loop(
     moved: Sequence[Moved],
     channels: Sequence[str],
     air_m_per_s: Sequence[float] | None = None,
+    conditions: Sequence[Wrapper] = (),
+    trims: Floats | None = None,
 ) -> Flown:
     """Return the flight of a model from its trim, by what its surfaces did; a row a frame.
 
-    `air_m_per_s` is how fast the air rises over each frame. Raises InputError where the model does
-    not trim so.
+    `air_m_per_s` is how fast the air rises over each frame. The `conditions` act on the model as
+    they did on the aircraft; `trims` are the commands by which they move the trim, shape (frames,
+    controls), which the surfaces' positions hold, too. Raises InputError where the model does not
+    trim so.
     """
     still = changed(flight, {"gust_rms_m_per_s": 0.0}, "rig", "flight")
     frame_s = 1.0 / frame_rate_Hz
     gusts = Gusts(still, frame_s, air_m_per_s=air_m_per_s)
     with _flying:
-        airframe = make_aircraft(still, frame_s, controls, [aircraft_folder()], gusts=gusts)
+        models = [aircraft_folder()]
+        airframe = make_aircraft(
+            still, frame_s, controls, models, conditions=conditions, gusts=gusts
+        )
         start = dict(zip(motion_channels(controls, flown=True), airframe.motion(), strict=True))
         trim = tuple(start[one.channel] for one in moved)
         asked = np.zeros((len(moved[0].values) + 1, 3))
         for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
             asked[:-1, i] = one.commands(own)
+            if trims is not None and one.points is not None:
+                asked[1:-1, i] -= trims[:-1, i]  # a row is the answer to the frame before it
         asked[-1] = asked[-2]
         return Flown(_motion(airframe, asked[1:], channels), trim)
 

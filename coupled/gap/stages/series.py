@@ -24,7 +24,6 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.driven import Drive
 from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.signals.served import services
 from coupled.gap.stages.ratchet import Driven, is_walked, unratcheted, unwalked
 from coupled.record.channels import unit_of
 from coupled.rig.hosted import Hosted
@@ -39,8 +38,8 @@ SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pus
 class Series:
     """The grip's motion under a force, as measured and as a rig predicts it."""
 
-    def __init__(self, reading: Reading, force: Drive) -> None:
-        self._reading, self.force = reading, force
+    def __init__(self, reading: Reading, force: Drive, hosted: Hosted) -> None:
+        self._reading, self.force, self._hosted = reading, force, hosted
         self._gradient, self._second = reading.gradient(), reading.second()
         self._load = reading.load()
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
@@ -62,7 +61,7 @@ class Series:
                 bending = bending + times * self._trembling
             if self._leaks and (share := rig.controls[reading.control].loader.crosstalk):
                 pull = pull + share * self._leaks[0].of(rig)
-            host = Hosted(services(reading), reading.missed.under(rig, reading.control))
+            host = self._hosted._replace(missed=reading.missed.under(rig, reading.control))
             driven_by = (pull, self._gradient, bending, self._load(rig), self._second)
             read = drive_series(rig, reading.control, *driven_by, host, self._others)
             return sensed.zero + read

@@ -17,12 +17,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.noise import Noise, between_jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.driven import Drive
 from coupled.gap.signals.drives import drifts
 from coupled.gap.signals.floors import (
@@ -63,7 +65,7 @@ from coupled.gap.thresholds import (
 )
 from coupled.parallel import in_threads
 from coupled.rig.hosted import Hosted
-from coupled.rig.nodes import Nodes
+from coupled.rig.nodes import Nodes, coarsely, on_nodes
 from coupled.rig.replay import (
     drive_linkage,
     drive_loader,
@@ -71,10 +73,33 @@ from coupled.rig.replay import (
     replay_surface,
 )
 from coupled.rig.rig import Rig
+from coupled.rig.serving import held_force
 
 Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
 SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
+
+
+class DrivenBy(NamedTuple):
+    """The quantity of a control that drives a stage.
+
+    `between` is by how much the prediction may be off, rms, since the inputs are not known between
+    the frames.
+    """
+
+    quantity: str = ""
+    between: float = 0.0
+
+
+UNDRIVEN = DrivenBy()
+
+
+def hosted_by(reading: Reading) -> Hosted:
+    """Return what a record holds of services and host, and of where the cab stopped the grip."""
+    held = held_force(reading.rig, reading.record, reading.control)
+    assumed = reading.assumed()
+    more = None if assumed is None else assumed.gradient
+    return Hosted(services(reading), None, held, reach_of(reading.record, reading.control), more)
 
 
 @dataclass(frozen=True)
@@ -111,7 +136,7 @@ class Reader(Reading):
         predict: Predict,
         noisy: Callable[[Rig, int], Floats],
         own: Noise,
-        driven_by: str = "",
+        driven_by: DrivenBy = UNDRIVEN,
         judged: NDArray[np.bool_] | None = None,
         echo: Floats | None = None,
     ) -> Output:
@@ -124,16 +149,21 @@ class Reader(Reading):
         base = predict(self.rig)
         own = left_noise(own, measured, without_echo(measured - base, echo), judged)
         tries = in_threads(lambda k: noisy(self.rig, k) - base, range(NOISE_TRIES))
-        carried = float(np.sqrt(np.mean(np.square(tries))))
-        floor = math.hypot(own.rms, carried, REPLAY_KNOWN * float(np.ptp(measured)))
+        carried = _rms(np.array(tries))
+        known = REPLAY_KNOWN * float(np.ptp(measured))
+        floor = math.hypot(own.rms, carried, driven_by.between, known)
         made = self._output(stage, name, measured, predict, floor)
         if floor <= 0.0:
             return made
-        known = replace(made, spread=spread(tries, own.rms, own.memory), smoothed=carried / floor)
-        if not driven_by:
-            return known
-        noisiest = self.name_of(driven_by) if carried > own.rms else name
-        return replace(known, hides=Hides(floor / float(np.std(measured)), noisiest, name))
+        made = replace(
+            made,
+            spread=spread(tries, own.rms, own.memory, self.rig.frame_rate),
+            smoothed=carried / floor,
+        )
+        if not driven_by.quantity:
+            return made
+        noisiest = self.name_of(driven_by.quantity) if carried > own.rms else name
+        return replace(made, hides=Hides(floor / float(np.std(measured)), noisiest, name))
 
     def _output(
         self, stage: str, name: str, measured: Floats, predict: Predict, floor: float
@@ -169,16 +199,21 @@ class Reader(Reading):
     def _loader(self) -> list[Output]:
         force, gradient = self.pulled(), self.gradient()
         computed, second = self.signal("computed"), self.second()
-        load_of = self.load()
+        load_of, hosted = self.load(), hosted_by(self)
         smooth, own = smoothed(computed, sensor := self.driving("computed")), self.heard("computed")
         leaks = [Nodes(smoothed(other)) for other in self.partner()]
         every = self._restarts(round(RESTART_s * self.rig.frame_rate))
         restarted = drifts(self.rig, self.control, float(np.min(gradient)))
         own_starts = every if restarted else self._restarts()
 
-        def driven(f: Floats, seen: Floats, starts: Mask = own_starts) -> Driven:
-            """Return the answer to a force, and so many times its noise, by where windows start."""
-            nodes = Nodes(f)
+        def driven(
+            f: Floats, seen: Floats, starts: Mask = own_starts, otherwise: bool = False
+        ) -> Driven:
+            """Return the answer to a force, and so many times its noise, by where windows start.
+
+            `otherwise`: with less known of what force and services did between the frames.
+            """
+            nodes = Nodes(f, coarsely if otherwise and not rough else on_nodes)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
 
@@ -194,8 +229,9 @@ class Reader(Reading):
                     pull = pull + times * trembling.of(rig)
                 if leaks and (share := rig.controls[self.control].loader.crosstalk):
                     pull = pull + share * leaks[0].of(rig)
-                made_by = (second, restart, self._hosted(rig))
-                driven_by = (pull, gradient, misread + hum, load_of(rig), *made_by)
+                host = hosted.a_frame_late() if otherwise else hosted
+                host = host._replace(missed=self.missed.under(rig, self.control))
+                driven_by = (pull, gradient, misread + hum, load_of(rig), second, restart, host)
                 return scale * drive_loader(rig, self.control, *driven_by)[0] + hum
 
             return at
@@ -210,13 +246,16 @@ class Reader(Reading):
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
+        rough = force.noise.rms > BROAD * float(np.std(force.recorded))
         force = self._without_what_was_felt(force, computed)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
         walks = force.smooth is not force.recorded
         walks = walks and is_walked(self.rig, self.control, answer, own.rms)
-        made = (self.name_of("computed"), computed, predicted(answer), noisy, own, "force")
-        whole = self._made("loader", *made, judged=self.judged).under(force.noise)
+        made = (self.name_of("computed"), computed, predicted(answer), noisy, own)
+        between = driven(force.smooth, smooth, otherwise=True)(self.rig, 0.0)
+        driven_by = DrivenBy("force", _rms(between - answer(self.rig, 0.0)))
+        whole = self._made("loader", *made, driven_by, judged=self.judged).under(force.noise)
         if not restarted:
             shot = driven(force.smooth, smooth, every)
             shots = self._judged(lambda rig: shot(rig, 0.0), computed)
@@ -224,12 +263,6 @@ class Reader(Reading):
         if not walks:
             return [whole]
         return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
-
-    def _hosted(self, rig: Rig) -> Hosted:
-        """Return what the record holds of the host's work."""
-        assumed = self.assumed()
-        more = None if assumed is None else assumed.gradient
-        return Hosted(services(self), self.missed.under(rig, self.control), more)
 
     def _restarts(self, every: int = 0) -> Mask:
         """Return the frames at which a replay starts as measured, and those `every` so many."""
@@ -258,9 +291,11 @@ class Reader(Reading):
     def _series(self) -> list[Output]:
         """Return the grip's motion under the force, where δc is not recorded."""
         grip = self.signal("deflection")
-        series = Series(self, self._without_what_was_felt(self.pulled(), grip))
+        force = self._without_what_was_felt(self.pulled(), grip)
+        series = Series(self, force, hosted_by(self))
         own = self.heard("deflection")
-        made = (self.name_of("deflection"), grip, series.predict(own), series.noisy, own, "force")
+        driven_by = DrivenBy("force")
+        made = (self.name_of("deflection"), grip, series.predict(own), series.noisy, own, driven_by)
         found = replace(self._made("loader", *made), in_series=True)
         return [found.under(series.force.noise)]
 
@@ -268,7 +303,7 @@ class Reader(Reading):
         """Return the force that answers an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
         own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
-        made = (force, motion.predict(), motion.noisy, own, self.imposed)
+        made = (force, motion.predict(), motion.noisy, own, DrivenBy(self.imposed))
         return [self._made("loader", self.name_of("force"), *made)]
 
     def _multiplier(self) -> list[Output]:
@@ -283,8 +318,8 @@ class Reader(Reading):
         rng = np.random.default_rng(SAMPLED)
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
-        def driven(c: Floats, f: Floats) -> Predict:
-            nodes = Nodes(c)
+        def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
+            nodes = Nodes(c, coarsely if otherwise else on_nodes)
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
@@ -299,10 +334,15 @@ class Reader(Reading):
             pulled = force.with_error(k + NOISE_TRIES)
             return driven(command.with_error(k), pulled)(rig)
 
-        made = (measured, driven(command.smooth, force.smooth), noisy, self.heard("deflection"))
+        given, predict = (command.smooth, force.smooth), driven(command.smooth, force.smooth)
+        between = driven(*given, otherwise=True)(self.rig) - predict(self.rig)
+        made = (measured, predict, noisy, self.heard("deflection"))
+        driven_by = DrivenBy("computed", _rms(between))
         name = self.name_of("deflection")
-        linkage = self._made("linkage", name, *made, "computed", judged=self.judged)
-        return [replace(linkage, noises={"force": force.noise.rms})]
+        linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
+        # A bend adds to δc; of set points the whole way is the servo's.
+        handed_on = None if self.set_points else computed
+        return [replace(linkage, noises={"force": force.noise.rms}, handed_on=handed_on)]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""
@@ -320,16 +360,23 @@ class Reader(Reading):
         pressure = self.record["dynamic_pressure_Pa"]
         command = replay_surface(self.rig, self.control, estimate, pressure)
 
+        shift = trim_shift(self.record, self.control, 1.0 / self.rig.frame_rate)
+
         def position(wanted: Floats) -> Floats:
-            return np.interp(held + wanted, commands_at, positions)
+            """Return where the surface stands; a row answers to the one before it."""
+            asked = np.concatenate(([0.0], (wanted + shift)[:-1]))
+            return np.interp(held + asked, commands_at, positions)
 
         def predict(rig: Rig) -> Floats:
-            commands = replay_surface(rig, self.control, estimate, pressure)
-            # Row k is the answer to row k − 1; the first is the trim.
-            return position(np.concatenate(([0.0], commands[:-1])))
+            return position(replay_surface(rig, self.control, estimate, pressure))
 
         # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
-        left = measured - position(np.concatenate(([0.0], command[:-1])))
+        left = measured - position(command)
         own = left_noise(heard(left), measured, left)
         floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))
         return [self._output("surface", self.surface, measured, predict, floor)]
+
+
+def _rms(signal: Floats) -> float:
+    """Return the root of a signal's mean square."""
+    return float(np.sqrt(np.mean(np.square(signal))))

@@ -18,10 +18,12 @@ from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import UNALTERED
 from coupled.gap.noise.smooth import Smoother, smoothed
+from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.floors import left_noise
 from coupled.gap.signals.output import heard
 from coupled.gap.stages.openloop import Moved, Points, about
 from coupled.gap.thresholds import (
+    HALF_FELT,
     SURFACE_SHAKE,
     SURFACE_GUST_m_per_s,
     SURFACE_MOVES_rad,
@@ -71,22 +73,28 @@ def _points(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether the aircraft moves a surface as the air rises and other controls are moved."""
+    """Tell whether a surface moves as the air rises and other controls are moved.
+
+    Or goes on under its own control after a frame, as with a tab or an actuator of the model's own.
+    """
     at = motion_channels(controls, flown=True).index(surface_channel(control))
-    still, moved = airframe.motion()[at], 0.0
+    own, frames = controls.index(control), round(SURFACE_SHAKE_s * rate_Hz)
+
+    def goes(moved: int) -> list[float]:
+        """Return where the surface stands, frame by frame, as a control is held off neutral."""
+        places = []
+        for _ in range(frames):
+            first, second, third = (SURFACE_SHAKE * (i == moved) for i in range(3))
+            airframe.step((first, second, third))
+            places.append(airframe.motion()[at])
+        return places
+
+    still = airframe.motion()[at]
     airframe.set_gust(SURFACE_GUST_m_per_s)
-    for i, other in enumerate(controls):
-        for _ in range(round(SURFACE_SHAKE_s * rate_Hz)):
-            shaken = 0.0 if other == control else SURFACE_SHAKE
-            airframe.step(
-                (
-                    shaken * (i == 0),
-                    shaken * (i == 1),
-                    shaken * (i == 2),
-                )
-            )
-            moved = max(moved, abs(airframe.motion()[at] - still))
-    return moved > SURFACE_MOVES_rad
+    left_alone = goes(-1) + [place for i in range(len(controls)) if i != own for place in goes(i)]
+    led = goes(own)
+    moved = [*(place - still for place in left_alone), *(place - led[0] for place in led)]
+    return max(map(abs, moved)) > SURFACE_MOVES_rad
 
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
@@ -140,9 +148,15 @@ def moved(
             found, wrong = [*found, one], [*wrong, one]
             continue
         step = np.where(np.arange(len(position)) > 0, jump, 0.0)
-        smooth = smoothed(position - step) + step
-        level = left_noise(heard(position), position, position - _led(rig, record, control, trim))
-        error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
+        left = position - _led(rig, record, control, trim)
+        level = left_noise(heard(position), position, left)
+        if float(np.std(left)) < HALF_FELT * heard(position).rms:
+            # What is rough in it was commanded: it is the surface's motion, and no noise.
+            smooth, error = position, level.sample(len(position), rng)
+            error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))
+        else:
+            smooth = smoothed(position - step) + step
+            error = Smoother.of(position - step).wiener_error(level, len(smooth), rng)
         found.append(Moved(name, smooth, points, trim, filed))
         wrong.append(Moved(name, smooth + error, points, trim, filed))
     return found, wrong
@@ -153,7 +167,9 @@ def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
     points = surface_points(rig, control)
     assert points is not None
     held = about(trim, filed_trim(rig, control), points)
-    return np.interp(held + _asked(rig, record, control), *points)
+    shift = trim_shift(record, control, 1.0 / rig.frame_rate)
+    shift = np.concatenate(([0.0], shift[:-1]))
+    return np.interp(held + _asked(rig, record, control) + shift, *points)
 
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:

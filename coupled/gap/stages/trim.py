@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.gap.noise.smooth import smoothed
+from coupled.gap.signals.conditions import trim_shift
 from coupled.gap.signals.output import heard, memory, white
-from coupled.gap.stages.openloop import about, fly_open_loop
+from coupled.gap.stages.openloop import about, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import filed_trim, moved, own_trim, surface_channel, surface_points
 from coupled.gap.thresholds import (
     TRIM_ANSWERED,
@@ -91,6 +92,7 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     served = service_rows(record, control)
     wanted = record[name] if served is None else served.asked
     asked = replay_surface(rig, control, wanted[:rows], record[pressure][:rows])
+    asked = asked + trim_shift(record, control, 1.0 / rig.frame_rate)[:rows]
     measured = record[surface_channel(control)]
     held = about(own_trim(rig, control), filed_trim(rig, control), points)
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
@@ -137,14 +139,15 @@ def _followed(
     None where the record does not hold the motion.
     """
     rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
-    short = Record(record.channels, record.data[:rows])
+    short = Record(record.channels, record.data[:rows], record.manifest)
     names = [name for name in WEIGHED if name in record]
     if not names or rig.flight is None:
         return None
     lefts = []
     for trim, jump in ((own, there - own), (there, 0.0)):
         surfaces, _ = moved(rig, short, {control: (trim, jump)}, np.random.default_rng(43))
-        flown = fly_open_loop(rig.flight, rig.frame_rate, list(rig.controls), surfaces, names)
+        given = (rig.flight, rig.frame_rate, list(rig.controls), surfaces, names, None)
+        flown = fly_open_loop(*given, *flown_in(short, list(rig.controls), rig.frame_rate))
         left = np.column_stack([short[n] - flown.motion[:, i] for i, n in enumerate(names)])
         linear = _lagged(smoothed(short[surface_channel(control)]), rig.frame_rate)
         left -= linear @ np.linalg.lstsq(linear, left, rcond=None)[0]

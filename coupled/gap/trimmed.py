@@ -1,0 +1,153 @@
+"""The rig and the trim of a record: from the manifest beside it, else from its first rows.
+
+A rig file describes a machine; its aircraft may be trimmed at any speed, altitude and flight path,
+and with any flaps. Those are conditions of the flight and no fault: they are taken from the record.
+What else the rig of a manifest differs in (a mass, a moment, a bend) stays as the rig file has it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from coupled.errors import InputError
+from coupled.flight.aircraft import make_aircraft
+from coupled.gap.checks import SPEED, start_of
+from coupled.gap.thresholds import OTHER_SPEED, OTHER_PATH_rad
+from coupled.record.channels import motion_channels
+from coupled.record.record import Record
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+from coupled.rig.rig import Rig
+from coupled.rig.rigfile import rig_from_table
+from coupled.schema import changed, file_keys
+
+# The keys of a rig's `flight` that say how a flight starts, and not what the aircraft is.
+TRIM_KEYS = (
+    "altitude_m",
+    "calibrated_airspeed_m_per_s",
+    "flight_path_rad",
+    "trim",
+    "landing",
+    "properties",
+)
+_FIELDS = file_keys(Flight, "m")
+
+
+def rig_of_manifests(records: Mapping[str, Record]) -> Rig:
+    """Return the rig that the manifests beside some records hold, that of the first.
+
+    Raises InputError where a record has no manifest with a rig, or one with other controls.
+    """
+    found: Rig | None = None
+    for file, record in records.items():
+        table = record.manifest.get("rig")
+        if not isinstance(table, Mapping):
+            problem = "is missing, and no manifest beside the record holds a rig: give the rig file"
+            raise InputError(file, "--rig", problem)
+        rig = rig_from_table(table, f"{file} (its manifest)")
+        found = rig if found is None else found
+        if (rig.controls, rig.structure) != (found.controls, found.structure):
+            first = next(iter(records))
+            problem = f"its manifest holds another rig than that of {first}: give the rig file"
+            raise InputError(file, "--rig", problem)
+    assert found is not None
+    return found
+
+
+def trimmed(rig: Rig, records: Mapping[str, Record]) -> tuple[Rig, str]:
+    """Return a rig whose aircraft is trimmed as the records begin, and what was taken, in words.
+
+    The words are empty where the rig file's own trim is theirs, or where there is no aircraft.
+    Raises InputError where a manifest holds another aircraft, the records differ in their trim, or
+    the aircraft cannot be trimmed so.
+    """
+    if rig.flight is None:
+        return rig, ""
+    each = {file: _manifest_trim(rig.flight, record, file) for file, record in records.items()}
+    first, taken = next(iter(each.items()))
+    for file, other in each.items():
+        if other != taken:
+            problem = f"was flown from another trim than {first}: diagnose the two one by one"
+            raise InputError(file, "flight", problem)
+    source = f"the manifest of {first}"
+    if taken is None:
+        taken, source = _measured_trim(rig, records[first], first), f"the first rows of {first}"
+    new = {key: value for key, value in taken.items() if not _same(rig.flight, key, value)}
+    if not new:
+        return rig, ""
+    was = ", ".join(_change(rig.flight, key, value) for key, value in new.items())
+    return rig.changed({f"flight.{key}": value for key, value in new.items()}), (
+        f"Trim taken from {source}, not from the rig file: {was}."
+    )
+
+
+def _same(flight: Flight, key: str, value: Any) -> bool:
+    """Tell whether a rig file has a key as it was flown, to what an instrument would show."""
+    filed = getattr(flight, _FIELDS[key])
+    if isinstance(value, float) and isinstance(filed, float):
+        return math.isclose(value, filed, rel_tol=1e-6, abs_tol=1e-9)
+    return bool(value == filed)
+
+
+def _change(flight: Flight, key: str, value: Any) -> str:
+    """Return what a key was and is, in words."""
+    if key == "properties":
+        return "properties of the model"
+    before = getattr(flight, _FIELDS[key])
+    if isinstance(value, float):
+        return f"{key} {before:.4g} → {value:.4g}"
+    return f"{key} {before} → {value}"
+
+
+def _manifest_trim(flight: Flight, record: Record, file: str) -> dict[str, Any] | None:
+    """Return the trim that a record's manifest holds by the keys of a rig file; None without."""
+    table = record.manifest.get("rig")
+    given = table.get("flight") if isinstance(table, Mapping) else None
+    if not isinstance(given, Mapping):
+        return None
+    if given.get("model") != flight.model:
+        problem = f"is {given.get('model')!r} in the manifest, {flight.model!r} in the rig file"
+        raise InputError(file, "flight.model", f"{problem}: another rig's file?")
+    return {key: given[key] for key in TRIM_KEYS if key in given}
+
+
+def _measured_trim(rig: Rig, record: Record, file: str) -> dict[str, Any]:
+    """Return the trim with which a record begins; empty where it is the rig's own, or not known."""
+    assert rig.flight is not None
+    if SPEED not in record:
+        return {}
+    flight, found = rig.flight, dict[str, Any]()
+    wanted = start_of(record, SPEED)
+    if abs(wanted / trim_speed(rig) - 1.0) <= OTHER_SPEED:
+        return {}
+    if "altitude_m" in record:
+        found["altitude_m"] = start_of(record, "altitude_m")
+    if "pitch_rad" in record and "alpha_rad" in record:
+        path = start_of(record, "pitch_rad") - start_of(record, "alpha_rad")
+        if abs(path - flight.flight_path) > OTHER_PATH_rad:
+            found["flight_path_rad"] = path
+    speed = flight.calibrated_airspeed
+    try:
+        for _ in range(3):  # the two speeds are nearly in proportion
+            found["calibrated_airspeed_m_per_s"] = speed
+            there = rig.changed({f"flight.{key}": value for key, value in found.items()})
+            speed *= wanted / trim_speed(there)
+        found["calibrated_airspeed_m_per_s"] = speed
+        trim_speed(rig.changed({f"flight.{key}": value for key, value in found.items()}))
+    except InputError:
+        problem = (
+            f"starts at {wanted:.4g}, where the rig's {flight.model} does not trim;"
+            f" the rig file has it at {trim_speed(rig):.4g}: another rig's file?"
+        )
+        raise InputError(file, SPEED, problem) from None
+    return found
+
+
+def trim_speed(rig: Rig) -> float:
+    """Return the true airspeed at which the rig's aircraft is trimmed, m/s."""
+    assert rig.flight is not None
+    still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
+    airframe = make_aircraft(still, 1.0 / rig.frame_rate, ["column"], [aircraft_folder()])
+    return airframe.motion()[motion_channels(["column"], flown=True).index(SPEED)]

@@ -1,0 +1,119 @@
+"""A record is held against its rig in its own trim, and by the rig of its manifest."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import coupled as api
+from coupled.errors import InputError
+from coupled.flight.runfile import read_run
+from coupled.record.record import Record, manifest_path, write_record
+from coupled.rig.rig import Rig
+from tests.support.commands import coupled
+
+CAS = "flight.calibrated_airspeed_m_per_s"
+WORN = {"controls.column.loader.bend_m_per_N": 6e-4, "noise.column_deflection_m": 2e-5}
+
+
+@pytest.fixture(scope="module")
+def slow_737() -> Record:
+    """Return the first case of `pull-up-737`, whose rig file is trimmed at another speed."""
+    return api.fly(read_run("pull-up-737")[0]).record
+
+
+@pytest.fixture(scope="module")
+def filed() -> Rig:
+    """Return the 737 as its rig file has it."""
+    return api.load_rig("737")
+
+
+def bare(record: Record) -> Record:
+    """Return a record without a manifest, as of a log that was imported."""
+    return Record(record.channels, record.data)
+
+
+def test_the_trim_is_taken_from_the_manifest_and_said(slow_737: Record, filed: Rig) -> None:
+    found = api.diagnose(filed, slow_737)
+    assert found.verdict == "no_gap"
+    assert found.nominal.flight is not None
+    assert found.nominal.flight.calibrated_airspeed == pytest.approx(102.9)
+    assert found.summary.startswith(
+        "Trim taken from the manifest of record, not from the rig file:"
+    )
+    assert f"{CAS.partition('.')[2]} 130 → 102.9" in found.summary
+    assert found.as_dict()["trim"] == found.trim
+
+
+def test_the_trim_is_taken_from_the_first_rows_without_a_manifest(
+    slow_737: Record, filed: Rig
+) -> None:
+    found = api.diagnose(filed, bare(slow_737))
+    assert found.verdict == "no_gap"
+    assert found.trim.startswith("Trim taken from the first rows of record,")
+    assert found.nominal.flight is not None
+    assert found.nominal.flight.calibrated_airspeed == pytest.approx(102.9, rel=1e-3)
+
+
+def test_a_trim_that_is_the_rig_files_own_is_not_talked_of(filed: Rig) -> None:
+    sweep = api.FrequencySweep(force_N=120, duration_s=5)
+    own = api.fly(filed, column=sweep, duration_s=6).record
+    assert api.diagnose(filed, bare(own)).trim == api.diagnose(filed, own).trim == ""
+
+
+def test_a_fault_in_the_manifests_rig_is_found_against_the_rig_file(slow_737: Record) -> None:
+    """The manifest's trim is taken, and nothing else of its rig."""
+    worn = replace(
+        case := read_run("pull-up-737")[0],
+        rig=case.rig.changed(WORN),
+    )
+    found = api.diagnose("737", api.fly(worn).record)
+    assert [effect.name for effect in found.effects] == ["bend"]
+    assert found.effects[0].value == pytest.approx(6e-4, rel=0.03)
+
+
+def test_without_a_rig_the_manifests_is_taken(slow_737: Record) -> None:
+    found = api.diagnose(None, slow_737)
+    assert (found.verdict, found.trim) == ("no_gap", "")
+    with pytest.raises(InputError, match="no manifest beside the record holds a rig"):
+        api.diagnose(None, bare(slow_737))
+    other = Record(slow_737.channels, slow_737.data, json.loads(json.dumps(slow_737.manifest)))
+    other.manifest["rig"]["controls"]["column"]["loader"]["mass_kg"] = 9.0
+    with pytest.raises(InputError, match="b: --rig: its manifest holds another rig than that of a"):
+        api.diagnose(None, {"a": slow_737, "b": other})
+
+
+def test_another_aircraft_and_another_trim_are_refused(slow_737: Record, filed: Rig) -> None:
+    with pytest.raises(InputError, match="'737' in the manifest, 'T37' in the rig file"):
+        api.diagnose("t37", slow_737)
+    fast = api.fly(read_run("pull-up-737")[1]).record
+    with pytest.raises(InputError, match="b: flight: was flown from another trim than a"):
+        api.diagnose(filed, {"a": slow_737, "b": fast})
+    with pytest.raises(InputError, match="b: true_airspeed_m_per_s: starts at"):
+        api.diagnose(filed, {"a": bare(slow_737), "b": bare(fast)})
+
+
+def test_the_help_pages_example_runs_on_the_guides_record(tmp_path: Path, slow_737: Record) -> None:
+    write_record(slow_737, tmp_path / "737.csv")
+    for words in (("737.csv", "--rig", "737"), ("737.csv",)):
+        done = coupled(tmp_path, "diagnose", *words)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "No gap in the column" in " ".join(done.stdout.split())
+    assert "rig: 737, of the manifest of 737.csv" in done.stdout
+    manifest_path(tmp_path / "737.csv").unlink()
+    refused = coupled(tmp_path, "diagnose", "737.csv")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: 737.csv: --rig: is missing")
+
+
+def test_an_improved_rig_keeps_the_rig_files_trim(tmp_path: Path) -> None:
+    case = read_run("pull-up-737")[0]
+    write_record(api.fly(replace(case, rig=case.rig.changed(WORN))).record, tmp_path / "w.csv")
+    done = coupled(tmp_path, "diagnose", "w.csv", "--rig", "737", "--improve", "new.toml")
+    assert done.returncode == 0, done.stderr
+    improved = api.load_rig(tmp_path / "new.toml")
+    assert improved.flight == api.load_rig("737").flight
+    assert improved.controls["column"].loader.bend == pytest.approx(6e-4, rel=0.03)
