@@ -3,8 +3,12 @@
 One manoeuvre is flown in several configurations; an `Outcome` holds the figures of one
 flight. Loss and feel are read while the control stands still, held at half or more of its
 greatest deflection, beside the closed form of the rig's statics there (which leaves friction
-out). The force is the hand's own, whatever the strain gauge says of it; breakout and bob weight
-are taken off before it is compared.
+out). Deflection and force are the hand's own, whatever its sensors read; breakout and bob weight
+are taken off before forces are compared.
+
+Authority is what the surface does: a command beyond the surface's stop gives nothing, and to fall
+short of it there loses nothing. A hand that stays within breakout and friction moves no loader, and
+has neither a loss nor a felt ratio.
 """
 
 from __future__ import annotations
@@ -21,6 +25,8 @@ from coupled.authority.held import (
     asked_and_reached,
     by_the_statics,
     felt_and_specified,
+    loader_rests,
+    true_deflection,
     where_held,
 )
 from coupled.errors import InputError, listed, nearest
@@ -45,8 +51,10 @@ class Outcome:
     case: str
     configuration: str
     control: str
-    asked_norm: float  # surface command that the held deflection asks for, of ±1
-    reached_norm: float  # surface command reached
+    asked_norm: (
+        float  # command that the held deflection asks for, as far as the surface goes, of ±1
+    )
+    reached_norm: float  # surface command reached, as far as the surface goes
     hand_travel_norm: float  # the hand's deflection, a pull positive, of the control's travel
     loss: float  # share of the asked command that is lost
     loss_closed_form: float  # the same by the rig's statics
@@ -58,6 +66,8 @@ class Outcome:
     peak_load_factor: float | None
     time_to_attitude_s: float | None  # from the pilot's start
     ended_early: str  # why, or empty
+    surface_stop_norm: float | None = None  # command at its stop, where more is asked for
+    loader_rests: bool = False  # the hand stays within breakout and friction
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON takes them (no NaN)."""
@@ -179,7 +189,7 @@ def fly_and_judge(
 
     `progress` is called with frames done and frames in all.
     """
-    record = fly(manoeuvre, progress)
+    record = fly(manoeuvre, progress, stops=True)
     return Flight(manoeuvre, configuration, record, judge(manoeuvre, configuration, record))
 
 
@@ -190,32 +200,38 @@ def judge(
     control, rig = manoeuvre.control, manoeuvre.rig
     why = "" if record.ended_early is None else str(record.ended_early)
     nan = float("nan")
-    if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
-        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
-    deflection = record[channel(control, "deflection")]
+    deflection = true_deflection(rig, control, record)
     force = record[channel(control, "hand_force")]
-    held = where_held(record.time_s, deflection)
-    side = float(np.sign(np.mean(deflection[held])))
-    asked, reached = asked_and_reached(rig, control, record, held)
-    felt, specified = felt_and_specified(rig, control, record, held)
-    # The statics are those of a loader without services.
-    known = closed_forms and not manoeuvre.served
-    loss, ratio = by_the_statics(rig, control, record, held) if known else (nan, nan)
+    if len(record) < 2 or not (np.any(deflection) or np.any(force)):
+        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
+    rests = not manoeuvre.served and loader_rests(rig, control, record)
+    moved = deflection if np.any(deflection) else force
+    held = where_held(record.time_s, moved)
+    side = float(np.sign(np.mean(moved[held])))
+    stop, shares = None, (nan,) * 6
+    if not rests:
+        commands = asked_and_reached(rig, control, record, held)
+        felt, specified = felt_and_specified(rig, control, record, held)
+        stop = commands.stop
+        # The statics are those of a loader without services.
+        known = closed_forms and not manoeuvre.served
+        loss, ratio = by_the_statics(rig, control, record, held, stop) if known else (nan, nan)
+        asked, reached = commands.asked, commands.reached
+        ratios = (felt / specified, ratio) if specified else (nan, nan)
+        shares = (asked, reached, 1.0 - reached / asked, loss, *ratios)
     return Outcome(
         manoeuvre.label,
         configuration,
         control,
-        asked,
-        reached,
+        *shares[:2],
         float(np.mean(deflection[held])) / rig.controls[control].travel,
-        1.0 - reached / asked,
-        loss,
-        felt / specified if specified else nan,
-        ratio if specified else nan,
+        *shares[2:],
         float(np.max(np.abs(force))),
         float(np.max(np.abs(record[channel(control, "force_step")]))),
         *_motion_figures(manoeuvre, control, record, side),
         why,
+        stop,
+        rests,
     )
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from coupled.display import System, shown
-from coupled.record.channels import unit_of
+from coupled.errors import listed
+from coupled.record.channels import SURFACES, unit_of
 from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
@@ -86,28 +88,139 @@ def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
     return (travel / INCH_m, "in") if system == "us" else (1000.0 * travel, "mm")
 
 
+def corrects_nothing(flight: Flight) -> bool:
+    """Tell whether a flight's configuration corrects a bend by a K̂ of 0, and so not at all."""
+    data = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
+    host = data.compensation
+    bends = data.loader.bend > 0.0 or (data.loader.bend_push or 0.0) > 0.0
+    return bends and host.bend == 0.0 and (host.deflection or host.gradient)
+
+
+def named(flight: Flight) -> str:
+    """Return a flight's configuration as tables and figures head it."""
+    return f"{flight.configuration} (K̂ = 0)" if corrects_nothing(flight) else flight.configuration
+
+
+def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
+    """Return what a comparison's figures alone do not show, a sentence each; flights of all cases.
+
+    A K̂ of 0, hands that move no loader, surfaces at their stops, and why a force that moves the
+    surface as on the rigid rig loses authority.
+    """
+    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+    said = [_without_correction(flights)]
+    for case in cases:
+        said += [_resting(case, system), _saturated(case)]
+    said += [next(filter(None, (further(case, system) for case in cases)), "")]
+    return list(dict.fromkeys(filter(None, said)))
+
+
+def _which(case: Sequence[Flight], some: Sequence[Flight]) -> str:
+    """Return the case and the configurations that a sentence is about, where not all are."""
+    manoeuvre = case[0].manoeuvre
+    names = [f"case {manoeuvre.label}"] if manoeuvre.label != manoeuvre.name else []
+    if len(some) < len(case):
+        names.append(listed([flight.configuration for flight in some]))
+    return f"In {', '.join(names)}: " if names else ""
+
+
+def _without_correction(flights: Sequence[Flight]) -> str:
+    some = [flight for flight in flights if corrects_nothing(flight)]
+    if not some:
+        return ""
+    manoeuvre = some[0].manoeuvre
+    control, d = manoeuvre.control, unit_of(manoeuvre.control)
+    bend = manoeuvre.rig.controls[control].loader.bend
+    names = listed(list(dict.fromkeys(flight.configuration for flight in some)))
+    return (
+        f"In {names} nothing is corrected, since the host's K̂ is 0 while the structure's K is"
+        f" {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
+        " `coupled calibrate` finds."
+    )
+
+
+def _resting(case: Sequence[Flight], system: System) -> str:
+    """Return that hands stay within breakout and friction, where any do."""
+    some = [flight for flight in case if flight.outcome.loader_rests]
+    if not some:
+        return ""
+    manoeuvre = some[0].manoeuvre
+    loader = manoeuvre.rig.controls[manoeuvre.control].loader
+    friction = max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
+    unit = shown("force_N", system)
+    force, breakout, rubs = (
+        f"{unit.factor * each:.3g}"
+        for each in (max(f.outcome.force_N for f in some), loader.breakout, friction)
+    )
+    return (
+        f"{_which(case, some)}the force on the {manoeuvre.control}, {force} {unit.unit}, stays"
+        f" within breakout ({breakout} {unit.unit}) and friction ({rubs} {unit.unit}): the loader"
+        " does not move, so there is no share lost or felt."
+    )
+
+
+def _saturated(case: Sequence[Flight]) -> str:
+    """Return where the surface met its stop, where the hand asks for more than it gives."""
+    some = [flight for flight in case if flight.outcome.surface_stop_norm is not None]
+    if not some:
+        return ""
+    manoeuvre = some[0].manoeuvre
+    surface = SURFACES[manoeuvre.control]
+    at = 100.0 * abs(some[0].outcome.surface_stop_norm or 0.0)
+    stops = some[0].record.manifest["surface_stops"][surface]
+    side = "positive" if (some[0].outcome.surface_stop_norm or 0.0) > 0.0 else "negative"
+    place = stops[side]["position_rad"] / DEGREE_rad
+    return (
+        f"{_which(case, some)}the {surface} is at its stop ({place:.1f}°) from {at:.1f} % of the"
+        f" {manoeuvre.control}'s travel on, counted from this trim. The hand asks for more, which no"
+        " surface gives, and which is not counted as lost."
+    )
+
+
 def further(case: Sequence[Flight], system: System = "si") -> str:
     """Return why authority is lost where a force moves the surface as on the rigid rig.
 
     Nothing where the hand does not hold a force, or moves no further for it.
     """
     manoeuvre = case[0].manoeuvre
-    pilot = manoeuvre.pilots.get(manoeuvre.control)
-    flown = {flight.configuration: flight.outcome for flight in case}
-    rigid, bent = flown.get("rigid"), flown.get("uncompensated")
-    if pilot is None or pilot.kind not in _FORCES or rigid is None or bent is None:
+    rigid = next((f.outcome for f in case if f.configuration == "rigid"), None)
+    if not holds_force(manoeuvre) or rigid is None:
         return ""
-    further = abs(bent.hand_travel_norm) - abs(rigid.hand_travel_norm)
-    if not further > _NOTICED:
+    moved = [
+        flight.outcome
+        for flight in case
+        if abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
+        and math.isfinite(flight.outcome.loss)
+        and flight.outcome.loss > _NOTICED
+    ]
+    if not moved:
         return ""
+    bent = moved[0]
     size, unit = _travel(manoeuvre, system)
     digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
     places = [f"{size * abs(each.hand_travel_norm):.{digits}f} {unit}" for each in (bent, rigid)]
-    alike = abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)
+    others = [
+        f"{each.configuration} {size * abs(each.hand_travel_norm):.{digits}f} {unit}"
+        f" and {100 * each.loss:.0f} %"
+        for each in moved[1:]
+    ]
+    alike = goes_as_far(bent, rigid)
     surface = "the surface goes about as far, while" if alike else "and"
+    more = f" Likewise {listed(others)}." if others else ""
     return (
-        f"The pilot holds a force: uncompensated, the hand moves {places[0]} for it instead of"
-        f" {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of what"
-        " the hand asks for is lost."
+        f"The pilot holds a force: {bent.configuration}, the hand moves {places[0]} for it instead"
+        f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
+        f" what the hand asks for is lost.{more}"
     )
+
+
+def holds_force(manoeuvre: Manoeuvre) -> bool:
+    """Tell whether the pilot of the control that is looked at holds a force, not a deflection."""
+    pilot = manoeuvre.pilots.get(manoeuvre.control)
+    return pilot is not None and pilot.kind in _FORCES
+
+
+def goes_as_far(bent: Outcome, rigid: Outcome) -> bool:
+    """Tell whether a surface goes about as far as on the rigid rig."""
+    return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

@@ -194,8 +194,12 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
     bends more, so a hand that takes this slope implicitly does not overshoot. What has mass does
     not bend at once.
     """
-    if p.modal:
-        return 0.0
+    return 0.0 if p.modal else static_slope(p, force)
+
+
+@stage
+def static_slope(p: LinkageParameters, force: float) -> float:
+    """Return the slope of `bend` by the force, d/N, of a structure that has come to rest."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
@@ -203,11 +207,36 @@ def bend_slope(p: LinkageParameters, force: float) -> float:
 
 
 @stage
+def pressed(p: LinkageParameters, force: float) -> float:
+    """Return how far a force in N moves the grip ahead of the servo in a soft play at rest, d.
+
+    Half of the play, and what its contact yields: sgn(F)·play/2 + F/k; 0 for a rigid contact,
+    behind which the servo takes the grip along.
+    """
+    if p.contact == 0.0 or force == 0.0:
+        return 0.0
+    return math.copysign(0.5 * p.play, force) + force / p.contact
+
+
+@stage
+def loaded(p: LinkageParameters, force: float) -> float:
+    """Return how far the grip is ahead of the servo under a force that rose slowly, d.
+
+    The bend on the loading branch of its hysteresis, and a soft play.
+    """
+    bent = bend(p, force)
+    if p.share > 0.0:
+        carried = math.copysign(max(abs(force) - 0.5 * p.width, 0.0), force)
+        bent += p.share * (bend(p, carried) - bent)
+    return bent + pressed(p, force)
+
+
+@stage
 def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
     """Begin at rest under the force at the first node, N."""
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
-    s.asked = s.bent = _still(p, s, force)
+    s.asked = s.bent = still(p, s, force)
 
 
 @stage
@@ -219,7 +248,7 @@ def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None
     s.carried = min(max(s.carried, force - half), force + half)
     if p.modal:
         a, b, y, v = p.mode_position, p.mode_speed, s.bent, s.bent_rate
-        before, s.asked = s.asked, _still(p, s, force)
+        before, s.asked = s.asked, still(p, s, force)
         s.bent = a[0] * y + a[1] * v + a[2] * before + a[3] * s.asked
         s.bent_rate = b[0] * y + b[1] * v + b[2] * before + b[3] * s.asked
         if abs(s.bent) < TINY and abs(s.bent_rate) < TINY:
@@ -240,7 +269,7 @@ def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> Non
 
 
 @stage
-def _still(p: LinkageParameters, s: LinkageState, force: float) -> float:
+def still(p: LinkageParameters, s: LinkageState, force: float) -> float:
     """Return the bend under a force in N as it would stay, d."""
     bent = bend(p, force)
     if p.share > 0.0:
@@ -253,7 +282,7 @@ def _still(p: LinkageParameters, s: LinkageState, force: float) -> float:
 @stage
 def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
     """Return the true deflection δ at the grip in d under a force in N."""
-    return s.grip + (s.bent if p.modal else _still(p, s, force)) + s.others
+    return s.grip + (s.bent if p.modal else still(p, s, force)) + s.others
 
 
 @stage

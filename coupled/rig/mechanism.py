@@ -18,7 +18,7 @@ from coupled.rig.inertia import lead_force
 from coupled.rig.linkage import carry, move_linkage
 from coupled.rig.loader import move_loader, set_external
 from coupled.rig.modification import exchange_last
-from coupled.rig.reach import bounds, seated, set_reach, stop_linkage, within_reach
+from coupled.rig.reach import bounds, seated, set_reach, stop_grip, stop_linkage, within_reach
 from coupled.rig.sensing import sample
 from coupled.rig.services import serve, set_base
 
@@ -118,6 +118,8 @@ def run_node(
         set_hand(p, s, force[node], held[node], rate)
     if p.linkage.carries:
         carry(p.linkage, s.linkage, s.hand.force, h)
+        if stopped:
+            stop_grip(p.reach, p.linkage, s.linkage, s.hand.force)
     if p.sensing.skewed:
         sample_channels(p, s, first_node + p.clock.substeps - node, False)
 
