@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.authority.figures import remarks
 from coupled.authority.held import (
     asked_and_reached,
     by_the_statics,
@@ -29,6 +30,7 @@ from coupled.authority.held import (
     true_deflection,
     where_held,
 )
+from coupled.display import System
 from coupled.errors import InputError, listed, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
@@ -51,9 +53,7 @@ class Outcome:
     case: str
     configuration: str
     control: str
-    asked_norm: (
-        float  # command that the held deflection asks for, as far as the surface goes, of ±1
-    )
+    asked_norm: float  # command that the deflection asks for, of ±1, as far as the surface goes
     reached_norm: float  # surface command reached, as far as the surface goes
     hand_travel_norm: float  # the hand's deflection, a pull positive, of the control's travel
     loss: float  # share of the asked command that is lost
@@ -118,7 +118,16 @@ class Comparison(Sequence[Flight]):
         return len(self.flights)
 
     def __repr__(self) -> str:
-        return "\n".join(["Comparison:", *(f"  {flight!r}" for flight in self.flights)])
+        lines = [*(f"  {flight!r}" for flight in self.flights), *self.remarks()]
+        return "\n".join(["Comparison:", *lines])
+
+    def remarks(self, system: System = "si") -> list[str]:
+        """Return what the figures alone do not show, a sentence each, in units of a system.
+
+        Surfaces at their stops, hands that stay within breakout and friction, a K̂ of 0, and why a
+        force that moves the surface as on the rigid rig loses authority.
+        """
+        return remarks(self.flights, system) if self.flights else []
 
     def flight(self, configuration: str, case: str | None = None) -> Flight:
         """Return the flight in a configuration; `case` is needed where there are several.

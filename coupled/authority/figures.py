@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from coupled.authority.held import dry_friction
 from coupled.display import System, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
@@ -15,11 +16,12 @@ from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight, Outcome
-    from coupled.flight.manoeuvre import Manoeuvre
+    from coupled.flight.manoeuvre import Configuration, Manoeuvre
 
 NONE = "–"  # in place of a figure that a flight does not have
 _NOTICED = 0.005  # of the hand's travel: what it moves further is said
 _ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+_LISTED = 3  # cases that a sentence names
 _FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
 
@@ -90,7 +92,11 @@ def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
 
 def corrects_nothing(flight: Flight) -> bool:
     """Tell whether a flight's configuration corrects a bend by a K̂ of 0, and so not at all."""
-    data = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
+    return _corrects_nothing(flight.manoeuvre)
+
+
+def _corrects_nothing(manoeuvre: Manoeuvre) -> bool:
+    data = manoeuvre.rig.controls[manoeuvre.control]
     host = data.compensation
     bends = data.loader.bend > 0.0 or (data.loader.bend_push or 0.0) > 0.0
     return bends and host.bend == 0.0 and (host.deflection or host.gradient)
@@ -108,73 +114,87 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     surface as on the rigid rig loses authority.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
-    said = [_without_correction(flights)]
-    for case in cases:
-        said += [_resting(case, system), _saturated(case)]
-    said += [next(filter(None, (further(case, system) for case in cases)), "")]
-    return list(dict.fromkeys(filter(None, said)))
+    held = next(filter(None, (further(case, system) for case in cases)), "")
+    said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
+    return list(filter(None, said))
 
 
-def _which(case: Sequence[Flight], some: Sequence[Flight]) -> str:
-    """Return the case and the configurations that a sentence is about, where not all are."""
-    manoeuvre = case[0].manoeuvre
-    names = [f"case {manoeuvre.label}"] if manoeuvre.label != manoeuvre.name else []
+def _where(
+    cases: Sequence[Sequence[Flight]], case: Sequence[Flight], some: Sequence[Flight]
+) -> str:
+    """Return in which case and configurations something is so, where not in all of them."""
+    names = [case[0].outcome.case] if len(cases) > 1 else []
     if len(some) < len(case):
-        names.append(listed([flight.configuration for flight in some]))
-    return f"In {', '.join(names)}: " if names else ""
+        names += [flight.configuration for flight in some]
+    return f" ({listed(names)})" if names else ""
+
+
+def _some(places: Sequence[str]) -> str:
+    """Return places in a row, those of a long run cut short."""
+    more = len(places) - _LISTED
+    return "; ".join(places[:_LISTED]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _without_correction(flights: Sequence[Flight]) -> str:
     some = [flight for flight in flights if corrects_nothing(flight)]
     if not some:
         return ""
-    manoeuvre = some[0].manoeuvre
+    names = list(dict.fromkeys(flight.configuration for flight in some))
+    return _says_no_correction(some[0].manoeuvre, names)
+
+
+def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
     control, d = manoeuvre.control, unit_of(manoeuvre.control)
     bend = manoeuvre.rig.controls[control].loader.bend
-    names = listed(list(dict.fromkeys(flight.configuration for flight in some)))
     return (
-        f"In {names} nothing is corrected, since the host's K̂ is 0 while the structure's K is"
-        f" {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
+        f"In {listed(names)} nothing is corrected, since the host's K̂ is 0 while the structure's K"
+        f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
         " `coupled calibrate` finds."
     )
 
 
-def _resting(case: Sequence[Flight], system: System) -> str:
-    """Return that hands stay within breakout and friction, where any do."""
-    some = [flight for flight in case if flight.outcome.loader_rests]
-    if not some:
-        return ""
-    manoeuvre = some[0].manoeuvre
-    loader = manoeuvre.rig.controls[manoeuvre.control].loader
-    friction = max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
+def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]:
+    """Yield that hands stay within breakout and friction, where any do."""
     unit = shown("force_N", system)
-    force, breakout, rubs = (
-        f"{unit.factor * each:.3g}"
-        for each in (max(f.outcome.force_N for f in some), loader.breakout, friction)
-    )
-    return (
-        f"{_which(case, some)}the force on the {manoeuvre.control}, {force} {unit.unit}, stays"
-        f" within breakout ({breakout} {unit.unit}) and friction ({rubs} {unit.unit}): the loader"
-        " does not move, so there is no share lost or felt."
-    )
+    found: dict[tuple[str, str], list[str]] = {}
+    for case in cases:
+        some = [flight for flight in case if flight.outcome.loader_rests]
+        if not some:
+            continue
+        loader = some[0].manoeuvre.rig.controls[some[0].manoeuvre.control].loader
+        rubs = dry_friction(loader)
+        pull = max(flight.outcome.force_N for flight in some)
+        force, breakout, friction = (
+            f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
+        )
+        place = f"{force}{_where(cases, case, some)}"
+        found.setdefault((breakout, friction), []).append(place)
+    control = cases[0][0].manoeuvre.control
+    for (breakout, friction), places in found.items():
+        yield (
+            f"The force on the {control} stays within breakout ({breakout}) and friction"
+            f" ({friction}): {_some(places)}. The loader does not move, so there is no share lost"
+            " or felt."
+        )
 
 
-def _saturated(case: Sequence[Flight]) -> str:
-    """Return where the surface met its stop, where the hand asks for more than it gives."""
-    some = [flight for flight in case if flight.outcome.surface_stop_norm is not None]
-    if not some:
-        return ""
-    manoeuvre = some[0].manoeuvre
+def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
+    """Yield where the surface met its stop, where the hand asks for more than it gives."""
+    manoeuvre, places = cases[0][0].manoeuvre, []
     surface = SURFACES[manoeuvre.control]
-    at = 100.0 * abs(some[0].outcome.surface_stop_norm or 0.0)
-    stops = some[0].record.manifest["surface_stops"][surface]
-    side = "positive" if (some[0].outcome.surface_stop_norm or 0.0) > 0.0 else "negative"
-    place = stops[side]["position_rad"] / DEGREE_rad
-    return (
-        f"{_which(case, some)}the {surface} is at its stop ({place:.1f}°) from {at:.1f} % of the"
-        f" {manoeuvre.control}'s travel on, counted from this trim. The hand asks for more, which no"
-        " surface gives, and which is not counted as lost."
-    )
+    for case in cases:
+        some = [flight for flight in case if flight.outcome.surface_stop_norm is not None]
+        if some:
+            stop = some[0].outcome.surface_stop_norm or 0.0
+            stops = some[0].record.manifest["surface_stops"][surface]
+            rad = stops["positive" if stop > 0.0 else "negative"]["position_rad"]
+            at = f"{100.0 * abs(stop):.1f} % of the {manoeuvre.control}'s travel"
+            places.append(f"{at}, at {rad / DEGREE_rad:.1f}°{_where(cases, case, some)}")
+    if places:
+        yield (
+            f"The {surface} is at its stop from here on, counted from trim: {_some(places)}. The"
+            " hand asks for more, which the surface does not give: it is not counted as lost."
+        )
 
 
 def further(case: Sequence[Flight], system: System = "si") -> str:
@@ -213,6 +233,35 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
         f" what the hand asks for is lost.{more}"
     )
+
+
+def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration]) -> list[str]:
+    """Return what losses in a table of flights alone do not show, a sentence each.
+
+    `manoeuvre` is one of the flights, its rig as filed, flown in `configurations`, or as filed
+    where there are none.
+    """
+    said = []
+    flown = {str(each): manoeuvre.configured(each) for each in configurations}
+    flown = flown or {"the rig as filed": manoeuvre}
+    useless = [name for name, each in flown.items() if _corrects_nothing(each)]
+    if useless:
+        said.append(_says_no_correction(manoeuvre, useless))
+    if holds_force(manoeuvre) and any(_feels_too_soft(each) for each in flown.values()):
+        said.append(
+            "The pilot holds a force: on a structure that bends, the hand goes further for it, and"
+            " without correction the surface goes about as far as on a rigid one. What is lost is a"
+            " share of what the hand asks for."
+        )
+    return said
+
+
+def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
+    """Tell whether a control bends and its host corrects neither gradient nor deflection."""
+    data = manoeuvre.rig.controls[manoeuvre.control]
+    bends = data.loader.bend > 0.0 or (data.loader.bend_push or 0.0) > 0.0
+    host = data.compensation
+    return bends and (host.bend == 0.0 or not (host.gradient or host.deflection))
 
 
 def holds_force(manoeuvre: Manoeuvre) -> bool:

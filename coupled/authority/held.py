@@ -1,7 +1,7 @@
 """What is read while a control is held: the surface reached, the force felt, beside the statics.
 
-Held is far out on the peak's side, and still. Deflection and force are the hand's own: a zero of the
-transducer at the grip and its arc are taken off, and the strain gauge is left out.
+Held is far out on the peak's side, and still. Deflection and force are the hand's own: a zero of
+the transducer at the grip and its arc are taken off, and the strain gauge is left out.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Loader
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
@@ -51,17 +52,25 @@ def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
 def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
     """Tell whether a loader never leaves neutral: the hand stays within breakout and friction.
 
-    A friction whose contact yields lets it move by F_c/stiffness. Not for a loader with services,
-    which a jam may hold.
+    By its δc. A friction whose contact yields lets it move a little before it slips: there the
+    forces decide. Not for a loader with services, which a jam may hold.
     """
     loader, name = rig.controls[control].loader, channel(control, "computed")
     away = float(np.max(np.abs(record[name] - record[name][0])))
     within = _STILL * rig.controls[control].travel + 2.0 * abs(rig.controls[control].sensing.hum)
-    within += 2.0 * _SIGMAS * rig.noise.get(name, 0.0)
-    if loader.friction_stiffness > 0.0:
-        most = max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
-        within += most / loader.friction_stiffness
-    return away <= within
+    if away <= within + 2.0 * _SIGMAS * rig.noise.get(name, 0.0):
+        return True
+    if loader.friction_stiffness == 0.0:
+        return False
+    net = record[channel(control, "hand_force")] + loader.offset
+    if rig.flight is not None:
+        net = net - loader.bob_weight * (record["load_factor"] - 1.0)
+    return float(np.max(np.abs(net))) <= loader.breakout + dry_friction(loader)
+
+
+def dry_friction(loader: Loader) -> float:
+    """Return the force at which a loader's dry friction gives way on either side, N."""
+    return max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
 
 
 def by_the_statics(

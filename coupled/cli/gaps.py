@@ -145,6 +145,7 @@ def _diagnose(
 def _print(
     whole: Diagnosis, power: bool, written: tuple[Path | None, list[Path]], units: System
 ) -> None:
+    from coupled.calibration.assumed import outdated_bends
     from coupled.cli.tables.gaps import (
         in_words,
         print_closed_loop,
@@ -166,6 +167,8 @@ def _print(
         print_power(out, whole.power, units)
     if improve is not None:
         say(f"improved rig: {improve}")
+        for sentence in outdated_bends(whole.nominal, whole.improved):
+            say(sentence)
     for figure in drawn:
         say(f"figure: {figure}")
 
@@ -173,6 +176,7 @@ def _print(
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path, records: dict[str, Record]
 ) -> None:
+    from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
     from coupled.gap.findings.summary import change
     from coupled.rig.rigedit import differences, edited
@@ -184,7 +188,9 @@ def _write_improved(
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
-    changes = differences(read_rig(rig_file), whole.improved)
+    filed = read_rig(rig_file)
+    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
+    changes = differences(filed, whole.improved)
     write_text(path, edited(read_text(rig_file, "a rig file is wanted"), changes, remark))
 
 

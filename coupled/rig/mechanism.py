@@ -66,7 +66,8 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
         set_base(s.services, s.loader)
     stopped = p.reach.reach > 0.0
     if stopped:
-        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
+        stages = (p.loader, p.friction, s.modification, s.loader, p.linkage, s.linkage)
+        set_reach(p.reach, s.reach, *stages)
     if p.sensing.skewed:
         sample_channels(p, s, p.clock.substeps, True)
     if p.modification.late > 0:

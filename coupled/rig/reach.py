@@ -3,15 +3,16 @@
 The grip at δ = ±r stops the whole chain behind it, inelastically. Loader and servo go no further
 than the place x at which the grip, under the force that moves it there slowly, stands at the reach:
 
-    x + yields(F_x) = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
+    x + yields(F_x) + others = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
 
-`yields` is all that lies between servo and grip: the bend, on the loading branch of its hysteresis,
-and a play whose contact yields. Loader and servo are located there as at the loader's own stops.
-What stops their masses is an impulse, which is not in the force of a node.
+`yields` is all that lies between servo and grip: the bend, as its hysteresis stands at the frame,
+and a play whose contact yields; `others` is what the forces on other controls bend here. Loader and
+servo are stopped there as at the loader's own stops. What stops their masses is an impulse, which
+is not in the force of a node.
 
 The stop takes what a hand asks for beyond the force at which the grip stands at the reach,
 
-    at + yields(F) ≤ r,     at = the servo's side, and what other controls' forces bend here
+    at + yields(F) + others ≤ r,     at = the servo's side
 
 and of a linkage that does not yield, beyond F_x once δc is at x. What does not follow the force at
 once (a structure with mass, a soft play behind its damper) is stopped where δ = r: it goes no
@@ -35,7 +36,6 @@ from coupled.rig.linkage import (
     LinkageParameters,
     LinkageState,
     deflection,
-    loaded,
     pressed,
     static_slope,
     still,
@@ -96,6 +96,7 @@ def _place(
     m: ModificationState,
     s: LoaderState,
     linkage_p: LinkageParameters,
+    linkage: LinkageState,
 ) -> tuple[float, float]:
     """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
     low, high = 0.0, p.travel
@@ -107,7 +108,8 @@ def _place(
         at = x - side * s.neutral
         force = level + side * spring(p, side * at) + limited(p, smooth_force(m, at))
         force /= 1.0 - friction.by_load
-        over = x + side * loaded(linkage_p, side * force) - r
+        ahead = still(linkage_p, linkage, side * force) + pressed(linkage_p, side * force)
+        over = x + side * (ahead + linkage.others) - r
         if over > 0.0:
             high = x
         else:
@@ -123,7 +125,7 @@ def _place(
         if abs(after - x) <= 1e-14 * r:
             break
         x = after
-    return x, force if x >= r else _NO_FORCE
+    return x, force
 
 
 @stage
@@ -141,10 +143,12 @@ def set_reach(
     m: ModificationState,
     loader: LoaderState,
     linkage_p: LinkageParameters,
+    linkage: LinkageState,
 ) -> None:
     """Find where the grip stands at its reach with a frame's gradients and external force."""
-    stop.top, stop.top_force = _place(p.reach, 1.0, loader_p, friction, m, loader, linkage_p)
-    size, force = _place(p.reach, -1.0, loader_p, friction, m, loader, linkage_p)
+    r = p.reach
+    stop.top, stop.top_force = _place(r, 1.0, loader_p, friction, m, loader, linkage_p, linkage)
+    size, force = _place(r, -1.0, loader_p, friction, m, loader, linkage_p, linkage)
     stop.bottom, stop.bottom_force = -size, -force
 
 
@@ -237,9 +241,12 @@ def _most(
     if side < 0.0:
         outward, inward = inward, outward
     if outward == 0.0 and linkage_p.contact == 0.0:
-        if side * seated(stop, linkage_p, computed) <= 0.0:
+        at, force = stop.top, stop.top_force
+        if side < 0.0:
+            at, force = stop.bottom, stop.bottom_force
+        if side * seated(stop, linkage_p, computed) <= 0.0 or side * at < p.reach:
             return side * _NO_FORCE
-        return stop.top_force if side > 0.0 else stop.bottom_force
+        return force
     servo = linkage.position if linkage_p.contact > 0.0 else linkage.grip
     by = side * p.reach - (servo + linkage.others)
     if side * by < 0.0 and inward == 0.0 and linkage_p.contact == 0.0:
