@@ -15,7 +15,7 @@ from coupled.record.channels import SURFACES, unit_of
 from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
-    from coupled.authority.compare import Flight, Outcome
+    from coupled.authority.outcome import Flight, Outcome
     from coupled.flight.manoeuvre import Configuration, Manoeuvre
 
 NONE = "–"  # in place of a figure that a flight does not have
