@@ -96,10 +96,13 @@ def corrects_nothing(flight: Flight) -> bool:
 
 
 def _corrects_nothing(manoeuvre: Manoeuvre) -> bool:
-    data = manoeuvre.rig.controls[manoeuvre.control]
-    host = data.compensation
-    bends = data.loader.bend > 0.0 or (data.loader.bend_push or 0.0) > 0.0
-    return bends and host.bend == 0.0 and (host.deflection or host.gradient)
+    host = manoeuvre.rig.controls[manoeuvre.control].compensation
+    return _bends(manoeuvre) and host.bend == 0.0 and (host.deflection or host.gradient)
+
+
+def _bends(manoeuvre: Manoeuvre) -> bool:
+    loader = manoeuvre.rig.controls[manoeuvre.control].loader
+    return loader.bend > 0.0 or (loader.bend_push or 0.0) > 0.0
 
 
 def named(flight: Flight) -> str:
@@ -209,13 +212,13 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     moved = [
         flight.outcome
         for flight in case
-        if abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
-        and math.isfinite(flight.outcome.loss)
-        and flight.outcome.loss > _NOTICED
+        if _feels_too_soft(flight.manoeuvre)
+        and abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
+        and flight.outcome.loss > 0.0
     ]
     if not moved:
         return ""
-    bent = moved[0]
+    bent, alike = moved[0], goes_as_far(moved[0], rigid)
     size, unit = _travel(manoeuvre, system)
     digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
@@ -224,8 +227,8 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         f"{each.configuration} {size * abs(each.hand_travel_norm):.{digits}f} {unit}"
         f" and {100 * each.loss:.0f} %"
         for each in moved[1:]
+        if goes_as_far(each, rigid) is alike
     ]
-    alike = goes_as_far(bent, rigid)
     surface = "the surface goes about as far, while" if alike else "and"
     more = f" Likewise {listed(others)}." if others else ""
     return (
@@ -258,10 +261,8 @@ def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration])
 
 def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
     """Tell whether a control bends and its host corrects neither gradient nor deflection."""
-    data = manoeuvre.rig.controls[manoeuvre.control]
-    bends = data.loader.bend > 0.0 or (data.loader.bend_push or 0.0) > 0.0
-    host = data.compensation
-    return bends and (host.bend == 0.0 or not (host.gradient or host.deflection))
+    host = manoeuvre.rig.controls[manoeuvre.control].compensation
+    return _bends(manoeuvre) and (host.bend == 0.0 or not (host.gradient or host.deflection))
 
 
 def holds_force(manoeuvre: Manoeuvre) -> bool:

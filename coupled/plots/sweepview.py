@@ -31,6 +31,7 @@ LABELS = {
     "peak_rate_rad_per_s": ("peak rate, rad/s", 1.0),
     "peak_load_factor": ("peak load factor", 1.0),
     "time_to_attitude_s": ("time to attitude, s", 1.0),
+    "surface_stop_norm": ("surface at its stop, % of travel", 100.0),
 }
 
 
