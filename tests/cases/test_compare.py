@@ -93,17 +93,29 @@ def test_short_of_any_stop_none_is_named() -> None:
     assert found.loss("uncompensated") > 0.05
 
 
-@pytest.mark.parametrize(("at_s", "lost"), [(0.1, False), (3.2, True)])
-def test_the_stop_is_that_of_the_trim_while_the_control_is_held(at_s: float, lost: bool) -> None:
-    """The trim goes down by 30 % of the travel, before the pull or after it; 60 % are asked."""
-    event = {"trim": "column", "by_norm": 0.3, "at_s": at_s, "over_s": 0.1}
+@pytest.mark.parametrize(
+    ("by", "lost"),
+    [({0.1: 0.3}, False), ({3.2: 0.3}, True), ({0.1: 0.3, 3.2: -0.3}, False)],
+    ids=["before", "after", "to and back"],
+)
+def test_the_stop_is_that_of_the_trim_while_the_control_is_held(
+    by: dict[float, float], lost: bool
+) -> None:
+    """The trim moves by 30 % of the travel before the pull, after it, or back again; 60 % are held.
+
+    Of the trim's 75 % 45 are left, so that nothing is lost where it has moved before.
+    """
+    event = {
+        f"at{i}": {"trim": "column", "by_norm": norm, "at_s": at, "over_s": 0.1}
+        for i, (at, norm) in enumerate(by.items())
+    }
     case = read_run(str(CASES / "saturated-surface" / "run.toml"))[0]
     pilot = coupled.Clamp(deflection_m=0.06, start_s=0.5, duration_s=2.4, rise_s=0.2)
     found = coupled.compare(
         case.rig,
         column=pilot,
         duration_s=4.0,
-        event={"runaway": event},
+        event=event,
         configurations=["rigid", "uncompensated"],
     )
     assert (found.loss("uncompensated") > 0.03) is lost
