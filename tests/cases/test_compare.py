@@ -18,8 +18,10 @@ from coupled.authority.maps import loss_maps
 from coupled.calibration.assumed import outdated_bends
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
+from coupled.flight.pilot import Pilot
 from coupled.flight.runfile import read_run
 from coupled.plots.flights import draw_comparison
+from coupled.record.channels import ControlName
 from coupled.rig.standalone import run_control
 from coupled.rig.statics import static_line, static_point
 from tests.support.commands import ROOT
@@ -229,7 +231,8 @@ def test_a_bob_weight_bends_the_structure_in_the_closed_form_too() -> None:
 def test_a_leak_of_another_force_is_in_the_closed_form() -> None:
     """A tenth of the wheel's 60 N pulls the column, too: F = G·δ − (1 − K·G)·6 N."""
     rig = joined({LOADER + "crosstalk": 0.1}, {"reciprocal": False})
-    pilots = {"column": coupled.Clamp(deflection_m=PULL_m), "wheel": coupled.Step(force_N=60.0)}
+    clamp, pull = coupled.Clamp(deflection_m=PULL_m), coupled.Step(force_N=60.0)
+    pilots: dict[ControlName, Pilot] = {"column": clamp, "wheel": pull}
     manoeuvre = Manoeuvre(rig, pilots, 5.0, bench=STATIC).configured("compensated")
     found = fly_and_judge(manoeuvre, "compensated").outcome
     wanted = 1.0 - (1.0 - K_REPORT * G_STIFF) * 6.0 / (G_STIFF * PULL_m)
@@ -486,7 +489,7 @@ def test_at_its_reach_the_grip_stands_where_the_statics_have_it(
 
 def test_grips_on_one_structure_do_not_pass_their_reach() -> None:
     """A jump of the wheel's force bends the column too, whose grip stands at its reach."""
-    pilots = {
+    pilots: dict[ControlName, Pilot] = {
         "column": coupled.Step(force_N=400.0, reach_m=0.1),
         "wheel": coupled.Doublet(force_N=90.0, half_period_s=0.6, rise_s=0.0, start_s=2.0),
     }
