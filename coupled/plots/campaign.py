@@ -16,7 +16,6 @@ from coupled.plots.sweepview import Shown, mark_ended, place_of, titled, varying
 
 _COLOURS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 _MOST_COLUMNS = 4
-_LETTERS_PER_INCH = 12.0  # of a title in 11 points, at the least
 
 
 def draw_sweep(
@@ -38,10 +37,10 @@ def draw_sweep(
     figures, still = varying(found, figures)
     remark = " ".join((f"{still}." if still and remarks else still, *remarks)).strip()
     if is_grid(found, keys, numeric):
-        return draw_grid(found, (numeric[0], numeric[1]), figures, titled(title, remark))
+        return draw_grid(found, (numeric[0], numeric[1]), figures, (title, remark))
     width, height = max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures)
     drawn = Figure(figsize=(width, height), layout="constrained")
-    drawn.suptitle(titled(title, remark, int(_LETTERS_PER_INCH * width)), fontsize=11)
+    drawn.suptitle(titled(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
     for row, name in enumerate(figures):
         for column, key in enumerate(numeric):
