@@ -3,26 +3,34 @@
 One manoeuvre is flown in several configurations; an `Outcome` holds the figures of one
 flight. Loss and feel are read while the control stands still, held at half or more of its
 greatest deflection, beside the closed form of the rig's statics there (which leaves friction
-out). The force is the hand's own, whatever the strain gauge says of it; breakout and bob weight
-are taken off before it is compared.
+out). Deflection and force are the hand's own, whatever its sensors read; breakout and bob weight
+are taken off before forces are compared.
+
+Authority is what the surface does: a command beyond the surface's stop gives nothing, and to fall
+short of it there loses nothing. A hand that stays within breakout and friction moves no loader, and
+has neither a loss nor a felt ratio.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.authority.figures import remarks
 from coupled.authority.held import (
     asked_and_reached,
     by_the_statics,
     felt_and_specified,
+    loader_rests,
+    true_deflection,
     where_held,
 )
+from coupled.authority.outcome import Flight, Outcome
+from coupled.display import System
 from coupled.errors import InputError, listed, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
@@ -35,58 +43,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
+__all__ = ["AS_THE_RIG", "Comparison", "Flight", "Outcome", "compare", "fly_and_judge", "judge"]
+
 AS_THE_RIG = "as the rig file says"  # a flight in none of the configurations
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The figures of one flight; SI, shares without unit, None where there is none."""
-
-    case: str
-    configuration: str
-    control: str
-    asked_norm: float  # surface command that the held deflection asks for, of ±1
-    reached_norm: float  # surface command reached
-    hand_travel_norm: float  # the hand's deflection, a pull positive, of the control's travel
-    loss: float  # share of the asked command that is lost
-    loss_closed_form: float  # the same by the rig's statics
-    felt_ratio: float  # force felt over force specified, breakout taken off
-    felt_ratio_closed_form: float
-    force_N: float  # greatest force of the pilot's hand
-    force_step_N: float  # greatest jump of the modifying force from frame to frame
-    peak_rate_rad_per_s: float | None  # of pitch, roll or yaw, to the pilot's side
-    peak_load_factor: float | None
-    time_to_attitude_s: float | None  # from the pilot's start
-    ended_early: str  # why, or empty
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the figures by name, as JSON takes them (no NaN)."""
-        items = asdict(self).items()
-        return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in items}
-
-
-@dataclass(frozen=True)
-class Flight:
-    """One flight: what was flown, its record, and the figures of its outcome.
-
-    `configuration` is one of the manoeuvre's, or says that the rig was flown as it is.
-    """
-
-    manoeuvre: Manoeuvre
-    configuration: str
-    record: Record
-    outcome: Outcome
-
-    @property
-    def ended_early(self) -> str:
-        """Why and when the flight ended before its time, or an empty string."""
-        return self.outcome.ended_early
-
-    def __repr__(self) -> str:
-        ended = f", ended early: {self.ended_early}" if self.ended_early else ""
-        loss, seconds = self.outcome.loss, self.manoeuvre.duration_s
-        lost = f", {100.0 * loss:.1f} % authority lost" if math.isfinite(loss) else ""
-        return f"Flight({self.manoeuvre.label}, {self.configuration}: {seconds:g} s{lost}{ended})"
 
 
 @dataclass(frozen=True, repr=False)
@@ -108,7 +67,16 @@ class Comparison(Sequence[Flight]):
         return len(self.flights)
 
     def __repr__(self) -> str:
-        return "\n".join(["Comparison:", *(f"  {flight!r}" for flight in self.flights)])
+        lines = [*(f"  {flight!r}" for flight in self.flights), *self.remarks()]
+        return "\n".join(["Comparison:", *lines])
+
+    def remarks(self, system: System = "si") -> list[str]:
+        """Return what the figures alone do not show, a sentence each, in units of a system.
+
+        Surfaces at their stops, hands that stay within breakout and friction, a K̂ of 0, and why a
+        force that moves the surface as on the rigid rig loses authority.
+        """
+        return remarks(self.flights, system) if self.flights else []
 
     def flight(self, configuration: str, case: str | None = None) -> Flight:
         """Return the flight in a configuration; `case` is needed where there are several.
@@ -179,7 +147,7 @@ def fly_and_judge(
 
     `progress` is called with frames done and frames in all.
     """
-    record = fly(manoeuvre, progress)
+    record = fly(manoeuvre, progress, stops=True)
     return Flight(manoeuvre, configuration, record, judge(manoeuvre, configuration, record))
 
 
@@ -190,32 +158,38 @@ def judge(
     control, rig = manoeuvre.control, manoeuvre.rig
     why = "" if record.ended_early is None else str(record.ended_early)
     nan = float("nan")
-    if len(record) < 2 or not np.any(record[channel(control, "deflection")]):
-        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
-    deflection = record[channel(control, "deflection")]
+    deflection = true_deflection(rig, control, record)
     force = record[channel(control, "hand_force")]
-    held = where_held(record.time_s, deflection)
-    side = float(np.sign(np.mean(deflection[held])))
-    asked, reached = asked_and_reached(rig, control, record, held)
-    felt, specified = felt_and_specified(rig, control, record, held)
-    # The statics are those of a loader without services.
-    known = closed_forms and not manoeuvre.served
-    loss, ratio = by_the_statics(rig, control, record, held) if known else (nan, nan)
+    if len(record) < 2 or not (np.any(deflection) or np.any(force)):
+        return Outcome(manoeuvre.label, configuration, control, *(nan,) * 9, None, None, None, why)
+    rests = not manoeuvre.served and loader_rests(rig, control, record)
+    moved = deflection if np.any(deflection) else force
+    held = where_held(record.time_s, moved)
+    side = float(np.sign(np.mean(moved[held])))
+    stop, shares = None, (nan,) * 6
+    if not rests:
+        commands = asked_and_reached(rig, control, record, held)
+        felt, specified = felt_and_specified(rig, control, record, held)
+        stop = commands.stop
+        # The statics are those of a loader without services.
+        known = closed_forms and not manoeuvre.served
+        loss, ratio = by_the_statics(rig, control, record, held, stop) if known else (nan, nan)
+        asked, reached = commands.asked, commands.reached
+        ratios = (felt / specified, ratio) if specified else (nan, nan)
+        shares = (asked, reached, 1.0 - reached / asked, loss, *ratios)
     return Outcome(
         manoeuvre.label,
         configuration,
         control,
-        asked,
-        reached,
+        *shares[:2],
         float(np.mean(deflection[held])) / rig.controls[control].travel,
-        1.0 - reached / asked,
-        loss,
-        felt / specified if specified else nan,
-        ratio if specified else nan,
+        *shares[2:],
         float(np.max(np.abs(force))),
         float(np.max(np.abs(record[channel(control, "force_step")]))),
         *_motion_figures(manoeuvre, control, record, side),
         why,
+        stop,
+        rests,
     )
 
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
+from coupled.authority.held import dry_friction
 from coupled.display import System, shown
-from coupled.record.channels import unit_of
+from coupled.errors import listed
+from coupled.record.channels import SURFACES, unit_of
 from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
-    from coupled.authority.compare import Flight, Outcome
-    from coupled.flight.manoeuvre import Manoeuvre
+    from coupled.authority.outcome import Flight, Outcome
+    from coupled.flight.manoeuvre import Configuration, Manoeuvre
 
 NONE = "–"  # in place of a figure that a flight does not have
 _NOTICED = 0.005  # of the hand's travel: what it moves further is said
 _ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+_LISTED = 3  # cases that a sentence names
 _FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
 
@@ -86,28 +90,187 @@ def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
     return (travel / INCH_m, "in") if system == "us" else (1000.0 * travel, "mm")
 
 
+def corrects_nothing(flight: Flight) -> bool:
+    """Tell whether a flight's configuration corrects a bend by a K̂ of 0, and so not at all."""
+    return _corrects_nothing(flight.manoeuvre)
+
+
+def _corrects_nothing(manoeuvre: Manoeuvre) -> bool:
+    host = manoeuvre.rig.controls[manoeuvre.control].compensation
+    return _bends(manoeuvre) and host.bend == 0.0 and (host.deflection or host.gradient)
+
+
+def _bends(manoeuvre: Manoeuvre) -> bool:
+    loader = manoeuvre.rig.controls[manoeuvre.control].loader
+    return loader.bend > 0.0 or (loader.bend_push or 0.0) > 0.0
+
+
+def named(flight: Flight) -> str:
+    """Return a flight's configuration as tables and figures head it."""
+    return f"{flight.configuration} (K̂ = 0)" if corrects_nothing(flight) else flight.configuration
+
+
+def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
+    """Return what a comparison's figures alone do not show, a sentence each; flights of all cases.
+
+    A K̂ of 0, hands that move no loader, surfaces at their stops, and why a force that moves the
+    surface as on the rigid rig loses authority.
+    """
+    cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
+    held = next(filter(None, (further(case, system) for case in cases)), "")
+    said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
+    return list(filter(None, said))
+
+
+def _where(
+    cases: Sequence[Sequence[Flight]], case: Sequence[Flight], some: Sequence[Flight]
+) -> str:
+    """Return in which case and configurations something is so, where not in all of them."""
+    names = [case[0].outcome.case] if len(cases) > 1 else []
+    if len(some) < len(case):
+        names += [flight.configuration for flight in some]
+    return f" ({listed(names)})" if names else ""
+
+
+def _some(places: Sequence[str]) -> str:
+    """Return places in a row, those of a long run cut short."""
+    more = len(places) - _LISTED
+    return "; ".join(places[:_LISTED]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _without_correction(flights: Sequence[Flight]) -> str:
+    some = [flight for flight in flights if corrects_nothing(flight)]
+    if not some:
+        return ""
+    names = list(dict.fromkeys(flight.configuration for flight in some))
+    return _says_no_correction(some[0].manoeuvre, names)
+
+
+def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
+    control, d = manoeuvre.control, unit_of(manoeuvre.control)
+    bend = manoeuvre.rig.controls[control].loader.bend
+    return (
+        f"In {listed(names)} nothing is corrected, since the host's K̂ is 0 while the structure's K"
+        f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
+        " `coupled calibrate` finds."
+    )
+
+
+def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]:
+    """Yield that hands stay within breakout and friction, where any do."""
+    unit = shown("force_N", system)
+    found: dict[tuple[str, str], list[str]] = {}
+    for case in cases:
+        some = [flight for flight in case if flight.outcome.loader_rests]
+        if not some:
+            continue
+        loader = some[0].manoeuvre.rig.controls[some[0].manoeuvre.control].loader
+        rubs = dry_friction(loader)
+        pull = max(flight.outcome.force_N for flight in some)
+        force, breakout, friction = (
+            f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
+        )
+        place = f"{force}{_where(cases, case, some)}"
+        found.setdefault((breakout, friction), []).append(place)
+    control = cases[0][0].manoeuvre.control
+    for (breakout, friction), places in found.items():
+        yield (
+            f"The force on the {control} stays within breakout ({breakout}) and friction"
+            f" ({friction}): {_some(places)}. The loader does not move, so there is no share lost"
+            " or felt."
+        )
+
+
+def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
+    """Yield where the surface met its stop, where the hand asks for more than it gives."""
+    manoeuvre, places = cases[0][0].manoeuvre, []
+    surface = SURFACES[manoeuvre.control]
+    for case in cases:
+        some = [flight for flight in case if flight.outcome.surface_stop_norm is not None]
+        if some:
+            stop = some[0].outcome.surface_stop_norm or 0.0
+            stops = some[0].record.manifest["surface_stops"][surface]
+            rad = stops["positive" if stop > 0.0 else "negative"]["position_rad"]
+            at = f"{100.0 * abs(stop):.1f} % of the {manoeuvre.control}'s travel"
+            places.append(f"{at}, at {rad / DEGREE_rad:.1f}°{_where(cases, case, some)}")
+    if places:
+        yield (
+            f"The {surface} is at its stop from here on, counted from trim: {_some(places)}. The"
+            " hand asks for more, which the surface does not give: it is not counted as lost."
+        )
+
+
 def further(case: Sequence[Flight], system: System = "si") -> str:
     """Return why authority is lost where a force moves the surface as on the rigid rig.
 
     Nothing where the hand does not hold a force, or moves no further for it.
     """
     manoeuvre = case[0].manoeuvre
-    pilot = manoeuvre.pilots.get(manoeuvre.control)
-    flown = {flight.configuration: flight.outcome for flight in case}
-    rigid, bent = flown.get("rigid"), flown.get("uncompensated")
-    if pilot is None or pilot.kind not in _FORCES or rigid is None or bent is None:
+    rigid = next((f.outcome for f in case if f.configuration == "rigid"), None)
+    if not holds_force(manoeuvre) or rigid is None:
         return ""
-    further = abs(bent.hand_travel_norm) - abs(rigid.hand_travel_norm)
-    if not further > _NOTICED:
+    moved = [
+        flight.outcome
+        for flight in case
+        if _feels_too_soft(flight.manoeuvre)
+        and abs(flight.outcome.hand_travel_norm) - abs(rigid.hand_travel_norm) > _NOTICED
+        and flight.outcome.loss > 0.0
+    ]
+    if not moved:
         return ""
+    bent, alike = moved[0], goes_as_far(moved[0], rigid)
     size, unit = _travel(manoeuvre, system)
     digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
     places = [f"{size * abs(each.hand_travel_norm):.{digits}f} {unit}" for each in (bent, rigid)]
-    alike = abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)
+    others = [
+        f"{each.configuration} {size * abs(each.hand_travel_norm):.{digits}f} {unit}"
+        f" and {100 * each.loss:.0f} %"
+        for each in moved[1:]
+        if goes_as_far(each, rigid) is alike
+    ]
     surface = "the surface goes about as far, while" if alike else "and"
+    more = f" Likewise {listed(others)}." if others else ""
     return (
-        f"The pilot holds a force: uncompensated, the hand moves {places[0]} for it instead of"
-        f" {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of what"
-        " the hand asks for is lost."
+        f"The pilot holds a force: {bent.configuration}, the hand moves {places[0]} for it instead"
+        f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
+        f" what the hand asks for is lost.{more}"
     )
+
+
+def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration]) -> list[str]:
+    """Return what losses in a table of flights alone do not show, a sentence each.
+
+    `manoeuvre` is one of the flights, its rig as filed, flown in `configurations`, or as filed
+    where there are none.
+    """
+    said = []
+    flown = {str(each): manoeuvre.configured(each) for each in configurations}
+    flown = flown or {"the rig as filed": manoeuvre}
+    useless = [name for name, each in flown.items() if _corrects_nothing(each)]
+    if useless:
+        said.append(_says_no_correction(manoeuvre, useless))
+    if holds_force(manoeuvre) and any(_feels_too_soft(each) for each in flown.values()):
+        said.append(
+            "The pilot holds a force: on a structure that bends, the hand goes further for it, and"
+            " without correction the surface goes about as far as on a rigid one. What is lost is a"
+            " share of what the hand asks for."
+        )
+    return said
+
+
+def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
+    """Tell whether a control bends and its host corrects neither gradient nor deflection."""
+    host = manoeuvre.rig.controls[manoeuvre.control].compensation
+    return _bends(manoeuvre) and (host.bend == 0.0 or not (host.gradient or host.deflection))
+
+
+def holds_force(manoeuvre: Manoeuvre) -> bool:
+    """Tell whether the pilot of the control that is looked at holds a force, not a deflection."""
+    pilot = manoeuvre.pilots.get(manoeuvre.control)
+    return pilot is not None and pilot.kind in _FORCES
+
+
+def goes_as_far(bent: Outcome, rigid: Outcome) -> bool:
+    """Tell whether a surface goes about as far as on the rigid rig."""
+    return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

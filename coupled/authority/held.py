@@ -1,41 +1,111 @@
 """What is read while a control is held: the surface reached, the force felt, beside the statics.
 
-Held is far out on the peak's side, and still. The force is the hand's own.
+Held is far out on the peak's side, and still. Deflection and force are the hand's own: a zero of
+the transducer at the grip and its arc are taken off, and the strain gauge is left out.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.record.channels import ControlName, channel
+from coupled.record.channels import SURFACES, ControlName, channel
 from coupled.record.record import Record
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
+from coupled.rig.parameters import Loader
 from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
 Floats = NDArray[np.float64]
+_AT_STOP_rad = 1e-6  # from its stop, within which a surface stands there
+_SIGMAS = 6.0  # of the noise, which a record's rows stay within: once in 5e8 rows it does not
+_STILL = 1e-9  # of the travel: rounding of a loader at rest
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Mean surface commands about trim while a control is held, in ±1.
+
+    What the deflection asks for and what is reached, both no further than the surface goes;
+    `stop` is the command at which it meets its stop, where more is asked for, else None.
+    """
+
+    asked: float
+    reached: float
+    stop: float | None
+
+
+def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
+    """Return the deflection δ at the grip in d, which the record's transducer reads: eq. (15)."""
+    data = rig.controls[control]
+    read = record[channel(control, "deflection")] - data.sensing.deflection_zero
+    if data.loader.arc_geometry:
+        read = data.length * np.arcsin(np.clip(read / data.length, -1.0, 1.0))
+    return np.asarray(read)
+
+
+def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
+    """Tell whether a loader never leaves neutral: the hand stays within breakout and friction.
+
+    By its δc. A friction whose contact yields lets it move a little before it slips: there the
+    forces decide. Not for a loader with services, which a jam may hold.
+    """
+    loader, name = rig.controls[control].loader, channel(control, "computed")
+    away = float(np.max(np.abs(record[name] - record[name][0])))
+    within = _STILL * rig.controls[control].travel + 2.0 * abs(rig.controls[control].sensing.hum)
+    if away <= within + 2.0 * _SIGMAS * rig.noise.get(name, 0.0):
+        return True
+    if loader.friction_stiffness == 0.0:
+        return False
+    net = record[channel(control, "hand_force")] + loader.offset
+    if rig.flight is not None:
+        net = net - loader.bob_weight * (record["load_factor"] - 1.0)
+    return float(np.max(np.abs(net))) <= loader.breakout + dry_friction(loader)
+
+
+def dry_friction(loader: Loader) -> float:
+    """Return the force at which a loader's dry friction gives way on either side, N."""
+    return max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
 
 
 def by_the_statics(
-    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
+    rig: Rig,
+    control: ControlName,
+    record: Record,
+    held: NDArray[np.bool_],
+    stop: float | None = None,
 ) -> tuple[float, float]:
-    """Return the share of the command that is lost, and force felt over specified, at rest."""
-    others = {
-        str(name): float(np.mean(record[channel(name, "hand_force")][held]))
-        for name in rig.controls
-        if name != control and not rig.structure.stands_apart
-    }
-    pressure = float(np.mean(record["dynamic_pressure_Pa"][held]))
-    deflection = float(np.mean(record[channel(control, "deflection")][held]))
-    point = static_point(rig, control, pressure, deflection, others)
-    breakout = math.copysign(rig.controls[control].loader.breakout, deflection)
-    felt, specified = float(point.force[0]) - breakout, float(point.specified[0]) - breakout
-    loss = 1.0 - float(point.estimate[0] / point.deflection[0])
+    """Return the share of the command that is lost, and force felt over specified, at rest.
+
+    `stop` is the command at which the surface meets its stop, if it does.
+    """
+
+    def mean(values: Floats) -> float:
+        return float(np.mean(values[held]))
+
+    others = {str(n): mean(record[channel(n, "hand_force")]) for n in rig.controls if n != control}
+    load = mean(record["load_factor"]) if rig.flight is not None else 1.0
+    deflection = mean(true_deflection(rig, control, record))
+    point = static_point(
+        rig,
+        control,
+        mean(record["dynamic_pressure_Pa"]),
+        deflection,
+        others,
+        time_s=mean(record.time_s),
+        load_factor=load,
+    )
+    loader = rig.controls[control].loader
+    preload = math.copysign(loader.breakout, deflection)
+    felt = float(point.force[0]) - preload - loader.bob_weight * (load - 1.0)
+    specified = float(point.specified[0]) - preload
+    asked = _as_far_as(np.array([_gain(rig, control) * deflection]), stop)
+    loss = 1.0 - float(_as_far_as(point.command, stop)[0] / asked[0])
     return loss, felt / specified if specified else float("nan")
 
 
@@ -44,7 +114,7 @@ def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> t
 
     Breakout and bob weight are taken off both.
     """
-    deflection = record[channel(control, "deflection")]
+    deflection = true_deflection(manoeuvre.rig, control, record)
     if len(record) < 2 or not np.any(deflection):
         return float("nan"), float("nan")
     held = where_held(record.time_s, deflection)
@@ -68,23 +138,65 @@ def where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
     return np.asarray(held if held.sum() >= reach else share >= 0.98)
 
 
+def _gain(rig: Rig, control: ControlName) -> float:
+    """Return the surface command, in ±1, that a deflection of 1 d asks for."""
+    data = rig.controls[control]
+    return COMMAND_SIGN[data.surface] / data.travel
+
+
+def _as_far_as(commands: Floats, stop: float | None) -> Floats:
+    """Return commands in ±1, no further than a surface goes that meets its stop at one of them."""
+    low = stop if stop is not None and stop <= 0.0 else -1.0
+    high = stop if stop is not None and stop > 0.0 else 1.0
+    return np.asarray(np.clip(commands, low, high))
+
+
 def asked_and_reached(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
-) -> tuple[float, float]:
+) -> Commands:
     """Return the mean surface commands asked for by the deflection, and reached, of ±1."""
-    data = rig.controls[control]
-    gain = COMMAND_SIGN[data.surface] / data.travel
-    deflection = record[channel(control, "deflection")]
-    asked = np.clip(gain * deflection, -1.0, 1.0)
+    asked = _gain(rig, control) * true_deflection(rig, control, record)[held]
     reached = record[channel(control, "surface_norm")]
-    return float(np.mean(asked[held])), float(np.mean(reached[held]))
+    stop = _surface_stop(rig, control, record, held, float(np.mean(asked)))
+    if stop is None or abs(float(np.mean(asked))) <= abs(stop):
+        return Commands(float(np.mean(np.clip(asked, -1, 1))), float(np.mean(reached[held])), None)
+    means = [float(np.mean(_as_far_as(each, stop))) for each in (asked, reached[held])]
+    return Commands(means[0], means[1], stop)
+
+
+def _surface_stop(
+    rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_], asked: float
+) -> float | None:
+    """Return the command at which the surface met its stop on the side asked for; None if unknown.
+
+    The manifest has it as the aircraft stood at the flight's end. If the trim was moved after the
+    control was held, the surface's own position decides: at its stop it went no further than the
+    command of then, and elsewhere nothing is known of the stop.
+    """
+    data = rig.controls[control]
+    surface = SURFACES[control]
+    stops = record.manifest.get("surface_stops", {}).get(surface)
+    rows = np.flatnonzero(held[:-1])  # a row's command moves the surface of the next
+    known = stops["positive" if asked > 0.0 else "negative"] if stops else None
+    if known is None or not len(rows):
+        return None
+    stop, name = float(known["command_norm"]), f"{surface}_rad"
+    reached = record[channel(control, "surface_norm")][rows]
+    within = _AT_STOP_rad + _SIGMAS * rig.noise.get(name, 0.0) / math.sqrt(len(rows))
+    stands = abs(float(np.mean(record[name][rows + 1])) - known["position_rad"]) <= within
+    slack = data.rigging.play + 1e-4
+    if stands and np.mean(np.abs(reached)) < abs(stop) - slack:
+        return math.copysign(float(np.min(np.abs(reached))), asked)
+    if not stands and np.mean(np.abs(reached)) > abs(stop) + slack:
+        return None
+    return stop
 
 
 def felt_and_specified(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return the mean force felt and specified, breakout and bob weight taken off, N."""
-    deflection = record[channel(control, "deflection")][held]
+    deflection = true_deflection(rig, control, record)[held]
     pressure = record["dynamic_pressure_Pa"][held]
     loader = rig.controls[control].loader
     preload = np.sign(deflection) * loader.breakout

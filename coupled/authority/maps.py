@@ -148,7 +148,7 @@ def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
 
 
 def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
-    """Return the forces past the breakout, N, that so much elevator takes, by the statics.
+    """Return the forces past breakout and offset, N, that so much elevator takes, by the statics.
 
     `commands` are shares of the travel, pull positive; the force of a command beyond the
     travel is that of the whole travel, in proportion. NaN where the bend alone moves the
@@ -160,7 +160,7 @@ def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
         line = static_line(rig, "column", q, _computed(control))
         wanted = min(abs(command) * control.travel, line.estimate[-1])
         force = np.interp(wanted, line.estimate, line.force, left=np.nan)
-        past = (force - control.loader.breakout) * command * control.travel
+        past = (force - control.loader.breakout + control.loader.offset) * command * control.travel
         out.append(past / wanted if wanted > 0.0 else 0.0)
     return np.array(out)
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coupled.record.channels import unit_of
 from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
 
 # What a calibration was made under, and its unit; another value makes it stale.
 GAINS = {"mechanical_advantage": "", "s1_over_s2": "N_per_{d}", "s3_over_s2": ""}
@@ -70,6 +72,27 @@ def stale(control: Control) -> list[str]:
         if not _same(found, value)
     ]
     return changes
+
+
+def outdated_bends(filed: Rig, found: Rig) -> list[str]:
+    """Return for which controls the host's K̂ is not the K that was found, a sentence each.
+
+    `filed` is the rig as its file has it, `found` with the K that records gave. What the host
+    assumes is kept there, since the records were made with it.
+    """
+    said = []
+    for name, control in found.controls.items():
+        old, new, host = filed.controls[name].loader, control.loader, control.compensation
+        corrects = host.deflection or host.gradient
+        if _same(old.bend, new.bend) or _same(host.bend, new.bend) or not corrects:
+            continue
+        d = unit_of(name)
+        said.append(
+            f"the {name}'s K̂ is stale: the host corrects by {host.bend:.6g} {d}/N, and K is"
+            f" {new.bend:.6g} {d}/N. To correct by the K found, set"
+            f" controls.{name}.compensation.bend_{d}_per_N = {new.bend:.6g}"
+        )
+    return said
 
 
 def _same(one: float, other: float) -> bool:

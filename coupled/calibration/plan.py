@@ -26,12 +26,13 @@ from coupled.errors import InputError
 from coupled.record.channels import ControlName
 from coupled.rig.equations import bend_loss, specified_gradient, volts, volts_of_computed
 from coupled.rig.rig import Rig
-from coupled.rig.statics import static_point
+from coupled.rig.statics import static_line, static_point
 
 Floats = NDArray[np.float64]
 STRONGEST_N = 150.0  # two thirds of what 14 CFR 25.143(d) allows one hand for a short time
 NEAREST, FARTHEST = 0.4, 1.0  # deflections within what travel and force allow, as shares
 FULL_TRAVEL = 0.95
+_LEAVES = 1e-6  # of that, δc of a loader that has just left its breakout
 MOST_READINGS = 400
 FINEST = 100.0  # times an instrument may err less: 3 µm for 0.3 mm
 NORMAL_95 = 1.96
@@ -104,17 +105,17 @@ def stations(
 def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) -> float:
     """Return how far out a control can be held with so many N, d."""
     full = FULL_TRAVEL * rig.controls[control].travel
-    tiny = 1e-3 * full
 
     def excess(deflection: float) -> float:
         return float(static_point(rig, control, pressure, deflection).force[0]) - strongest_N
 
     if excess(full) <= 0.0:
         return full
-    if excess(tiny) >= 0.0:
+    leaves = static_line(rig, control, pressure, np.array([_LEAVES * full]))
+    if leaves.force[0] >= strongest_N:
         problem = f"{strongest_N:g} N does not overcome the breakout; give more"
         raise InputError(rig.name, "--strongest-N", problem)
-    return float(brentq(excess, tiny, full, rtol=1e-6))
+    return float(brentq(excess, float(leaves.deflection[0]), full, rtol=1e-6))
 
 
 def precision(

@@ -59,7 +59,7 @@ def fly_planned(
         entry = replace(entry, seed=scenario.seed)
         if flight.configuration:
             scenario = scenario.configured(flight.configuration)
-        record = fly(scenario, hangar=hangar)
+        record = fly(scenario, hangar=hangar, stops=True)
     except InputError as error:
         return replace(entry, ended_early=f"not flown: {error.problem}")
     ended = record.manifest["ended_early"]

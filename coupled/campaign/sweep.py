@@ -11,11 +11,13 @@ from typing import Any
 
 import polars as pl
 
+from coupled.authority.figures import sweep_remarks
 from coupled.campaign.flights import fly_sweep
 from coupled.campaign.journal import opened
-from coupled.campaign.plan import SweepPlan, plan_from_table, read_plan
+from coupled.campaign.plan import SweepPlan, plan_from_table, planned_flights, read_plan
 from coupled.campaign.sensitivity import SobolIndex, sensitivity
 from coupled.campaign.survival import SurvivalLimit, limits
+from coupled.errors import InputError
 from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
@@ -42,6 +44,18 @@ class SweepResult:
     def to_polars(self) -> pl.DataFrame:
         """Return the table, a row a flight."""
         return self.table
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the losses alone do not show, a sentence each, by the first flight's rig."""
+        asked = self.plan.sweep
+        if not {"loss", "loss_closed_form"} & set(asked.keep):
+            return []
+        first = planned_flights(self.plan)[0]
+        try:
+            return sweep_remarks(self.plan.scenario(first.changes), asked.configurations)
+        except InputError:  # a flight that cannot be flown, as the table says
+            return []
 
     @property
     def numeric_keys(self) -> list[str]:

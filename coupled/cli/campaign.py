@@ -175,6 +175,8 @@ def _show(
             write_report(report, outputs, inputs, lambda made: sweep_report(found, made))
     if json_file != "-":
         print_sweep(out, table, asked.keep, units)
+        for sentence in found.remarks:
+            out.print(sentence, markup=False, highlight=False)
         print_survival(out, found.limits)
         say(f"table: {target / TABLE}  ({len(table)} flights)")
         if found.indices:

@@ -153,6 +153,7 @@ def _diagnose(
 def _print(
     whole: Diagnosis, power: bool, written: tuple[Path | None, list[Path]], units: System
 ) -> None:
+    from coupled.calibration.assumed import outdated_bends
     from coupled.cli.tables.gaps import (
         in_words,
         print_closed_loop,
@@ -174,6 +175,8 @@ def _print(
         print_power(out, whole.power, units)
     if improve is not None:
         say(f"improved rig: {improve}")
+        for sentence in outdated_bends(whole.nominal, whole.improved):
+            say(sentence)
     for figure in drawn:
         say(f"figure: {figure}")
 
@@ -181,6 +184,7 @@ def _print(
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
 ) -> None:
+    from coupled.calibration.assumed import outdated_bends
     from coupled.files import read_text
     from coupled.gap.findings.summary import change
     from coupled.gap.trimmed import rig_of_manifests, trimmed
@@ -200,6 +204,7 @@ def _write_improved(
         remark += "".join(f"changed: {p.key} {change(p)}\n" for p in effect.parameters)
     for setting in (one for one in whole.settings if one.moved):
         remark += f"changed: {setting.words}, within its tolerance\n"
+    remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
     # The trim was taken from the record, and is no change of the rig file.
     changes = differences(trimmed(filed, records)[0], whole.improved)
     write_text(path, edited(text, changes, remark))

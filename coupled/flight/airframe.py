@@ -40,7 +40,7 @@ from coupled.flight.gusts import GUST_DOWN
 from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable, models_in
 from coupled.flight.newton import newton_trim
 from coupled.flight.putback import put_back
-from coupled.flight.surfacemap import flown_through
+from coupled.flight.surfacemap import flown_through, stops_found
 from coupled.flight.wrapper import Step, Wrapper, led_by
 from coupled.record.channels import ALTITUDE, LONGITUDINAL, SURFACES, motion_channels
 from coupled.rig.parameters import Flight
@@ -128,6 +128,7 @@ class JSBSimAirframe:
         plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
         hooks = [hook for wrapper in wrappers if (hook := wrapper.meet(self)) is not None]
         self.step = led_by(hooks, plain)
+        self._unled = plain
         # Above this altitude no wheel is near the ground, and no height need be asked for.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
@@ -255,6 +256,13 @@ class JSBSimAirframe:
         Spends this aircraft: it is flown through all of them, a frame each.
         """
         return flown_through(self.step, self.motion, self._controls, surface)
+
+    def surface_stops(self, control: str) -> dict[str, dict[str, Any] | None]:
+        """Return where a control's surface meets its stop, as it is trimmed now (`surfacemap`).
+
+        Spends this aircraft: some frames are flown, without what else acts on it.
+        """
+        return stops_found(self._unled, self.motion, self._controls, control)
 
     def names(self) -> list[str]:
         """Return the names of all of the model's properties."""

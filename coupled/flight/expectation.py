@@ -31,6 +31,7 @@ Figure = Literal[
     "peak_rate_rad_per_s",
     "peak_load_factor",
     "time_to_attitude_s",
+    "surface_stop_norm",
 ]
 Take = Literal["every", "mean", "lowest", "greatest", "last"]
 Standard = Literal[
@@ -56,6 +57,7 @@ REFERENCE = "rigid"
 
 SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole: a bound of 1 bounds nothing
 RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "hand_travel_norm")
+RELATIVE += ("surface_stop_norm",)
 RELATIVE += ("felt_ratio", "felt_ratio_closed_form")
 _PER_CENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
 

@@ -8,9 +8,10 @@ meets the ground, loses a finite state or is interrupted keeps its record so far
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
+from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
 from coupled.flight.companion import Aboard, Companion
 from coupled.flight.conditions import condition_wrappers
@@ -32,6 +34,7 @@ from coupled.flight.pilot.base import Look, Start
 from coupled.flight.served import Served
 from coupled.record.channels import (
     PRESSURE,
+    SURFACES,
     ControlName,
     record_channels,
 )
@@ -53,6 +56,7 @@ def fly(
     air_m_per_s: Sequence[float] | None = None,
     companion: Companion | None = None,
     hangar: Hangar | None = None,
+    stops: bool = False,
 ) -> Record:
     """Fly a manoeuvre and return its record, SI, one row a frame.
 
@@ -60,7 +64,8 @@ def fly(
     what went in, and under `ended_early` why and when a flight ended before its time.
     `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame. A
     `companion` is called before and after each frame. A `hangar` keeps the aircraft for the next
-    flight, unless its air is given.
+    flight, unless its air is given. With `stops` the manifest says where the surface of the control
+    that the manoeuvre looks at meets its stop, for an aircraft whose surfaces follow directly.
     """
     rig = manoeuvre.rig
     hangar = hangar if air_m_per_s is None else None
@@ -91,9 +96,19 @@ def fly(
         )
     with timed("fly"):
         flight.fly()
+    found = _surface_stops(manoeuvre, airframe) if stops and flight.ended is None else {}
     if hangar is not None and flight.ended is None:
         hangar.take_back(lent)
-    return _flown(manoeuvre, channels, (data[: flight.done], noise), beside, flight.ended)
+    flown = (data[: flight.done], noise)
+    return _flown(manoeuvre, channels, flown, beside, flight.ended, found)
+
+
+def _surface_stops(manoeuvre: Manoeuvre, airframe: Airframe) -> dict[str, Any]:
+    """Return what the manifest says of a surface's stops, found after the last frame."""
+    flown, control = manoeuvre.rig.flight, manoeuvre.control
+    if flown is None or not flown.direct_controls or not isinstance(airframe, JSBSimAirframe):
+        return {}
+    return {"surface_stops": {SURFACES[control]: airframe.surface_stops(control)}}
 
 
 def _looks(
@@ -133,6 +148,7 @@ def _flown(
     beside: tuple[Served, Sequence[tuple[float, ...]]],
     ended: EndedEarly | None,
     first: int = 0,
+    noted: Mapping[str, Any] = MappingProxyType({}),
 ) -> Record:
     """Return the record of the frames flown, with their noise, up to the first without a number.
 
@@ -148,7 +164,7 @@ def _flown(
         channels = (*channels, *properties)
         own = extra[first : first + len(data)]
         data = np.column_stack((data, np.reshape(own, (len(data), -1))))
-    return Record(channels, data, manifest(manoeuvre, channels, data, ended))
+    return Record(channels, data, manifest(manoeuvre, channels, data, ended) | dict(noted))
 
 
 def _finite(

@@ -1,8 +1,10 @@
-"""Where a surface stands for each command, found by flying an aircraft through them."""
+"""Where a surface stands for each command, and where it stops, found by flying an aircraft."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,51 @@ from coupled.flight.wrapper import Motion, Step
 from coupled.record.channels import SURFACES, motion_channels
 
 Floats = NDArray[np.float64]
+_BEYOND = (2.0, 2.5)  # commands about trim that no model follows whose command has an end at ±1
+_SAME_rad = 1e-9  # rounding of a surface's position
+_HALVINGS = 24  # of a command from 0 to 1: to 6e-8
+
+
+@dataclass(frozen=True)
+class SurfaceStop:
+    """Where a surface meets its stop: the command about trim, of ±1, and its position in rad."""
+
+    command_norm: float
+    position_rad: float
+
+
+def stops_found(
+    step: Step, motion: Motion, controls: Sequence[str], control: str
+) -> dict[str, dict[str, Any] | None]:
+    """Return where a control's surface meets its stop on either side, within commands of ±1.
+
+    By the sign of the command, `negative` and `positive`, as JSON takes it; None where it does not.
+    For a surface that follows its command within a frame. A frame each is flown, up to some 50.
+    """
+    surface = f"{SURFACES[control]}_rad"
+    at = motion_channels(controls, flown=True).index(surface)
+    own = [float(each == control) for each in controls]
+
+    def place(command: float) -> float:
+        first, second, third = (*(command * each for each in own), 0.0, 0.0)[:3]
+        step((first, second, third))
+        return motion()[at]
+
+    found: dict[str, dict[str, Any] | None] = {}
+    for name, side in (("negative", -1.0), ("positive", 1.0)):
+        far, farther = (place(side * beyond) for beyond in _BEYOND)
+        found[name] = None
+        if abs(farther - far) > _SAME_rad or abs(place(side) - far) > _SAME_rad:
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            if abs(place(side * middle) - far) <= _SAME_rad:
+                high = middle
+            else:
+                low = middle
+        found[name] = asdict(SurfaceStop(side * high, far))
+    return found
 
 
 def flown_through(

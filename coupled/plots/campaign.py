@@ -19,21 +19,28 @@ _MOST_COLUMNS = 4
 
 
 def draw_sweep(
-    found: pl.DataFrame, keys: Sequence[str], figures: Sequence[str], title: str = ""
+    found: pl.DataFrame,
+    keys: Sequence[str],
+    figures: Sequence[str],
+    title: str = "",
+    remarks: Sequence[str] = (),
 ) -> Figure:
     """Draw up to four figures, a row each; those that do not vary are named in the title.
+
+    So are the `remarks`, sentences on what the figures alone do not show.
 
     A grid over two parameters is drawn as lines or a map. Of any other, up to four parameters
     with numbers have a column each, and a colour stands for a configuration; with a single one,
     for the next parameter's value. The flights that ended early are crosses on the lower edge.
     """
     numeric = [key for key in keys if found[key].dtype.is_numeric()][:_MOST_COLUMNS] or ["flight"]
-    figures, remark = varying(found, figures)
+    figures, still = varying(found, figures)
+    remark = " ".join((f"{still}." if still and remarks else still, *remarks)).strip()
     if is_grid(found, keys, numeric):
-        return draw_grid(found, (numeric[0], numeric[1]), figures, titled(title, remark))
-    width, height = 1.5 + 3.6 * len(numeric), 1.1 + 2.3 * len(figures)
-    drawn = Figure(figsize=(max(width, 5.5), height), layout="constrained")
-    drawn.suptitle(titled(title, remark), fontsize=11)
+        return draw_grid(found, (numeric[0], numeric[1]), figures, (title, remark))
+    width, height = max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures)
+    drawn = Figure(figsize=(width, height), layout="constrained")
+    drawn.suptitle(titled(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
     for row, name in enumerate(figures):
         for column, key in enumerate(numeric):

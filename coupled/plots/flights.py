@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.authority.figures import corrects_nothing, named, remarks
+from coupled.authority.held import true_deflection
 from coupled.campaign.labels import parameter_label
 from coupled.plots.histories import legend_above, plain
 from coupled.record.channels import RATE, channel, unit_of
@@ -28,6 +30,7 @@ _STYLE = {
     "compensated": ("#009e73", "solid", 1.6),
     "calibrated low": ("#e69f00", "dashdot", 1.6),
 }
+_IN_A_ROW, _WIDE = 6, 18  # names in a row of the legend, and letters of one that need more room
 _FELT = 0.01  # of the force: a step below that is felt by no hand
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
@@ -59,9 +62,12 @@ def draw_comparison(flights: Sequence[Flight]) -> Figure:
         if len(cases) > 1:
             grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
     _share_limits(grid[-1])
-    figure.suptitle(_title(flights[0]), fontsize=12)
+    said = [line for each in remarks(flights) for line in _wrapped(each, 65 * columns).split("\n")]
+    figure.suptitle("\n".join([_title(flights[0]), *said]), fontsize=9 if said else 12)
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9)
+    wide = max(map(len, labels)) > _WIDE or len(labels) > _IN_A_ROW
+    ncols = _IN_A_ROW // 2 if wide else _IN_A_ROW
+    figure.legend(handles, labels, loc="outside lower center", ncols=ncols, fontsize=9)
     return figure
 
 
@@ -104,9 +110,9 @@ def _share_limits(row: Sequence[Any]) -> None:
         axes.set_ylim(low, high)
 
 
-def _line(configuration: str) -> dict[str, Any]:
-    color, style, width = _STYLE[configuration]
-    return {"color": color, "linestyle": style, "linewidth": width, "label": configuration}
+def _line(flight: Flight) -> dict[str, Any]:
+    color, style, width = _STYLE[flight.configuration]
+    return {"color": color, "linestyle": style, "linewidth": width, "label": named(flight)}
 
 
 def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
@@ -119,17 +125,22 @@ def _show_from_the_pull(axes: Any, case: Sequence[Flight]) -> None:
 
 
 def _draw_surface(axes: Any, case: Sequence[Flight]) -> None:
-    """Surface command about trim, against what the pilot's deflection asks for."""
+    """Surface command about trim, against what the pilot's deflection asks for, and its stop."""
     control = case[0].manoeuvre.control
     data = case[0].manoeuvre.rig.controls[control]
     sign = COMMAND_SIGN[data.surface]
     for flight in case:
         record = flight.record
         moved = 100.0 * sign * record[channel(control, "surface_norm")]
-        axes.plot(record.time_s, moved, **_line(flight.configuration))
+        axes.plot(record.time_s, moved, **_line(flight))
     record = case[-1].record
-    asked = 100.0 * np.clip(record[channel(control, "deflection")] / data.travel, -1.0, 1.0)
+    deflection = true_deflection(case[-1].manoeuvre.rig, control, record)
+    asked = 100.0 * np.clip(deflection / data.travel, -1.0, 1.0)
     axes.plot(record.time_s, asked, color="0.65", linewidth=3.5, zorder=0, label="asked, specified")
+    stop = next((s for f in case if (s := f.outcome.surface_stop_norm) is not None), None)
+    if stop is not None:
+        label = f"{data.surface} at its stop"
+        axes.axhline(100.0 * sign * stop, color="#cc0000", linestyle="dotted", label=label)
     axes.set_xlabel("time, s")
     _show_from_the_pull(axes, case)
     axes.set_ylabel(f"{data.surface} command, % of travel")
@@ -140,14 +151,14 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
     drawn = case[0].manoeuvre.measure.drawn
     if drawn is not None:
         for flight in case:
-            axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight.configuration))
+            axes.plot(flight.record.time_s, flight.record[drawn], **_line(flight))
         axes.set_xlabel("time, s")
         axes.set_ylabel(parameter_label(drawn))
         return
     name = RATE[case[0].manoeuvre.control]
     for flight in case:
         rate = flight.record[name] / DEGREE_rad
-        axes.plot(flight.record.time_s, rate, **_line(flight.configuration))
+        axes.plot(flight.record.time_s, rate, **_line(flight))
     axes.set_xlabel("time, s")
     _show_from_the_pull(axes, case)
     axes.set_ylabel(f"{name.removesuffix('_rad_per_s').replace('_', ' ')}, °/s")
@@ -158,11 +169,11 @@ def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
     control = case[0].manoeuvre.control
     scale, unit = (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
     for flight in case:
-        deflection = flight.record[channel(control, "deflection")]
+        deflection = true_deflection(flight.manoeuvre.rig, control, flight.record)
         force = flight.record[channel(control, "hand_force")]
-        axes.plot(scale * deflection, force, **_line(flight.configuration))
+        axes.plot(scale * deflection, force, **_line(flight))
     record = case[0].record
-    deflection = record[channel(control, "deflection")]
+    deflection = true_deflection(case[0].manoeuvre.rig, control, record)
     peak = int(np.argmax(np.abs(deflection)))
     line = np.linspace(0.0, deflection[peak], 50)
     pressure = float(record["dynamic_pressure_Pa"][peak])
@@ -194,6 +205,13 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
                 fontsize=7,
             )
     names = [_SHORT[list(_STYLE).index(o.configuration)] for o in outcomes]
+    names = [
+        f"{name}\nK̂ = 0" if corrects_nothing(flight) else name
+        for name, flight in zip(names, case, strict=True)
+    ]
+    if all(o.loader_rests for o in outcomes):
+        axes.text(0.5, 0.5, "the loader does not move", ha="center", transform=axes.transAxes)
+        axes.set_xlim(-0.5, len(outcomes) - 0.5)
     axes.set_xticks(places, names, fontsize=8)
     axes.margins(y=0.18)
     axes.set_ylim(bottom=min(0.0, *lost, *soft))

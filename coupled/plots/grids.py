@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from coupled.campaign.entry import AS_FILED
 from coupled.campaign.labels import parameter_label
 from coupled.plots.histories import plain
-from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of
+from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
 
 _MOST_LINES = 8
 _MARKS = "os^Dv<>p"
@@ -29,15 +29,19 @@ def is_grid(found: pl.DataFrame, keys: Sequence[str], numeric: Sequence[str]) ->
 
 
 def draw_grid(
-    found: pl.DataFrame, keys: tuple[str, str], figures: Sequence[str], title: str
+    found: pl.DataFrame, keys: tuple[str, str], figures: Sequence[str], heading: tuple[str, str]
 ) -> Figure:
-    """Draw a row a figure, a column a configuration; the longer parameter along the bottom."""
+    """Draw a row a figure, a column a configuration; the longer parameter along the bottom.
+
+    `heading` is the title, and a remark below it.
+    """
     along, other = sorted(keys, key=lambda key: -found[key].n_unique())
     configurations = found["configuration"].unique(maintain_order=True).to_list()
     size = (max(1.6 + 3.1 * len(configurations), 6.0), 1.5 + 2.4 * len(figures))
     drawn = Figure(figsize=size, layout="constrained")
     as_lines = found[other].n_unique() <= _MOST_LINES
     ended = not as_lines and bool((found["ended_early"] != "").any())
+    title = titled(*heading, size[0])
     drawn.suptitle(f"{title}\ngray: ended early" if ended else title, fontsize=11)
     panels = drawn.subplots(
         len(figures), len(configurations), squeeze=False, sharex=True, sharey="row"

@@ -20,4 +20,4 @@ def draw_result(found: SweepResult) -> Figure:
     if found.limits:
         return draw_survival(asked.name, found.numeric_keys[0], found.limits)
     title = f"{asked.name}: flights of {Path(asked.run).stem}"
-    return draw_sweep(found.table, found.plan.keys, asked.keep, title)
+    return draw_sweep(found.table, found.plan.keys, asked.keep, title, found.remarks)

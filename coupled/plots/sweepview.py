@@ -16,6 +16,7 @@ from coupled.plots.histories import plain
 
 Floats = NDArray[np.float64]
 MOST_ROWS = 4
+_LETTERS_PER_INCH = 12.0  # of a title in 11 points, at the least
 _STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic's own
 _EVEN = 1e-3  # of a step, by which steps differ that are taken as even
 _WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
@@ -31,6 +32,7 @@ LABELS = {
     "peak_rate_rad_per_s": ("peak rate, rad/s", 1.0),
     "peak_load_factor": ("peak load factor", 1.0),
     "time_to_attitude_s": ("time to attitude, s", 1.0),
+    "surface_stop_norm": ("surface at its stop, % of travel", 100.0),
 }
 
 
@@ -75,9 +77,10 @@ def varying(found: pl.DataFrame, figures: Sequence[str]) -> tuple[list[str], str
     return drawn[:MOST_ROWS], remark
 
 
-def titled(title: str, remark: str, width: int = 90) -> str:
-    """Return a figure's title, with a remark on lines of its own."""
-    return "\n".join([plain(title), *textwrap.wrap(plain(remark), width)]).strip("\n")
+def titled(title: str, remark: str, width_in: float) -> str:
+    """Return the title of a figure so many inches wide, with a remark on lines of its own."""
+    letters = int(_LETTERS_PER_INCH * width_in)
+    return "\n".join([plain(title), *textwrap.wrap(plain(remark), letters)]).strip("\n")
 
 
 def is_logarithmic(values: Floats) -> bool:

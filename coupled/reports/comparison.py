@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from coupled.authority.compare import Flight
-from coupled.authority.figures import further, rows
+from coupled.authority.figures import named, remarks, rows
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.plots.flights import draw_comparison
 from coupled.plots.saving import svg_text
@@ -40,7 +40,7 @@ def comparison_report(flights: Sequence[Flight], made: Made) -> Report:
 
 
 def _table(case: Sequence[Flight], by_case: bool) -> Table:
-    heads = [f.outcome.case if by_case else f.configuration for f in case]
+    heads = [f.outcome.case if by_case else named(f) for f in case]
     body = tuple((label, *cells) for label, cells in rows(case))
     return Table(("", *heads), body)
 
@@ -52,16 +52,13 @@ def _verdict(flights: Sequence[Flight]) -> Verdict:
         if configuration == "rigid":
             continue
         ours = [f.outcome for f in flights if f.configuration == configuration]
-        lost.append(f"{configuration} {_span([100.0 * o.loss for o in ours], 1)} %")
-        felt.append(f"{configuration} {_span([o.felt_ratio for o in ours], 3)}")
+        shown = named(next(f for f in flights if f.configuration == configuration))
+        lost.append(f"{shown} {_span([100.0 * o.loss for o in ours], 1)} %")
+        felt.append(f"{shown} {_span([o.felt_ratio for o in ours], 3)}")
     run = flights[0].manoeuvre
-    by_case = {
-        f.outcome.case: [g for g in flights if g.outcome.case == f.outcome.case] for f in flights
-    }
-    why = next(filter(None, map(further, by_case.values())), "")
-    remarks = [
+    said_beside = [
         f"Felt of the specified gradient: {', '.join(felt)}.",
-        why,
+        *remarks(flights),
         " ".join(run.card.split()),
     ]
     ended = [
@@ -70,7 +67,7 @@ def _verdict(flights: Sequence[Flight]) -> Verdict:
         if f.ended_early
     ]
     said = f"Authority lost: {', '.join(lost)}."
-    return Verdict(said, "bad" if ended else "plain", tuple(filter(None, [*ended, *remarks])))
+    return Verdict(said, "bad" if ended else "plain", tuple(filter(None, [*ended, *said_beside])))
 
 
 def _span(values: Iterable[float], decimals: int) -> str:

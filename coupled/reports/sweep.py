@@ -48,7 +48,7 @@ def _verdict(found: SweepResult) -> Verdict:
     keys = len(found.plan.keys)
     over = f"{keys} parameters" if keys > 1 else "one parameter"
     said = f"{len(found.table)} flights over {over}, {ended} ended early."
-    remarks = []
+    remarks = list(found.remarks)
     for limit in found.limits:
         where = "" if limit.boundary is None else f", the boundary at {limit.boundary:.4g}"
         text = f"{limit.survived} of {limit.flights} survived{where}"

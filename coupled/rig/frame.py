@@ -26,7 +26,7 @@ from coupled.rig.modification import (
     modifying_force,
     set_gradients,
 )
-from coupled.rig.reach import free
+from coupled.rig.reach import free, stop_again
 from coupled.rig.schedule import gradients, read_pressure
 from coupled.rig.sensing import converted, read_computed, read_force
 from coupled.rig.services import asked_of_surface, begin_services, note_services
@@ -36,6 +36,7 @@ Floats = NDArray[np.float64]
 
 # What the kernel records of each control, in this order; `record` names the channels.
 CHANNELS_PER_CONTROL = 10
+_ROUNDS = 24  # in which grips at their reach settle: terms of half the bends leave 1e-14 of a step
 
 
 @stage
@@ -173,8 +174,27 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
             leak_from_others(controls, i, script, node)
             scripted = only_scripted(p.hand) and p.reach.reach == 0.0
             run_node(p, s, script[i, 0], script[i, 1], begun, node, scripted)
+    settle_others(controls)
+
+
+@seldom
+def settle_others(controls: ControlArray) -> None:
+    """Let the controls of one structure stand as all forces at the frame's end have them.
+
+    A grip at its reach is stopped again, which changes its force and so the others' place: rounds
+    of Gauss and Seidel, which converge for every structure that takes work.
+    """
+    reaches = False
     for i in range(len(controls)):
         bend_by_others(controls, i)
+        reaches = reaches or controls[i].parameters.reach.reach > 0.0
+    for _ in range(_ROUNDS if reaches else 0):
+        for i in range(len(controls)):
+            p, s = controls[i].parameters, controls[i].state
+            bend_by_others(controls, i)
+            if p.reach.reach > 0.0:
+                at = s.loader.computed
+                stop_again(p.reach, s.reach, p.linkage, s.linkage, s.hand, at)
 
 
 @seldom

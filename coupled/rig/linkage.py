@@ -229,19 +229,6 @@ def pressed(p: LinkageParameters, force: float) -> float:
 
 
 @stage
-def loaded(p: LinkageParameters, force: float) -> float:
-    """Return how far the grip is ahead of the servo under a force that rose slowly, d.
-
-    The bend on the loading branch of its hysteresis, and a soft play.
-    """
-    bent = bend(p, force)
-    if p.share > 0.0:
-        carried = math.copysign(max(abs(force) - 0.5 * p.width, 0.0), force)
-        bent += p.share * (bend(p, carried) - bent)
-    return bent + pressed(p, force)
-
-
-@stage
 def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
     """Begin at rest under the force at the first node, N."""
     half = 0.5 * p.width

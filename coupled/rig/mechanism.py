@@ -18,7 +18,7 @@ from coupled.rig.inertia import lead_force
 from coupled.rig.linkage import carry, move_linkage
 from coupled.rig.loader import move_loader, set_external
 from coupled.rig.modification import exchange_last
-from coupled.rig.reach import bounds, seated, set_reach, stop_linkage, within_reach
+from coupled.rig.reach import bounds, seated, set_reach, stop_grip, stop_linkage, within_reach
 from coupled.rig.sensing import sample
 from coupled.rig.services import serve, set_base
 
@@ -66,7 +66,8 @@ def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bo
         set_base(s.services, s.loader)
     stopped = p.reach.reach > 0.0
     if stopped:
-        set_reach(p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage)
+        stages = (p.loader, p.friction, s.modification, s.loader, p.linkage, s.linkage)
+        set_reach(p.reach, s.reach, *stages)
     if p.sensing.skewed:
         sample_channels(p, s, p.clock.substeps, True)
     if p.modification.late > 0:
@@ -118,6 +119,8 @@ def run_node(
         set_hand(p, s, force[node], held[node], rate)
     if p.linkage.carries:
         carry(p.linkage, s.linkage, s.hand.force, h)
+        if stopped:
+            stop_grip(p.reach, p.linkage, s.linkage, s.hand.force)
     if p.sensing.skewed:
         sample_channels(p, s, first_node + p.clock.substeps - node, False)
 

@@ -1,16 +1,22 @@
 """The reach of a hand: a stop at the grip, where the limb is straight or the column meets the cab.
 
-The grip at δ = ±r stops the whole chain behind it, inelastically: loader and servo go no
-further than the place x at which the grip, under the force that moves it there slowly, stands at
-the reach,
+The grip at δ = ±r stops the whole chain behind it, inelastically. Loader and servo go no further
+than the place x at which the grip, under the force that moves it there slowly, stands at the reach:
 
-    x + bend(F_x) = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
+    x + yields(F_x) + others = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
 
-and are located there as at the loader's own stops. What stops their masses is an impulse,
-which is not in the force of a node. The stop takes what a hand asks for beyond the force that
-bends the structure to the reach; of a rigid structure, beyond F_x once δc is at x:
+`yields` is all that lies between servo and grip: the bend, as its hysteresis stands at the frame,
+and a play whose contact yields; `others` is what the forces on other controls bend here. Loader and
+servo are stopped there as at the loader's own stops. What stops their masses is an impulse, which
+is not in the force of a node.
 
-    grip + bend(F) ≤ r
+The stop takes what a hand asks for beyond the force at which the grip stands at the reach,
+
+    at + yields(F) + others ≤ r,     at = the servo's side
+
+and of a linkage that does not yield, beyond F_x once δc is at x. What does not follow the force at
+once (a structure with mass, a soft play behind its damper) is stopped where δ = r: it goes no
+further, and a structure with mass keeps no speed outward.
 
 Where x moves inward, as the gradient rises with q̄, the stop takes more by the same rule, and the
 loader follows by its own motion. So δ does not pass r by more than rounding, whatever is asked
@@ -25,12 +31,21 @@ from typing import Protocol
 from coupled.rig.compiled import layout, seldom, stage
 from coupled.rig.declaration import Declaration
 from coupled.rig.friction import FrictionParameters, more_friction
-from coupled.rig.linkage import LinkageParameters, LinkageState, bend, bend_slope
+from coupled.rig.hand import HandState
+from coupled.rig.linkage import (
+    LinkageParameters,
+    LinkageState,
+    deflection,
+    pressed,
+    static_slope,
+    still,
+)
 from coupled.rig.loader import LoaderParameters, LoaderState
 from coupled.rig.modification import ModificationState, slope, smooth_force
 from coupled.rig.springs import limited, spring, spring_slope
 
 _ITERATIONS = 40
+_HALVINGS = 64  # to the last digit of a double
 _SEAT = 1e-12  # of a deflection: rounding
 _NO_FORCE = 1e30  # N: no force brings the grip to its reach
 
@@ -81,6 +96,7 @@ def _place(
     m: ModificationState,
     s: LoaderState,
     linkage_p: LinkageParameters,
+    linkage: LinkageState,
 ) -> tuple[float, float]:
     """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
     low, high = 0.0, p.aft if side > 0.0 else p.forward
@@ -92,20 +108,24 @@ def _place(
         at = x - side * s.neutral
         force = level + side * spring(p, side * at) + limited(p, smooth_force(m, at))
         force /= 1.0 - friction.by_load
-        over = x + bend(linkage_p, force) - r
+        ahead = still(linkage_p, linkage, side * force) + pressed(linkage_p, side * force)
+        over = x + side * (ahead + linkage.others) - r
         if over > 0.0:
             high = x
         else:
             low = x
         stiffness = (spring_slope(p, side * at) + slope(m, at)) / (1.0 - friction.by_load)
-        rise = 1.0 + bend_slope(linkage_p, force) * stiffness
+        slope_of_yield = static_slope(linkage_p, side * force)
+        if linkage_p.contact > 0.0:
+            slope_of_yield += 1.0 / linkage_p.contact
+        rise = 1.0 + slope_of_yield * stiffness
         after = x - over / rise if rise > 0.0 else 0.5 * (low + high)
         if not low <= after <= high:
             after = 0.5 * (low + high)
         if abs(after - x) <= 1e-14 * r:
             break
         x = after
-    return x, force if x >= r else _NO_FORCE
+    return x, force
 
 
 @stage
@@ -123,11 +143,19 @@ def set_reach(
     m: ModificationState,
     loader: LoaderState,
     linkage_p: LinkageParameters,
+    linkage: LinkageState,
 ) -> None:
     """Find where the grip stands at its reach with a frame's gradients and external force."""
-    stop.top, stop.top_force = _place(p.reach, 1.0, loader_p, friction, m, loader, linkage_p)
-    size, force = _place(p.reach, -1.0, loader_p, friction, m, loader, linkage_p)
+    r = p.reach
+    stop.top, stop.top_force = _place(r, 1.0, loader_p, friction, m, loader, linkage_p, linkage)
+    size, force = _place(r, -1.0, loader_p, friction, m, loader, linkage_p, linkage)
     stop.bottom, stop.bottom_force = -size, -force
+
+
+@stage
+def _dragged(p: LinkageParameters) -> float:
+    """Return by how much the servo may be ahead of the grip, d: half of a play that is rigid."""
+    return 0.0 if p.contact > 0.0 else 0.5 * p.play
 
 
 @stage
@@ -144,7 +172,7 @@ def bounds(
     """
     if p.reach == 0.0:
         return -loader_p.forward, loader_p.aft
-    half = 0.5 * linkage_p.play
+    half = _dragged(linkage_p)
     low = max(-loader_p.forward, min(stop.bottom - half, computed))
     return low, min(loader_p.aft, max(stop.top + half, computed))
 
@@ -154,22 +182,77 @@ def stop_linkage(
     stop: ReachState, p: LinkageParameters, s: LinkageState, position: float, grip: float
 ) -> None:
     """Stop servo and grip where the reach stops them; `position` and `grip` are those before."""
-    half = 0.5 * p.play
+    half = _dragged(p)
     top, bottom = max(stop.top + half, position), min(stop.bottom - half, position)
     if s.position > top:
         s.position, s.rate = top, min(s.rate, 0.0)
     elif s.position < bottom:
         s.position, s.rate = bottom, max(s.rate, 0.0)
-    s.grip = min(max(s.grip, min(stop.bottom, grip)), max(stop.top, grip))
+    if p.contact > 0.0:
+        s.grip = s.position + s.touch
+    else:
+        s.grip = min(max(s.grip, min(stop.bottom, grip)), max(stop.top, grip))
 
 
 @stage
 def seated(stop: ReachState, p: LinkageParameters, computed: float) -> int:
     """Tell on which side δc stands where the reach stops it, or 0."""
-    half = 0.5 * p.play
+    half = _dragged(p)
     if abs(computed - (stop.top + half)) <= _SEAT * abs(computed):
         return 1
     return -1 if abs(computed - (stop.bottom - half)) <= _SEAT * abs(computed) else 0
+
+
+@seldom
+def _brought(p: LinkageParameters, s: LinkageState, by: float, side: float) -> float:
+    """Return the greatest force to a side, N, that takes the grip no further than `by`, d.
+
+    By halving: the bend, as its hysteresis now stands, and a soft play at rest rise with the force.
+    """
+    if p.contact > 0.0:
+        widest = p.contact * (abs(by) + 0.5 * p.play)
+        inner, outer = -side * widest, side * widest
+    else:
+        middle, half = unbent(p, by), 0.5 * p.width
+        if abs(middle) >= _NO_FORCE:
+            return middle
+        inner, outer = middle - side * half, middle + side * half
+    for _ in range(_HALVINGS):
+        force = 0.5 * (inner + outer)
+        if side * (still(p, s, force) + pressed(p, force) - by) > 0.0:
+            outer = force
+        else:
+            inner = force
+    return inner
+
+
+@seldom
+def _most(
+    p: ReachParameters,
+    stop: ReachState,
+    linkage_p: LinkageParameters,
+    linkage: LinkageState,
+    computed: float,
+    side: float,
+) -> float:
+    """Return the force to a side, N, beyond which the stop takes what is asked for."""
+    outward, inward = linkage_p.bend, linkage_p.push
+    if side < 0.0:
+        outward, inward = inward, outward
+    if outward == 0.0 and linkage_p.contact == 0.0:
+        at, force = stop.top, stop.top_force
+        if side < 0.0:
+            at, force = stop.bottom, stop.bottom_force
+        if side * seated(stop, linkage_p, computed) <= 0.0 or side * at < p.reach:
+            return side * _NO_FORCE
+        return force
+    servo = linkage.position if linkage_p.contact > 0.0 else linkage.grip
+    by = side * p.reach - (servo + linkage.others)
+    if side * by < 0.0 and inward == 0.0 and linkage_p.contact == 0.0:
+        return 0.0  # it stands beyond, and no force bends it back
+    if linkage_p.share > 0.0 or linkage_p.contact > 0.0:
+        return _brought(linkage_p, linkage, by, side)
+    return unbent(linkage_p, by)
 
 
 @stage
@@ -182,10 +265,36 @@ def within_reach(
     asked: float,
 ) -> float:
     """Return the force of one asked for, N, that the stop leaves on the grip."""
-    if linkage_p.bend > 0.0:
-        at = linkage.grip + linkage.others
-        return max(min(asked, unbent(linkage_p, p.reach - at)), unbent(linkage_p, -p.reach - at))
-    side = seated(stop, linkage_p, computed)
-    if side == 0:
-        return asked
-    return min(asked, stop.top_force) if side > 0 else max(asked, stop.bottom_force)
+    top = _most(p, stop, linkage_p, linkage, computed, 1.0)
+    return max(min(asked, top), _most(p, stop, linkage_p, linkage, computed, -1.0))
+
+
+@seldom
+def stop_grip(p: ReachParameters, linkage_p: LinkageParameters, s: LinkageState, f: float) -> None:
+    """Stop at the reach what has not followed the force at once; F at the node in N."""
+    if not (linkage_p.modal or linkage_p.contact > 0.0):
+        return
+    at = deflection(linkage_p, s, f)
+    over = at - min(max(at, -p.reach), p.reach)
+    if over == 0.0:
+        return
+    if linkage_p.modal:
+        s.bent -= over
+        s.bent_rate = min(s.bent_rate, 0.0) if over > 0.0 else max(s.bent_rate, 0.0)
+    else:
+        s.touch -= over
+        s.grip = s.position + s.touch
+
+
+@seldom
+def stop_again(
+    p: ReachParameters,
+    stop: ReachState,
+    linkage_p: LinkageParameters,
+    linkage: LinkageState,
+    hand: HandState,
+    computed: float,
+) -> None:
+    """Stop a grip at its reach that the other controls' forces have moved since its node."""
+    hand.force = within_reach(p, stop, linkage_p, linkage, computed, hand.force)
+    stop_grip(p, linkage_p, linkage, hand.force)

@@ -1,34 +1,52 @@
 """The rig at rest: force, deflection and what the host makes of it, in closed form.
 
 With breakout, two segments and a stiffening bend, along δc: the balance of the loader gives
-F(δc) = F_BO + F_L + k₃·δc³ + F_mod, which is eq. (9) solved for F; the structure δ = δc + bend(F).
-Friction is left out: it is a band about this line, and so is the bend's hysteresis, whose
-middle is here. `equations` has the linear case. Forces that other controls' pilots hold bend a
-common structure: δ = δc + bend(F) + Σ_j K_ij·F_j, and δ̂ has the host's K̂_ij·F_j in it. The line
-is drawn by the stages that fly, in one kernel that is kept on disk.
+
+    F(δc) = F_BO + F_L + k₃·δc³ + ripple + F_mod − F_offset + b·(n_z − 1) − Σ_j leak_j·F_j
+
+which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a play whose contact yields
++ sgn(F)·play/2 + F/k. F_mod is what the multiplier makes: of δc with an analog one, of δc as the
+host reads it with a digital one. The schedule has the q̄ that it gets, drifts stand as at `time_s`.
+
+The law is set-valued where something holds the loader still. At neutral it rests in its breakout
+under any F between F(0−) and F(0+); at its stop under any F beyond F(travel).
+
+Left out is what is a band about this line: friction, the bend's hysteresis, whose middle is here,
+and a play that the servo takes along, half of its width to either side. `equations` has the linear
+case. Forces that other controls' pilots hold bend a common structure: δ = δc + bend(F) + Σ_j
+K_ij·F_j, and δ̂ has the host's K̂_ij·F_j in it. The line is drawn by the stages that fly, in one
+kernel that is kept on disk.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.record.channels import ControlName
 from coupled.rig.compensation import estimate
-from coupled.rig.compiled import entry, stage
+from coupled.rig.compiled import entry, seldom, stage
 from coupled.rig.control import ControlArray, ControlParameters, ControlState
+from coupled.rig.crossing import leaks
 from coupled.rig.equations import basic_force, specified_force
-from coupled.rig.linkage import bend
-from coupled.rig.modification import modifying_force, set_gradients
+from coupled.rig.linkage import LinkageParameters, bend, pressed
+from coupled.rig.modification import set_gradients, smooth_force
 from coupled.rig.packing import crossed_bends, pack
 from coupled.rig.rig import Rig
 from coupled.rig.schedule import gradients
+from coupled.rig.sensing import converted, scale_at
 from coupled.rig.springs import limited, ripple
+from coupled.rig.surface import asked_command
 
 Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
+
+
+_HALVINGS = 200  # from the widest force to the last digit of a double, and more
 
 
 @dataclass(frozen=True)
@@ -36,23 +54,42 @@ class Statics:
     """The static line of one control at one dynamic pressure; arrays of one shape.
 
     `computed` δc, `deflection` δ and `estimate` δ̂ in d, `force` F and `specified` (what the
-    pilot should feel at that δ) in N.
+    pilot should feel at that δ) in N; `command` of the surface about trim, in ±1.
     """
 
     computed: Floats
     force: Floats
     deflection: Floats
     estimate: Floats
+    command: Floats
     specified: Floats
 
 
-def crossed(rig: Rig, control: str, others_N: Mapping[str, float]) -> tuple[float, float]:
-    """Return what the others' forces bend at a control, and what its host adds for them, d."""
+@dataclass(frozen=True)
+class Others:
+    """What the forces held on other controls do at one control.
+
+    They bend it by `bent`, its host adds `added` for them, both in d, and `leaked` of them, N,
+    reaches its loader.
+    """
+
+    bent: float
+    added: float
+    leaked: float
+
+
+def crossed(rig: Rig, control: str, others_N: Mapping[str, float]) -> Others:
+    """Return what the forces held on other controls, {control: N}, do at a control."""
     names = [str(name) for name in rig.controls]
     bends, assumed = crossed_bends(rig, control, names)
     force = np.array([others_N.get(name, 0.0) for name in names])
     scale = np.array([data.sensing.force_scale for data in rig.controls.values()])
-    return float(bends @ force), float(assumed @ (scale * force))
+    zero = np.array([data.sensing.force_zero for data in rig.controls.values()])
+    share = np.array(
+        leaks(control, rig.controls[cast(ControlName, control)].loader.crosstalk, names)
+    )
+    read = scale * force + zero
+    return Others(float(bends @ force), float(assumed @ read), float(share @ force))
 
 
 def static_line(
@@ -67,7 +104,11 @@ def static_line(
     `others_N` are the forces held on other controls, {control: N}.
     """
     others = crossed(rig, control, others_N or {})
-    return _line(rig, control, pressure_Pa, pack(rig, only=control), computed, others)
+    packed = pack(rig, only=control)
+    at = np.ascontiguousarray(computed, dtype=np.float64)
+    force = np.empty(len(at))
+    _along(packed, float(pressure_Pa), others.leaked, at, force)
+    return _line(rig, control, pressure_Pa, packed, 0, at, force, others)
 
 
 def static_point(
@@ -76,15 +117,23 @@ def static_point(
     pressure_Pa: float,
     deflection: float,
     others_N: Mapping[str, float] | None = None,
+    time_s: float = 0.0,
+    load_factor: float = 1.0,
 ) -> Statics:
-    """Return the point of the static line at which the grip stands at δ in d (not zero).
+    """Return the point of the static line at which the grip stands at δ in d.
 
-    Not where the others' forces alone bring it: there this control has no force.
+    Where the loader rests in its breakout, or at its stop, it is moved by the structure alone.
+    On a rigid structure δ is not to be zero. `time_s` since the start is the time at which drifts
+    of scale and multiplier stand; `load_factor` in g, +1 in level flight, acts on a bob weight.
     """
-    packed = pack(rig, only=control)
+    packed, frame = pack(rig, only=control), round(time_s * rig.frame_rate)
+    packed["state"]["modification"]["frames"] = frame
     others = crossed(rig, control, others_N or {})
-    computed = _computed_at(packed, float(pressure_Pa), float(deflection) - others[0])
-    return _line(rig, control, pressure_Pa, packed, np.array([computed]), others)
+    wanted = float(deflection) - others.bent
+    weight = rig.controls[cast(ControlName, control)].loader.bob_weight * (load_factor - 1.0)
+    found = _point_at(packed, float(pressure_Pa), others.leaked - weight, wanted)
+    computed, force = (np.array([value]) for value in found)
+    return _line(rig, control, pressure_Pa, packed, frame, computed, force, others)
 
 
 def _line(
@@ -92,60 +141,145 @@ def _line(
     control: str,
     pressure_Pa: float,
     packed: ControlArray,
+    frame: int,
     computed: Floats,
-    others: tuple[float, float],
+    force: Floats,
+    others: Others,
 ) -> Statics:
     out = np.empty((3, len(computed)))
-    _along(packed, float(pressure_Pa), np.ascontiguousarray(computed, dtype=np.float64), out)
-    out[1] += others[0]
-    out[2] += others[1]
-    force, deflection, estimates = out
+    beside = (others.bent, others.added)
+    _made_of(packed, float(pressure_Pa), frame, computed, force, beside, out)
+    deflection, estimates, commands = out
     wanted = specified_force(rig, control, pressure_Pa, deflection)
-    return Statics(computed, force, deflection, estimates, wanted)
+    return Statics(computed, force, deflection, estimates, commands, wanted)
 
 
 @stage
-def _force(p: ControlParameters, s: ControlState, computed: float) -> float:
-    """Return F in N at δc = `computed` d, which is not zero."""
-    breakout = p.loader.breakout if computed > 0.0 else -p.loader.breakout
-    spring = loader_force(p.loader.basic_gradient, computed) + p.loader.cubic * computed**3
-    given = limited(p.loader, modifying_force(s.modification, computed))
-    return breakout + spring + ripple(p.loader, computed) + given
+def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
+    """Set the modification of the frame that the state has; return δc as read over δc."""
+    m, sensing = s.modification, p.sensing
+    read = scale_at(sensing, m.frames)
+    first, second = gradients(p.schedule, p.schedule.pressure_scale * pressure)
+    set_gradients(p.modification, m, first, second)
+    if p.modification.digital == 0:
+        m.first = converted(m.first, sensing.gradient_step, sensing.gradient_range)
+        m.second = converted(m.second, sensing.gradient_step, sensing.gradient_range)
+    return read
+
+
+@stage
+def _force(
+    p: ControlParameters, s: ControlState, computed: float, read: float, side: float
+) -> float:
+    """Return F in N at δc in d, past the breakout to a side; the host reads δc times `read`."""
+    m, most = s.modification, p.sensing.product_range
+    force = side * p.loader.breakout + loader_force(p.loader.basic_gradient, computed)
+    force += p.loader.cubic * computed**3 + ripple(p.loader, computed) - p.loader.offset
+    if p.modification.digital:
+        product = smooth_force(m, read * computed) + side * m.breakout
+        if most > 0.0:
+            product = min(max(product, -most), most)
+        return force + limited(p.loader, product)
+    if p.loader.held:
+        return force + limited(p.loader, smooth_force(m, computed) + side * m.breakout)
+    return force + side * m.breakout + limited(p.loader, smooth_force(m, computed))
+
+
+@stage
+def _yields(p: LinkageParameters, force: float) -> float:
+    """Return how far the grip is ahead of δc under a force in N, d."""
+    return bend(p, force) + pressed(p, force)
 
 
 @entry
-def _along(controls: ControlArray, pressure: float, computed: Floats, out: Floats) -> None:
-    """Write F in N, δ and δ̂ in d, shape (3, n), at each δc."""
+def _along(
+    controls: ControlArray, pressure: float, leaked: float, computed: Floats, out: Floats
+) -> None:
+    """Write F in N at each δc, shape (n,), where others' forces leak so much into the loader, N."""
     p, s = controls[0].parameters, controls[0].state
-    first, second = gradients(p.schedule, pressure)
-    set_gradients(p.modification, s.modification, first, second)
+    read = _set(p, s, pressure)
     for i in range(len(computed)):
-        x = computed[i]
-        force = _force(p, s, x)
-        out[0, i] = force
-        out[1, i] = x + bend(p.linkage, force)
-        read, force_read = p.sensing.read_scale * x, p.sensing.force_scale * force
-        out[2, i] = estimate(p.compensation, read, force_read + p.sensing.force_zero)
+        side = 1.0 if computed[i] > 0.0 else -1.0
+        out[i] = _force(p, s, computed[i], read, side) - leaked
 
 
 @entry
-def _computed_at(controls: ControlArray, pressure: float, deflection: float) -> float:
-    """Return the δc in d at which the grip stands at δ, to the last digit, by bisection.
+def _made_of(
+    controls: ControlArray,
+    pressure: float,
+    frame: int,
+    computed: Floats,
+    force: Floats,
+    beside: tuple[float, float],
+    out: Floats,
+) -> None:
+    """Write δ and δ̂ in d and the surface's command, shape (3, n), of each δc and F.
 
-    δc has δ's sign and is no larger; a breakout may hold the loader at neutral.
+    `beside` is what other controls' forces bend here, and what the host adds for them, d.
+    """
+    p = controls[0].parameters
+    read = scale_at(p.sensing, frame)
+    for i in range(len(computed)):
+        out[0, i] = computed[i] + _yields(p.linkage, force[i]) + beside[0]
+        force_read = p.sensing.force_scale * force[i] + p.sensing.force_zero
+        made = estimate(p.compensation, read * computed[i], force_read) + beside[1]
+        out[1, i] = made
+        out[2, i] = asked_command(p.surface, made, pressure) + p.surface.offset
+
+
+@seldom
+def _force_for(p: LinkageParameters, by: float, low: float, high: float) -> float:
+    """Return the F in N between two at which the grip is so far ahead of δc, d; the nearer end."""
+    if _yields(p, high) <= by:
+        return high
+    if _yields(p, low) >= by:
+        return low
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return middle
+        if _yields(p, middle) < by:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@entry
+def _point_at(
+    controls: ControlArray, pressure: float, leaked: float, deflection: float
+) -> tuple[float, float]:
+    """Return the δc in d and the F in N at which the grip stands at δ, by bisection of δc.
+
+    Where the loader is held still, at neutral or at its stop, the structure alone gives F.
     """
     p, s = controls[0].parameters, controls[0].state
-    first, second = gradients(p.schedule, pressure)
-    set_gradients(p.modification, s.modification, first, second)
-    size = abs(deflection)
-    near, far = 1e-9, 1.0  # shares of δ
-    middle = near
+    read = _set(p, s, pressure)
+    up = _force(p, s, 0.0, read, 1.0) - leaked
+    down = _force(p, s, 0.0, read, -1.0) - leaked
+    side = 1.0
+    if deflection <= _yields(p.linkage, up):
+        if deflection >= _yields(p.linkage, down):
+            return 0.0, _force_for(p.linkage, deflection, down, up)
+        side = -1.0
+    near, far = 0.0, p.loader.travel
+    stopped = _force(p, s, side * far, read, side) - leaked
+    over = side * (deflection - side * far - _yields(p.linkage, stopped))
+    if over > 0.0:
+        most = side * (abs(stopped) + 1.0)
+        for _ in range(_HALVINGS):
+            if side * (deflection - side * far - _yields(p.linkage, most)) <= 0.0:
+                low, high = min(stopped, most), max(stopped, most)
+                return side * far, _force_for(p.linkage, deflection - side * far, low, high)
+            most *= 2.0
+        return side * far, stopped  # nothing yields so far: a rigid structure, but for rounding
     while True:
-        x = middle * deflection
-        beyond = abs(x + bend(p.linkage, _force(p, s, x))) > size
-        if beyond and middle == near:
-            return x
-        near, far = (near, middle) if beyond else (middle, far)
         middle = 0.5 * (near + far)
+        x = side * middle
+        force = _force(p, s, x, read, side) - leaked
         if middle in (near, far):
-            return middle * deflection
+            return x, force
+        if side * (x + _yields(p.linkage, force) - deflection) > 0.0:
+            far = middle
+        else:
+            near = middle

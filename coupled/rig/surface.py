@@ -54,12 +54,18 @@ SURFACE = Declaration(
 
 
 @stage
+def asked_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
+    """Return the command that the linkage asks for, in ±1, for δ̂ in d and q̄ in Pa."""
+    asked = min(max(p.gain * estimate, -1.0), 1.0)
+    return asked / (1.0 + p.stretch * dynamic_pressure)
+
+
+@stage
 def command_surface(
     p: SurfaceParameters, s: SurfaceState, estimate: float, dynamic_pressure: float
 ) -> float:
     """Return the command over this frame, in ±1, for δ̂ in d and q̄ in Pa."""
-    asked = min(max(p.gain * estimate, -1.0), 1.0)
-    asked /= 1.0 + p.stretch * dynamic_pressure
+    asked = asked_command(p, estimate, dynamic_pressure)
     s.lagged += p.lag_gain * (asked - s.lagged)
     if abs(s.lagged) < TINY:
         s.lagged = 0.0

@@ -25,7 +25,7 @@ def test_a_comparison_is_reported_with_its_numbers_and_hashes(tmp_path: Path) ->
     assert f"report: {REPORT}" in done.stdout
     text = (tmp_path / REPORT).read_text(encoding="utf-8")
     for row in json.loads((tmp_path / "out/t.json").read_text(encoding="utf-8")):
-        assert f"{100 * row['loss_closed_form']:.2f}<" in text
+        assert f"{100 * abs(row['loss_closed_form']):.2f}<" in text
         assert f"{row['force_N']:.1f}<" in text
     for file in (shipped_runs()["appendix-c"], shipped_rigs()["bench"]):
         assert sha256(file) in text

@@ -144,8 +144,14 @@ _PILOTS: dict[str, dict[str, Any]] = {
     structure=st.fixed_dictionaries(
         {
             "bend_m_per_N": amounts(2.5e-4),
+            "bend_push_m_per_N": st.none() | amounts(2.5e-4),
             "bend_limit_m": amounts(0.05),
+            "bend_hysteresis_share": amounts(0.95),
+            "bend_hysteresis_width_N": amounts(200.0),
+            "bend_frequency_Hz": st.just(0.0) | st.floats(0.5, 50.0),
+            "bend_damping_ratio": amounts(1.5),
             "play_m": amounts(5e-3),
+            "play_stiffness_N_per_m": st.just(0.0) | st.floats(1e3, 1e6),
             "friction_N": amounts(40.0),
             "breakout_N": amounts(40.0),
             "cubic_N_per_m3": amounts(1e4),
@@ -169,6 +175,8 @@ def test_no_force_structure_or_pilot_takes_the_grip_past_its_reach(
     pressures: list[float],
     compensated: bool,
 ) -> None:
+    if structure["bend_push_m_per_N"] is None:
+        del structure["bend_push_m_per_N"]
     rig = configure(bench(structure), "compensated" if compensated else "uncompensated")
     hand = {"kind": kind, "reach_m": reach, **_PILOTS[kind]}
     hand["deflection_m" if kind == "clamp" else "force_N"] = side * (

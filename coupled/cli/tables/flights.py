@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
 
-from coupled.authority.figures import further, rows
+from coupled.authority.figures import named, remarks, rows
 from coupled.cli.tables.whole import print_whole
 from coupled.display import System
 
@@ -30,10 +30,9 @@ def print_comparison(console: Console, flights: Sequence[Flight], system: System
     else:
         for case in cases:
             title = case[0].outcome.case if len(cases) > 1 else ""
-            _print_table(console, title, [(f.configuration, f) for f in case], system)
-    for sentence in filter(None, (further(case, system) for case in cases)):
+            _print_table(console, title, [(named(f), f) for f in case], system)
+    for sentence in remarks(flights, system):
         console.print(f"{escape(sentence)}\n", highlight=False)
-        break
     for flight in flights:
         o = flight.outcome
         if o.ended_early:
@@ -54,7 +53,9 @@ def _print_table(
 
 
 def _broken(head: str) -> str:
-    """Return a column's head on two lines where it is long."""
+    """Return a column's head on lines of its own where it is long, a remark on the last."""
+    head, bracket, remark = head.partition(" (")
+    last = f"\n{remark.rstrip(')')}" if bracket else ""
     if head.endswith("compensated"):
-        return head.replace("compensated", "compen-\nsated")
-    return head.replace(" ", "\n", 1)
+        return head.replace("compensated", "compen-\nsated") + last
+    return head.replace(" ", "\n", 1) + last
