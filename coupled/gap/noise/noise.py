@@ -60,9 +60,7 @@ def noise_of(signal: Floats) -> Noise:
     """Return the noise of a smooth signal; of a short one, its fourth differences' rms by √70."""
     rough = np.diff(signal, 4)
     plain = Noise(float(np.sqrt(np.mean(rough**2) / 70.0)) if len(rough) else 0.0)
-    # Where most of it lies in a few frames, a signal jumps there, and colour is not to be seen.
-    usual = float(np.median(np.abs(rough))) / 0.6745 if len(rough) else 0.0
-    if len(rough) < WHITE_FRAMES or usual < JUMPS * plain.rms * math.sqrt(70.0):
+    if len(rough) < WHITE_FRAMES or jumps(signal):  # where it jumps, colour is not to be seen
         return plain
     at, levels = _bands(rough)
     high = at >= NOISE_FROM * math.pi
@@ -76,6 +74,15 @@ def noise_of(signal: Floats) -> Noise:
     logs = np.log(sure / _shape(at[high], memory))
     white = float(np.exp(np.mean(logs) + 0.5 * variance))
     return Noise(math.sqrt(white / (1.0 - memory**2)), memory)
+
+
+def jumps(signal: Floats) -> bool:
+    """Tell whether most of what is rough in a signal lies in a few frames: it jumps there."""
+    rough = np.diff(signal, 4)
+    if not len(rough):
+        return False
+    usual = float(np.median(np.abs(rough))) / 0.6745
+    return usual < JUMPS * float(np.sqrt(np.mean(rough**2)))
 
 
 def between_jumps(signal: Floats) -> Noise:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.noise.noise import Noise, between_jumps
+from coupled.gap.noise.noise import Noise, between_jumps, jumps
 from coupled.gap.noise.smooth import rate_of, smoothed
 from coupled.gap.signals.conditions import reach_of, trim_shift
 from coupled.gap.signals.driven import Drive
@@ -213,7 +213,7 @@ class Reader(Reading):
 
             `otherwise`: with less known of what force and services did between the frames.
             """
-            nodes = Nodes(f, coarsely if otherwise and not rough else on_nodes)
+            nodes = Nodes(f, coarsely if otherwise and jumps(f) else on_nodes)
             misread = computed - seen
             rate = rate_of(seen, self.rig.frame_rate) if starts.any() else seen
 
@@ -246,7 +246,6 @@ class Reader(Reading):
             seen = with_error(smooth, k + NOISE_TRIES, sensor)
             return predicted(driven(force.with_error(k), seen), 2.0**0.5)(rig)
 
-        rough = force.noise.rms > BROAD * float(np.std(force.recorded))
         force = self._without_what_was_felt(force, computed)
         trembling = Nodes(force.passed(np.random.default_rng(SAMPLED)))
         answer = driven(force.smooth, smooth)
@@ -319,7 +318,7 @@ class Reader(Reading):
         noise = Nodes(command.passed(rng)), force.passed(rng)
 
         def driven(c: Floats, f: Floats, otherwise: bool = False) -> Predict:
-            nodes = Nodes(c, coarsely if otherwise else on_nodes)
+            nodes = Nodes(c, coarsely if otherwise and jumps(c) else on_nodes)
 
             def at(rig: Rig, times: float) -> Floats:
                 sensed = self.sensed(rig)
