@@ -41,13 +41,14 @@ class Column:
 
 def columns_of(log: Log) -> list[Column]:
     """Return a log's columns in their order; those that hold no numbers too."""
-    return [_column(log, name) for name in log.columns if name not in log.doubled]
+    return [_column(log, name) for name in log.columns]
 
 
 def _column(log: Log, name: str) -> Column:
     cells = log.columns[name]
     unit = log.units.get(name, "")
-    reading = read_name(name, unit, log.file.stem)
+    own = next((plain for plain, each in log.doubled.items() if name in each), name)
+    reading = read_name(own, unit, log.file.stem)
     if cells.dtype == pl.String:
         first = cells.drop_nulls().head(1)
         text = str(first[0]) if first.len() else ""
@@ -60,7 +61,7 @@ def _column(log: Log, name: str) -> Column:
     elif cells.dtype.is_temporal():
         counts = cells.to_physical().cast(pl.Float64).to_numpy().astype(np.float64)
         return Column(log.file.name, name, reading, "dates", counts - counts[:1])
-    values = _doubles(cells)
+    values = _doubles(log.point(cells))
     kind: Literal["numbers", "text"] = "numbers"
     if values.size == 0 or np.mean(np.isnan(values)) > FEW or np.isnan(values).all():
         filled = cells.is_not_null().to_numpy() & np.isnan(values)
