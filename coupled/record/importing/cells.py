@@ -42,7 +42,10 @@ def element(
     """
     lists = lists_in(column)
     if lists is None:
-        raise InputError(where.file, where.name, "holds plain numbers, no lists: leave element out")
+        plain = column.dtype.is_numeric()
+        what = "plain numbers" if plain else str(column.dtype)
+        problem = f"holds {what}, no lists of numbers{': leave element out' if plain else ''}"
+        raise InputError(where.file, where.name, problem)
     if isinstance(wanted, str):
         return _named_element(lists, wanted, labels, where)
     lengths = lists.list.len().fill_null(wanted)

@@ -30,7 +30,11 @@ def replace_objects(
     if importlib.util.find_spec("matio") is None:
         _explain(found, "reading it needs mat-io: pip install 'coupled[logs]'")
         return
-    matio: Any = importlib.import_module("matio")
+    try:
+        matio: Any = importlib.import_module("matio")
+    except Exception as error:  # of a release that does not go with the pandas installed
+        _explain(found, f"mat-io cannot be loaded: {type(error).__name__}: {str(error)[:100]}")
+        return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"log{suffix}"
         path.write_bytes(content)

@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.record.importing.cells import ISO, moments
+from coupled.record.importing.cells import ISO, lists_in, moments
 from coupled.record.importing.reading import Log
 from coupled.record.importing.suggest.names import Reading, read_name
 
@@ -36,7 +36,8 @@ class Column:
     @property
     def moves(self) -> bool:
         """Whether it ever changes."""
-        return self.values.size > 1 and bool(np.nanmax(self.values) > np.nanmin(self.values))
+        there = self.values[np.isfinite(self.values)]
+        return there.size > 1 and bool(there.max() > there.min())
 
 
 def columns_of(log: Log) -> list[Column]:
@@ -77,11 +78,12 @@ def _doubles(cells: pl.Series) -> Floats:
 
 
 def _lists(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
-    if cells.dtype == pl.String:
-        plain = cells.str.strip_chars("[](){} ").str.replace_all(r"\s*[;,]\s*|\s+", ",")
-        cells = plain.str.split(",")
-    lengths = cells.list.len().drop_nulls()
-    values = _doubles(cells.list.get(0, null_on_oob=True))
+    lists = lists_in(log.point(cells))
+    if lists is None:  # of words, or of lists
+        nothing = np.full(cells.len(), np.nan)
+        return Column(log.file.name, name, reading, "text", nothing)
+    lengths = lists.list.len().drop_nulls()
+    values = _doubles(lists.list.get(0, null_on_oob=True))
     length = int(lengths.to_numpy().min()) if lengths.len() else 0
     return Column(log.file.name, name, reading, "lists", values, length)
 
