@@ -17,9 +17,9 @@ from coupled.units import POUND_N, PSF_Pa
 Floats = NDArray[np.float64]
 FAR_BEYOND = 3.0  # times the travel: no rig does that, so its unit is another
 ROUNDING = 1e-9  # of a channel's own spread, as records in text are rounded
-FAR_RATIO = (
-    2.0  # of a force over its spring's, as from which a diagnosis refuses another rig's file
-)
+# Of what follows the rate: a delay τ makes ω·τ of the motion follow it, and leaves (ω·τ)²/2 beside.
+BESIDE_A_DELAY = 0.3  # up to ω·τ = 0.6, more than a sensor is late
+FAR_RATIO = 2.0  # of a force over its spring's: a diagnosis refuses another rig's file from here on
 # What N, and m or rad, are in other units; lbf has rules of its own.
 _FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
 _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
