@@ -29,7 +29,7 @@ from coupled.record.importing.reading import Log
 from coupled.record.importing.several import clock_of, lay_grids, log_of, read_logs
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.schema import LARGEST
+from coupled.schema import LARGEST, SMALLEST
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
@@ -129,7 +129,8 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
         row = int(np.argmax(huge))
         problem = f"row {log.line(row)} makes {si[row]:.3g}, larger than any real one"
         raise InputError(log.file, channel.source, problem)
-    return np.asarray(si + 0.0)  # a sign on an exact zero makes −0
+    si[np.abs(si) < SMALLEST] = 0.0  # −0 as well, which a sign on an exact zero makes
+    return np.asarray(si)
 
 
 def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats) -> int:

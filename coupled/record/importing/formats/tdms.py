@@ -36,7 +36,11 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
     for channel in channels[:MOST_COLUMNS]:
         notes: list[str] = []
         with kept_warnings(notes):
-            values = _numbers(channel)
+            try:
+                values = _numbers(channel)
+            except (ValueError, LookupError, TypeError, ArithmeticError) as error:
+                values = np.zeros(0)
+                notes.append(f"its scale cannot be computed ({type(error).__name__})")
         if values is None:
             continue
         label, stamps = str(channel.group_name), ""
@@ -49,7 +53,7 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
                 clocks[clock] = stamps
                 columns.append(Found(stamps, time_s, "s", _own(label, stamps), stamps))
         unit = str(channel.properties.get("unit_string", "")).strip()[:40]
-        refused = f"its numbers are not to be trusted: npTDMS warns: {notes[0]}" if notes else ""
+        refused = f"npTDMS does not know what its numbers are: {notes[0]}" if notes else ""
         values = values[:0] if refused else values
         columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps, refused))
     if not columns:

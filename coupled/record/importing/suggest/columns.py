@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.record.importing.cells import ISO, lists_in, moments
-from coupled.record.importing.reading import Log
+from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.names import Reading, read_name
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ def _doubles(cells: pl.Series) -> Floats:
     if not (cells.dtype.is_numeric() or cells.dtype == pl.String):
         return np.full(cells.len(), np.nan)
     values = cells.cast(pl.Float64, strict=False).to_numpy().astype(np.float64)
-    return np.where(np.isfinite(values), values, np.nan)
+    return np.where(np.abs(values) <= LATEST_ns, values, np.nan)
 
 
 def _lists(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:

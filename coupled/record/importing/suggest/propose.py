@@ -253,7 +253,8 @@ def _signs(
         if there.any() and move_oppositely(force.values[there], moved.values[there]):
             remark = f"moves against {moved.name}: -1 here, or there? a pull is positive in both"
             for name, lines in sections:
-                if name == f"channels.{control}_force_N":
+                asked = any(key == "sign" for key, _, _ in lines)
+                if name == f"channels.{control}_force_N" and not asked:
                     lines.append(("sign", "?", remark))
     return sections
 
