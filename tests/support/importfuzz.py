@@ -81,12 +81,13 @@ class Motion:
 
 @dataclass(frozen=True)
 class Case:
-    """A log with its map, and what an import may do with it."""
+    """A log with its map, and what an import may do with it; `rows` is how many frames it has."""
 
     name: str
     content: bytes
     log_map: str
     expected: str
+    rows: int = 0
 
 
 def moved(rng: np.random.Generator) -> Motion:
@@ -464,13 +465,16 @@ def make_case(reader: str, seed: int, number: int) -> Case:
     kind = number % 3
     if kind == 1:
         motion = with_a_fault(rng, motion)
+    if rng.random() < 0.5:
+        motion = replace(motion, clock=(*motion.clock, f"frame_rate_Hz = {RATE_Hz:g}"))
     name, content, log_map = WRITERS[reader](rng, motion)
     expected = (RIGHT, EITHER, ANY)[kind]
     if kind == 0 and ("Reciprocal" in str(content) or "[0]" in log_map):
         expected = EITHER  # may be refused: a scale that is not known, an order that changes
     if kind == 2:
         content = damaged(rng, content)
-    return Case(name, content, log_map, expected)
+    frames = round(float(np.ptp(motion.when_s)) * RATE_Hz) + 1 if motion.when_s.size else 0
+    return Case(name, content, log_map, expected, frames)
 
 
 # Maps: a good one with a key that is put in, left out or given another value.
@@ -668,6 +672,7 @@ def _imported(case: Case, folder: Path) -> str:
     assert (np.diff(record.time_s) > 0.0).all()
     if case.expected == ANY:
         return "read"
+    assert len(record) == case.rows, f"{len(record)} of {case.rows} frames"
     when_s = record["altitude_m"]
     late_s = np.max(np.abs(when_s - when_s[0] - record.time_s))
     assert late_s < 0.1 / RATE_Hz, f"a row stands {late_s:.3g} s off"
