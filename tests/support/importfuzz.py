@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from unittest.mock import patch
 
 import h5py
@@ -76,7 +76,8 @@ class Motion:
 
     def taken(self, rows: Any, *clock: str) -> Motion:
         """Return some of the rows, in the order given."""
-        return Motion(*(each[rows] for each in self.columns.values()), clock)
+        time_s, force_N, place_m, when_s = (each[rows] for each in self.columns.values())
+        return Motion(time_s, force_N, place_m, when_s, clock)
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,13 @@ def write_csv(rng: np.random.Generator, motion: Motion) -> Written:
     return "log.csv", text.encode(encoding), log_map
 
 
+COMPRESSIONS: tuple[Literal["zstd", "snappy", "uncompressed"], ...] = (
+    "zstd",
+    "snappy",
+    "uncompressed",
+)
+
+
 def write_parquet(rng: np.random.Generator, motion: Motion) -> Written:
     table: dict[str, Any] = dict(motion.columns)
     more = ""
@@ -272,7 +280,7 @@ def write_parquet(rng: np.random.Generator, motion: Motion) -> Written:
     if rng.random() < 0.2:
         frame = frame.with_columns(pl.col("X").cast(pl.Float32))
     buffer = io.BytesIO()
-    frame.write_parquet(buffer, compression=str(rng.choice(["zstd", "snappy", "uncompressed"])))
+    frame.write_parquet(buffer, compression=COMPRESSIONS[int(rng.integers(3))])
     return "log.parquet", buffer.getvalue(), mapped(motion, tuple(motion.columns), more=more)
 
 

@@ -21,9 +21,9 @@ from coupled.record.importing.reading import Log, Stamps
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
-# Rows that one late row may overtake on average. Packets of a network overtake a few; where a
-# clock was set back, every row of the second part lies between two of the first.
-MOST_OVERTAKEN = 10
+# Into how many pieces, in the order of time, rows of others may split a run of rows in the log's.
+# Late rows split a run once or twice; two recordings at the same times, at every row.
+MOST_PIECES = 4
 COARSE = 0.1  # share of repeated stamps from which the stamps are coarse, and no row is double
 
 
@@ -139,13 +139,17 @@ def _sort(log: Log, clock: Stamped, map_file: Path, key: str) -> Log:
     steps_s = np.diff(time_s)
     if not (steps_s < 0.0).any():
         return log
-    run = np.concatenate(([0], np.cumsum(steps_s < 0.0)))  # of rows in the order of time
-    changes = int(np.count_nonzero(np.diff(run[order])))
-    if changes - run[-1] > 2 * MOST_OVERTAKEN * run[-1]:
-        row = int(np.argmax(steps_s < 0.0)) + 1
-        problem = f"row {log.line(row)}: time goes back, and the rows from there on lie between"
-        problem += " those before: two recordings, which sort would mix; leave one out by"
-        problem += f' {key}.drop_rows = ["{log.line(row)}-{log.line(time_s.size - 1)}"]'
+    run = np.concatenate(([0], np.cumsum(steps_s < 0.0)))  # rows between two steps back
+    by_time = run[order]
+    pieces = np.bincount(by_time[np.concatenate(([True], np.diff(by_time) != 0))])
+    mixed = np.flatnonzero(pieces > MOST_PIECES)
+    if mixed.size:
+        first, last = (int(row) for row in np.flatnonzero(run == mixed[-1])[[0, -1]])
+        problem = (
+            f"row {log.line(first)}: the rows from here on lie between others, one by one: two"
+        )
+        problem += " recordings, which sort would mix; leave one out, as by"
+        problem += f' {key}.drop_rows = ["{log.line(first)}-{log.line(last)}"]'
         raise InputError(log.file, clock.source, problem)
     moved = int(np.count_nonzero(order != np.arange(order.size)))
     return _take(log, order, time_s.size, f"{moved} of {time_s.size} rows moved, by {key}.sort")

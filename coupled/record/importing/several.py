@@ -111,14 +111,22 @@ def clock_of(log: Log, log_map: LogMap) -> Clock | OtherClock:
         return clock
     if log.name in log_map.clocks:
         return log_map.clocks[log.name]
-    rows = {"sort": clock.sort, "drop_duplicates": clock.drop_duplicates}
     main = log.groups.get(clock.source, "")
     alike = f"{log.part}{clock.source.removeprefix(main)}"
     if alike in log.columns and alike != clock.source:
-        same = {"unit": clock.unit, "date": clock.date, "wraps_at": clock.wraps_at}
-        return OtherClock.model_construct(source=alike, **same, **rows)
-    column = next(iter(log.columns))
-    return OtherClock.model_construct(source=log.stamps[column], **rows)
+        return OtherClock.model_construct(
+            source=alike,
+            unit=clock.unit,
+            date=clock.date,
+            wraps_at=clock.wraps_at,
+            sort=clock.sort,
+            drop_duplicates=clock.drop_duplicates,
+        )
+    return OtherClock.model_construct(
+        source=log.stamps[next(iter(log.columns))],
+        sort=clock.sort,
+        drop_duplicates=clock.drop_duplicates,
+    )
 
 
 def lay_grids(
