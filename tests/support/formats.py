@@ -159,8 +159,7 @@ def write_hdf5(path: Path) -> None:
 
 def write_matlab_objects(path: Path, version: str) -> None:
     """Write a timetable, a table and a date beside plain vectors, and an object of another kind."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of mat-io, by pandas 3
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # mat-io's
         matio, pandas = (importlib.import_module(name) for name in ("matio", "pandas"))
     rate_s = np.rint(1e9 * TIME_s).astype("timedelta64[ns]")
     timed = pandas.DataFrame({"force": FORCE_lbf, "note": ["x"] * TIME_s.size})
@@ -175,6 +174,5 @@ def write_matlab_objects(path: Path, version: str) -> None:
         "span": rate_s[:, None],
         "kinds": pandas.Categorical(["a", "b"]),
     }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # durations are written in s
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # s, not ns
         matio.save_to_mat(str(path), variables, version=version)

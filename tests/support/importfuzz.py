@@ -657,12 +657,10 @@ def in_process() -> Iterator[None]:
 
 def outcome(reader: str, seed: int, number: int, folder: Path) -> str:
     """Return what an import did with a case: right, read, refused; raises what it must not do."""
-    with in_process(), warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with in_process(), warnings.catch_warnings(action="error"):
         if reader == "suggest":
             return _suggested(*make_table(seed, number), folder)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the libraries that write
+        with warnings.catch_warnings(action="ignore"):  # of the libraries that write
             case = make_map(seed, number) if reader == "map" else make_case(reader, seed, number)
         return _imported(case, folder)
 

@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 
 from coupled.errors import InputError
 from coupled.record.importing import separate
@@ -231,6 +232,34 @@ def test_what_a_reader_library_warns_of_is_a_line(tmp_path: Path) -> None:
     (tmp_path / "a.tdms").write_bytes(content)
     _, account = read(tmp_path, "a.tdms", TWO.format(unit="", **CASES["a.tdms"][1]))
     assert account.warnings == ("nptdms warns: Unrecognised version number: 4714",)
+
+
+def test_a_proposal_says_which_columns_are_not_read(tmp_path: Path) -> None:
+    scale = {"NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Reciprocal"}
+    with TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("g", "time", formats.TIME_s),
+                ChannelObject("g", "column encoder [mm]", 20.0 * np.sin(formats.TIME_s)),
+                ChannelObject("g", "column force [N]", formats.FORCE_lbf, scale),
+            ]
+        )
+    done = coupled(tmp_path, "import", "a.tdms", "--suggest", "m.toml", columns=200)
+    assert done.returncode == 0, done.stderr
+    assert "column force [N]: npTDMS does not know what its numbers are: Unsuppor" in done.stdout
+
+
+def test_a_ulog_of_which_parts_are_damaged_says_so(tmp_path: Path) -> None:
+    formats.write_ulog(tmp_path / "a.ulg")
+    content = bytearray((tmp_path / "a.ulg").read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 30] = b"\xff" * 30
+    (tmp_path / "a.ulg").write_bytes(content)
+    _, account = read(tmp_path, "a.ulg", TWO.format(unit="", **CASES["a.ulg"][1]))
+    assert any("the file is damaged from byte" in warning for warning in account.warnings)
+    formats.write_ulog(tmp_path / "a.ulg")
+    _, account = read(tmp_path, "a.ulg", TWO.format(unit="", **CASES["a.ulg"][1]))
+    assert account.warnings == ()
 
 
 def test_all_ways_of_warning_are_kept_and_those_of_code_are_not() -> None:

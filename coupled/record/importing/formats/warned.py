@@ -36,11 +36,10 @@ def kept_warnings(notes: list[str]) -> Iterator[None]:
         logger.addHandler(keeper)
     try:
         with (
-            warnings.catch_warnings(record=True) as caught,
+            warnings.catch_warnings(record=True, action="always") as caught,
             contextlib.redirect_stdout(said),
             contextlib.redirect_stderr(said),
         ):
-            warnings.simplefilter("always")
             yield
     finally:
         for logger in own:

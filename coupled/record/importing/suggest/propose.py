@@ -36,12 +36,16 @@ Line = tuple[str, object, str]  # a key, its value, and a remark
 
 @dataclass(frozen=True)
 class Proposal:
-    """A map as text, the questions that it still asks, and the columns that it leaves out."""
+    """A map as text, the questions that it still asks, and the columns that it leaves out.
+
+    `warnings` are what the readers of the logs warned of, and why columns are not read.
+    """
 
     text: str
     questions: tuple[str, ...]
     mapped: Mapping[str, str]  # channel: column
     unmapped: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -49,6 +53,7 @@ class Proposal:
             "channels": dict(self.mapped),
             "questions": list(self.questions),
             "unmapped": list(self.unmapped),
+            "warnings": list(self.warnings),
         }
 
 
@@ -85,7 +90,10 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
         for key, value, remark in lines
         if value == "?"
     )
-    return Proposal(_text(sections, logs, unmapped), questions, mapped, unmapped)
+    warnings = [note for log in read for note in log.notes]
+    warnings += [f"{name}: {why}" for log in read for name, why in log.refused.items()]
+    text = _text(sections, logs, unmapped)
+    return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
 
 
 def _stamps_first(
