@@ -29,6 +29,7 @@ from coupled.gap.signals.counts import as_counted
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.live import judged_part, live_of
 from coupled.gap.signals.output import Output
+from coupled.gap.signals.reading import worth_recording
 from coupled.gap.stages.airframe import Flights, airframe_outputs
 from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.setpoints import under_set_points
@@ -93,7 +94,14 @@ def _diagnose(
     halved = (output.halved(rig) for output in raised(judged))
     outputs = [allowing_for_contact(output, rig, control) for output in halved]
     if not outputs:
-        lacking = sorted({n for r in readers for names in r.missing().values() for n in names})
+        lacking = sorted(
+            {
+                name
+                for reader in readers
+                for stage, names in reader.missing().items()
+                for name in worth_recording(rig, control, stage, names)
+            }
+        )
         file = next(iter(records))
         problem = f"holds too little to judge any stage by; it lacks {', '.join(lacking)}"
         raise InputError(file, "", problem)

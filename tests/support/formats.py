@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import struct
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -153,3 +155,24 @@ def write_hdf5(path: Path) -> None:
         force = file.create_dataset("test/force", data=FORCE_lbf.astype(np.float32))
         force.attrs["units"] = "lbf"
         file.create_dataset("test/words", data=["a", "b"], dtype=h5py.string_dtype())
+
+
+def write_matlab_objects(path: Path, version: str) -> None:
+    """Write a timetable, a table and a date beside plain vectors, and an object of another kind."""
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # mat-io's
+        matio, pandas = (importlib.import_module(name) for name in ("matio", "pandas"))
+    rate_s = np.rint(1e9 * TIME_s).astype("timedelta64[ns]")
+    timed = pandas.DataFrame({"force": FORCE_lbf, "note": ["x"] * TIME_s.size})
+    timed.index = pandas.DatetimeIndex(
+        np.datetime64("2026-03-01T12:00", "ns") + rate_s, name="When"
+    )
+    variables = {
+        "t": TIME_s[:, None],
+        "F": FORCE_lbf[:, None],
+        "LOG": {"runs": timed, "gain": np.arange(3.0)[:, None]},
+        "plain": pandas.DataFrame({"T": TIME_s, "force": FORCE_lbf}),
+        "span": rate_s[:, None],
+        "kinds": pandas.Categorical(["a", "b"]),
+    }
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # s, not ns
+        matio.save_to_mat(str(path), variables, version=version)

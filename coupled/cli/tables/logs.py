@@ -47,6 +47,8 @@ def print_proposal(console: Console, proposal: Proposal) -> None:
     print_whole(console, table)
     for question in proposal.questions:
         console.print(f"[yellow]to answer:[/] {escape(question)}", highlight=False)
+    for warning in proposal.warnings[:LISTED]:
+        console.print(f"[yellow]{escape(warning)}[/]", highlight=False)
     if proposal.unmapped:
         console.print(f"not used: {escape(', '.join(proposal.unmapped[:LISTED]))}", highlight=False)
 

@@ -195,16 +195,14 @@ class Reading:
     def _gradient_from(self) -> list[str]:
         """Return the channel that G_T is taken from: its own, or q̄ where the record lacks it.
 
-        None where the record has neither, and the rig has one spring at any q̄.
+        None where the record has neither, and the rig has one gradient at any q̄.
         """
         own = self.name_of("gradient")
         if own in self.record:
             return [own]
         if PRESSURE in self.record:
             return [PRESSURE]
-        table = self.rig.controls[self.control].schedule.total_gradient
-        without = self.moved and not any(table)  # a machine that has no spring
-        return [] if without or one_spring(self.rig, self.control) else [own]
+        return [] if one_gradient(self.rig, self.control) else [own]
 
     def gradient(self) -> Floats:
         """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""
@@ -244,11 +242,11 @@ class Reading:
         }
 
 
-def one_spring(rig: Rig, control: ControlName) -> bool:
-    """Tell whether a control's gradient is the same at any q̄, and there is one."""
+def one_gradient(rig: Rig, control: ControlName) -> bool:
+    """Return whether a control's gradient is the same at any q̄; it is 0 without a spring."""
     schedule = rig.controls[control].schedule
     first, *rest = schedule.total_gradient
-    return schedule.second_gradient is None and first > 0.0 and all(g == first for g in rest)
+    return schedule.second_gradient is None and all(g == first for g in rest)
 
 
 def worth_recording(
@@ -257,13 +255,14 @@ def worth_recording(
     """Return those of a stage's lacking channels that belong to what the machine has.
 
     A bench without a host has no estimate, a slide without a spring no schedule, a rig file
-    without bend and play no second transducer.
+    without bend and play no second transducer, a rig without an aircraft no surface.
     """
     data = rig.controls[control]
     host = rig.flight is not None or data.compensation.deflection or data.compensation.gradient
     scheduled = len(set(data.schedule.total_gradient)) > 1
     soft = any((data.loader.bend, data.loader.play, data.loader.arc_geometry))
     has = {"schedule": scheduled, "compensation": host, "linkage": host or soft}
+    has["surface"] = rig.flight is not None
     if not has.get(stage, True):
         return set()
     by_schedule = set() if scheduled or host else {PRESSURE, channel(control, "gradient")}

@@ -2,56 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError
+from coupled.errors import InputError, nearest, shown
 from coupled.record.importing.mapping import Channel
 
 Floats = NDArray[np.float64]
 Line = Callable[[int], int]
 ISO = "iso"
 _DAY_us = 86_400_000_000
+FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is unknown
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def element(column: pl.Series, number: int, file: object, name: str, line: Line) -> pl.Series:
-    """Return one element, counted from 1, of each cell's list: `[0.1, 0.2]`, `0.1;0.2`.
+@dataclass(frozen=True)
+class Place:
+    """Where a column is: its file and name, and the line of each row, counted from 0."""
 
-    An empty cell stays empty. Raises InputError where a list is too short, or is none.
+    file: object
+    name: str
+    line: Line
+
+
+def element(
+    column: pl.Series, wanted: int | str, labels: Sequence[Sequence[str]] | None, where: Place
+) -> pl.Series:
+    """Return one element of each cell's list: `[0.1, 0.2]`, `0.1;0.2`.
+
+    `wanted` is its place, counted from 1, or its name among `labels`, the names of the elements
+    in each row. An empty cell stays empty, as does one that lacks the name. Raises InputError
+    where a list is too short, or is none, and for a place whose name changes.
     """
+    lists = lists_in(column)
+    if lists is None:
+        plain = column.dtype.is_numeric()
+        what = "plain numbers" if plain else str(column.dtype)
+        problem = f"holds {what}, no lists of numbers{': leave element out' if plain else ''}"
+        raise InputError(where.file, where.name, problem)
+    if isinstance(wanted, str):
+        return _named_element(lists, wanted, labels, where)
+    lengths = lists.list.len().fill_null(wanted)
+    short = (lengths < wanted).to_numpy()
+    if short.any():
+        row = int(np.argmax(short))
+        line, length = where.line(row), lengths[row]
+        problem = f"row {line} holds {length} numbers; the map asks for element {wanted}"
+        raise InputError(where.file, where.name, problem)
+    at_place = [row[wanted - 1] for row in labels or [] if len(row) >= wanted]
+    if len(set(at_place)) > 1:
+        row = next(i for i, names in enumerate(labels or []) if names[wanted - 1] != at_place[0])
+        first, other = shown(at_place[0], 40), shown((labels or [])[row][wanted - 1], 40)
+        problem = f"element {wanted} is {first!r} in row {where.line(0)} and {other!r} in row"
+        problem += f" {where.line(row)}: give its name, as element = {json.dumps(first)}"
+        raise InputError(where.file, where.name, problem)
+    return lists.list.get(wanted - 1, null_on_oob=True)
+
+
+def lists_in(column: pl.Series) -> pl.Series | None:
+    """Return a column's cells as lists, of text or of numbers; None where they are no lists."""
     if column.dtype == pl.String:
         plain = column.str.strip_chars().str.strip_chars("[](){}").str.strip_chars()
         plain = plain.str.replace_all(r"\s*[;,]\s*|\s+", ",")
-        lists = plain.replace("", None).str.split(",")
-    elif isinstance(column.dtype, (pl.List, pl.Array)):
-        lists = column.cast(pl.List(pl.Float64), strict=False)
+        return plain.replace("", None).str.split(",")
+    if not isinstance(column.dtype, (pl.List, pl.Array)):
+        return None
+    inner = column.dtype.inner
+    if not isinstance(inner, pl.DataType) or not (inner.is_numeric() or inner == pl.Boolean):
+        return None
+    return column.cast(pl.List(pl.Float64), strict=False)
+
+
+def labels_of(
+    name: str, column: pl.Series, columns: Mapping[str, pl.Series]
+) -> list[list[str]] | None:
+    """Return the names of the elements of a column's lists, row by row.
+
+    They are those of the first column of lists of words that are as long as its own in each row.
+    None where there is none.
+    """
+    lists = lists_in(column)
+    if lists is None:
+        return None
+    lengths = lists.list.len().fill_null(0).to_list()
+    for other, cells in columns.items():
+        words = _words_in(cells) if other != name and cells.len() == column.len() else None
+        if words is not None and [len(row) for row in words] == lengths:
+            return words
+    return None
+
+
+def _words_in(cells: pl.Series) -> list[list[str]] | None:
+    """Return lists of words, row by row; None where a column holds none, or numbers."""
+    if cells.dtype == pl.List(pl.String):
+        found = [[str(word) for word in row or []] for row in cells.to_list()]
+    elif cells.dtype == pl.String:
+        first = cells.drop_nulls().head(1)
+        if not first.len() or not str(first[0]).startswith(("[", "(", "{")):
+            return None
+        lists = lists_in(cells)
+        assert lists is not None
+        found = [[str(word).strip("'\"") for word in row or []] for row in lists.to_list()]
     else:
-        raise InputError(file, name, "holds plain numbers, no lists: leave element out")
-    lengths = lists.list.len().fill_null(number)
-    short = (lengths < number).to_numpy()
-    if short.any():
-        row = int(np.argmax(short))
-        problem = f"row {line(row)} holds {lengths[row]} numbers; the map asks for element {number}"
-        raise InputError(file, name, problem)
-    return lists.list.get(number - 1, null_on_oob=True)
+        return None
+    first_row = next((row for row in found if row), [])
+    return found if first_row and not any(_is_number(word) for word in first_row) else None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _named_element(
+    lists: pl.Series, wanted: str, labels: Sequence[Sequence[str]] | None, where: Place
+) -> pl.Series:
+    if labels is None:
+        problem = f"no column beside it names its elements: give element = 1 to {_most(lists)}"
+        raise InputError(where.file, where.name, problem)
+    known = dict.fromkeys(word for row in labels for word in row)
+    if wanted not in known:
+        problem = f"has no element {shown(wanted, 40)!r}; {nearest(wanted, known)}"
+        raise InputError(where.file, where.name, problem)
+    twice = next((i for i, row in enumerate(labels) if row.count(wanted) > 1), None)
+    if twice is not None:
+        problem = f"row {where.line(twice)} has two elements {shown(wanted, 40)!r}"
+        raise InputError(where.file, where.name, problem)
+    cells = [
+        row[names.index(wanted)] if row is not None and wanted in names else None
+        for row, names in zip(lists.to_list(), labels, strict=True)
+    ]
+    inner = lists.dtype.inner if isinstance(lists.dtype, pl.List) else pl.String
+    return pl.Series(where.name, cells, dtype=inner)
+
+
+def _most(lists: pl.Series) -> int:
+    lengths = lists.list.len().drop_nulls().to_list()
+    return max(lengths, default=1)
 
 
 def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
-    """Return raw integers with the sign that the map says they hold, NaN where empty.
+    """Return raw numbers with the sign that the map says they hold, NaN where empty.
 
     `sign_bit` n: a set bit n means minus, the bits below it are the magnitude. `wraps_at` N:
-    numbers from N/2 on stand for themselves less N (two's complement, read as unsigned).
+    whole counts from N/2 on stand for themselves less N (two's complement, read as unsigned).
+    With `unwrap`, and where the numbers are not whole and so no counts, an angle that starts
+    again at N is followed across it, from a first number between −N/2 and N/2.
     """
     if channel.sign_bit is None and channel.wraps_at is None:
         return raw
-    half = 2.0**channel.sign_bit if channel.sign_bit is not None else (channel.wraps_at or 0) / 2.0
     there = np.isfinite(raw)
-    wrong = there & ((raw < 0.0) | (raw >= 2.0 * half) | (raw != np.floor(raw)))
+    fractions = there & (raw != np.floor(raw))
+    if channel.wraps_at is not None:
+        unwrap = bool(fractions.any()) if channel.unwrap is None else channel.unwrap
+        if unwrap:
+            return _unwrapped(raw, channel, file, line)
+    half = 2.0**channel.sign_bit if channel.sign_bit is not None else (channel.wraps_at or 0) / 2.0
+    wrong = fractions | (there & ((raw < 0.0) | (raw >= 2.0 * half)))
     if wrong.any():
         row = int(np.argmax(wrong))
         key = "sign_bit" if channel.sign_bit is not None else "wraps_at"
@@ -60,7 +176,40 @@ def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
     minus = there & (raw >= half)
     if channel.sign_bit is not None:
         return np.where(minus, half - raw, raw)
-    return np.where(minus, raw - 2.0 * half, raw)
+    counts = np.where(minus, raw - 2.0 * half, raw)
+    jumps = np.abs(np.diff(counts[there])) > half
+    if channel.unwrap is None and jumps.any():
+        row = int(np.flatnonzero(there)[int(np.argmax(jumps)) + 1])
+        problem = f"row {line(row)} jumps by more than half of wraps_at: give unwrap = true for an"
+        problem += " encoder that turns on, or unwrap = false for counts that do jump so"
+        raise InputError(file, channel.source, problem)
+    return counts
+
+
+def _unwrapped(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
+    """Return an angle without the jumps at its period, its first number within half of it."""
+    period, name = channel.wraps_at or 0.0, channel.source
+    there = np.isfinite(raw)
+    values = raw[there]
+    if not values.size:
+        return raw
+    span = float(np.ptp(values))
+    if span > period:
+        problem = f"spans {span:.6g}, more than wraps_at = {period:g}: it starts again later"
+        raise InputError(file, name, problem)
+    turned = np.unwrap(values, period=period)
+    turned -= period * np.round(values[0] / period)
+    far = np.abs(np.diff(turned)) > FARTHEST * period
+    if far.any():
+        row = int(np.flatnonzero(there)[int(np.argmax(far)) + 1])
+        problem = (
+            f"row {line(row)} is {abs(np.diff(turned)[np.argmax(far)]) / period:.2g} of wraps_at"
+        )
+        problem += " from the row before: too far to tell which way it turned"
+        raise InputError(file, name, problem)
+    result = raw.copy()
+    result[there] = turned
+    return result
 
 
 def moments(column: pl.Series, pattern: str, file: object, name: str, line: Line) -> pl.Series:

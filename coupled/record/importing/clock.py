@@ -7,6 +7,7 @@ none, where a cubic spline would ring at a step or a stop, and a straight line w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -17,8 +18,9 @@ from scipy.interpolate import PchipInterpolator
 
 from coupled.errors import InputError
 from coupled.record.importing.account import ClockAccount
-from coupled.record.importing.mapping import Clock, LogMap, OtherClock
+from coupled.record.importing.mapping import Clock, LogMap, Stamped
 from coupled.record.importing.reading import Log, Stamps
+from coupled.record.importing.rows import check_order, check_steps, row_count, stamps_in_file
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -32,11 +34,12 @@ MOST_FRAMES = 20_000_000
 class Grid:
     """The record's frames over a log's rows.
 
-    `kept` are the rows used; `time_s` is when each was taken, from frame 0 on, shape
+    `kept` are those used of all `rows`; `time_s` is when each was taken, from frame 0 on, shape
     (rows kept,); `frame` is the frame on which each stands where `even`, else nothing counts.
     """
 
     kept: slice
+    rows: int
     time_s: Floats
     frame: Rows
     even: bool
@@ -72,11 +75,12 @@ def lay_grid(
     clock = log_map.clock
     begin_s = max(clock.start, span_s[0])
     end_s = min(np.inf if clock.end is None else clock.end, span_s[1])
-    stamps_s = stamps_of(log, clock, map_file).from_first_s
+    used = [channel.source for channel in log_map.channels.values()]
+    stamps_s = stamps_of(log, clock, used, map_file).from_first_s
     delay_s = max(channel.delay for channel in log_map.channels.values())
     kept = _cut(log, stamps_s, clock.source, (begin_s, end_s + delay_s))
     time_s = stamps_s[kept]
-    _check_steps(log, time_s, kept.start, clock.source, clock.longest_gap)
+    check_steps(log, time_s, kept.start, clock, "clock", clock.longest_gap)
     first = int(np.searchsorted(time_s, begin_s - 1e-9))
     if first == time_s.size:
         raise InputError(map_file, "clock.start_s", f"the log ends at {time_s[-1]:.6g} s")
@@ -111,36 +115,45 @@ def lay_grid(
         missing_rows=int(bridged.sum()),
     )
     frame = np.zeros(time_s.size, dtype=np.int64) if even is None else even
-    return Grid(kept, on_grid, frame, even is not None, wished, frames, account)
+    rows = len(stamps_s)
+    return Grid(kept, rows, on_grid, frame, even is not None, wished, frames, account)
 
 
-def stamps_of(log: Log, clock: Clock | OtherClock, map_file: Path, key: str = "clock") -> Stamps:
-    """Return when every row was taken, from the first one on, in s."""
+def stamps_of(
+    log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str = "clock"
+) -> Stamps:
+    """Return when every row was taken, from the first one on, in s.
+
+    A clock without a column has as many rows as the first of the columns `used`. Raises
+    InputError where the times go back.
+    """
     if isinstance(clock, Clock) and clock.rate is not None:
-        rows = len(next(iter(log.columns.values())))
+        rows = row_count(log, clock, used, map_file, key)
         return Stamps(Fraction(0), np.arange(rows) / clock.rate)
-    stamps = log.times(clock, map_file, key)
-    if stamps.from_first_s.size < 2:
-        raise InputError(log.file, clock.source, "has fewer than two rows")
-    lacking = np.isnan(stamps.from_first_s)
-    if lacking.any():
-        row = int(np.argmax(lacking))
-        raise InputError(log.file, clock.source, f"row {log.line(row)} has no time")
+    stamps = stamps_in_file(log, clock, map_file, key)
+    check_order(log, stamps.from_first_s, clock, key)
     return stamps
 
 
 def beside(
-    grid: Grid, stamps_s: Floats, delay_s: float, log: Log, source: str, longest_gap: int
+    grid: Grid,
+    stamps_s: Floats,
+    delay_s: float,
+    log: Log,
+    clock: Stamped,
+    key: str,
+    longest_gap: int,
 ) -> Grid:
     """Return the same frames over the rows of another log, whose stamps count from frame 0, in s.
 
     Its rows stand wherever they stand: its channels are interpolated.
     """
     end_s = (grid.frames - 1) / grid.frame_rate_Hz
-    kept = _cut(log, stamps_s, source, (0.0, end_s + delay_s))
-    _check_steps(log, stamps_s[kept], kept.start, source, longest_gap)
+    kept = _cut(log, stamps_s, clock.source, (0.0, end_s + delay_s))
+    check_steps(log, stamps_s[kept], kept.start, clock, key, longest_gap)
     nowhere = np.zeros(0, dtype=np.int64)
-    return replace(grid, kept=kept, time_s=stamps_s[kept], frame=nowhere, even=False)
+    rows = len(stamps_s)
+    return replace(grid, kept=kept, rows=rows, time_s=stamps_s[kept], frame=nowhere, even=False)
 
 
 def _cut(log: Log, stamps_s: Floats, source: str, span_s: tuple[float, float]) -> slice:
@@ -155,32 +168,6 @@ def _cut(log: Log, stamps_s: Floats, source: str, span_s: tuple[float, float]) -
         )
         raise InputError(log.file, source, problem)
     return slice(int(rows[0]), int(rows[-1]) + 1)
-
-
-def _check_steps(log: Log, time_s: Floats, first: int, source: str, longest_gap: int) -> None:
-    steps_s = np.diff(time_s)
-    if (steps_s <= 0.0).any():
-        row = int(np.argmax(steps_s <= 0.0))
-        where = f"row {log.line(first + row + 1)}"
-        if steps_s[row] == 0.0:
-            again = (
-                f"{where} repeats the time of the row before, {time_s[row]:.6f} s from the start"
-            )
-            problem = f"{again}; where rows are even all the same, give clock.rate_Hz, no from"
-        else:
-            problem = f"{where}: time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
-        raise InputError(log.file, source, problem)
-    median_s = float(np.median(steps_s))
-    gaps = np.flatnonzero(steps_s > (longest_gap + 1.5) * median_s)
-    if gaps.size:
-        row = int(gaps[0])
-        lost = round(steps_s[row] / median_s) - 1
-        raise InputError(
-            log.file,
-            source,
-            f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
-            f" longest_gap_rows = {longest_gap} allows no more; cut by start_s or end_s",
-        )
 
 
 def _rounding(time_s: Floats) -> float:

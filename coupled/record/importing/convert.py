@@ -29,7 +29,7 @@ from coupled.record.importing.reading import Log
 from coupled.record.importing.several import clock_of, lay_grids, log_of, read_logs
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-from coupled.schema import LARGEST
+from coupled.schema import LARGEST, SMALLEST
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ def import_log(
         raise InputError(map_file, "clock.frame_rate_Hz", problem)
     grids = lay_grids(logs, log_map, map_file, rate)
     grid = grids[main.name]
-    warnings = _clock_warnings(grid)
+    warnings = [*_notes(logs), *_clock_warnings(grid)]
     names = [name for name in CHANNELS if name in log_map.channels]
     record, logged, filled = {}, {}, {}
     for name in names:
@@ -71,8 +71,8 @@ def import_log(
         log = logs[log_of(name, log_map, logs, map_file)]
         own = grids[log.name]
         values = _in_si(log, name, channel, map_file, warnings)
-        if len(values) < own.kept.stop:
-            problem = f"has {len(values)} rows, the clock {own.kept.stop}"
+        if len(values) != own.rows:
+            problem = f"has {len(values)} rows, the clock {own.rows}: sampled by another clock?"
             raise InputError(log.file, channel.source, problem)
         kept = values[own.kept]
         filled[name] = _check_gaps(log, log_map, name, own, kept)
@@ -129,7 +129,8 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
         row = int(np.argmax(huge))
         problem = f"row {log.line(row)} makes {si[row]:.3g}, larger than any real one"
         raise InputError(log.file, channel.source, problem)
-    return np.asarray(si + 0.0)  # a sign on an exact zero makes −0
+    si[np.abs(si) < SMALLEST] = 0.0  # −0 as well, which a sign on an exact zero makes
+    return np.asarray(si)
 
 
 def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats) -> int:
@@ -169,6 +170,17 @@ def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
     base = 0.0 if np.min(values[valid]) >= 0.0 else -np.pi
     result = on_frames(grid, smooth, delay_s)
     return np.asarray(np.mod(result - base, turn) + base)
+
+
+def _notes(logs: Mapping[str, Log]) -> list[str]:
+    """Return what is to be said of the logs, each with its name where there are several."""
+    several = len({log.file for log in logs.values()}) > 1
+    notes = [
+        f"{log.file.name}: {note}" if several else note
+        for log in logs.values()
+        for note in log.notes
+    ]
+    return list(dict.fromkeys(notes))
 
 
 def _clock_warnings(grid: Grid) -> list[str]:

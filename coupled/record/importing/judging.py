@@ -83,13 +83,18 @@ def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> d
         for name in moved:
             if data is not None:
                 _add(doubts, name, _travel(name, record[name], data, file))
+        force = channel(control, "force")
         if moved:
-            force = channel(control, "force")
             if force in record and plausible.move_oppositely(record[force], record[moved[0]]):
                 _add(doubts, force, "moves against the deflection: sign?")
             if force in record and plausible.lacks_its_sign(record[force], record[moved[0]]):
                 _add(doubts, force, "never negative: a size without its sign?")
             _add(doubts, force, _force(record, control, moved[0], data))
+        if len(moved) == 2 and force in record:
+            sign = plausible.bend_sign(record[force], record[moved[0]], record[moved[1]])
+            if sign < 0:
+                problem = f"falls short of {moved[0]} under force: exchanged, or a scale?"
+                _add(doubts, moved[1], problem)
     pulled = next((n for n in ("column_computed_m", "column_deflection_m") if n in record), None)
     elevator = record.get("elevator_rad")
     if pulled and elevator is not None and plausible.move_oppositely(-elevator, record[pulled]):
@@ -124,15 +129,30 @@ def _force(
     force, gradient = (channel(control, q) for q in ("force", "gradient"))
     if force not in record:
         return None
-    if gradient in record:
-        total = record[gradient]
-    elif data is not None and "dynamic_pressure_Pa" in record:
-        total = specified_gradient(data.schedule, record["dynamic_pressure_Pa"])
-    else:
+    total = record[gradient] if gradient in record else _filed_gradient(record, data)
+    if total is None:
         return None
-    ratio = plausible.force_ratio(record[force], record[moved], total)
-    if ratio is None:
+    expected = record[force]
+    if data is not None:  # breakout and friction are no spring's, and may be most of a small pull
+        held = data.loader.breakout + data.loader.friction
+        expected = np.sign(expected) * np.maximum(np.abs(expected) - held, 0.0)
+    plain = plausible.force_ratio(record[force], record[moved], total)
+    sprung = plausible.force_ratio(expected, record[moved], total)
+    doubts = [
+        plausible.unit_doubt(ratio, moved.endswith("_rad"))
+        for ratio in (plain, sprung)
+        if ratio is not None
+    ]
+    return doubts[0] if doubts and all(doubts) else None
+
+
+def _filed_gradient(record: Mapping[str, Floats], data: Control | None) -> Floats | None:
+    """Return the gradient that a rig's table gives: by q̄, or without it where it is the same."""
+    if data is None:
         return None
-    if plausible.in_pounds(abs(ratio)):
-        return "looks like pounds"
-    return "was N already, not lbf?" if plausible.from_newtons(abs(ratio)) else None
+    if "dynamic_pressure_Pa" in record:
+        return specified_gradient(data.schedule, record["dynamic_pressure_Pa"])
+    first, *rest = data.schedule.total_gradient
+    if data.schedule.second_gradient is not None or any(each != first for each in rest):
+        return None
+    return np.full(next(iter(record.values())).size, first)

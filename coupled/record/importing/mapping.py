@@ -7,6 +7,7 @@ a channel says which is its own, and each log has its own stamps, all from one c
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -42,12 +43,28 @@ class Layout(Section):
     names: list[str] | str = "signals"
 
 
-class Clock(Section):
-    """Where a row's time comes from, the record's frame rate, and the cut."""
+def _rows_given(value: object) -> object:
+    each = value if isinstance(value, list) else [None]
+    if any(isinstance(row, bool) or not isinstance(row, (int, str)) for row in each):
+        raise PydanticCustomError("rows", 'should be a list of rows, as [962, "970-980"]')
+    return value
+
+
+class Stamped(Section):
+    """How the times of a log's rows are read, and which rows are used."""
 
     source: str = named("from", "")
     unit: str = ""  # the log's own, or s where it states none
     date: str = ""
+    wraps_at: float | None = quantity("", None, gt=0, le=2.0**64)
+    drop_rows: Annotated[list[int | str], BeforeValidator(_rows_given)] = []
+    sort: bool = False
+    drop_duplicates: bool = False
+
+
+class Clock(Stamped):
+    """The clock of the log that makes the frames, the record's frame rate, and the cut."""
+
     rate: float | None = quantity("Hz", None, gt=0, le=1e6)
     frame_rate: float | None = quantity("Hz", None, ge=1, le=2000)
     start: float = quantity("s", 0.0, ge=0)
@@ -61,12 +78,17 @@ def _no_bool(value: object) -> object:
     return value
 
 
-class OtherClock(Section):
+def _one_element(value: object) -> object:
+    place = isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 10_000
+    if not place and not (isinstance(value, str) and value):
+        raise PydanticCustomError("element", "should be a place from 1 to 10000, or a name")
+    return value
+
+
+class OtherClock(Stamped):
     """Where a further log's rows have their time from, if not as the first log's."""
 
     source: str = named("from", min_length=1)
-    unit: str = ""
-    date: str = ""
 
 
 class Channel(Section):
@@ -74,9 +96,10 @@ class Channel(Section):
 
     source: str = named("from", min_length=1)
     log: str = ""
-    element: int | None = quantity("", None, ge=1, le=10_000)
+    element: Annotated[int | str | None, BeforeValidator(_one_element)] = None
     sign_bit: int | None = quantity("", None, ge=1, le=52)
-    wraps_at: float | None = quantity("", None, ge=4, le=2.0**53)
+    wraps_at: float | None = quantity("", None, gt=0, le=2.0**53)
+    unwrap: bool | None = None
     unit: str = ""
     sign: Annotated[Literal[1, -1], BeforeValidator(_no_bool)] = 1
     scale: float = 1.0
@@ -155,6 +178,9 @@ def _faults(found: LogMap, path: Path) -> list[InputError]:
         if channel.sign_bit is not None and channel.wraps_at is not None:
             problem = "and wraps_at are two ways to keep a sign: give one"
             faults.append(InputError(path, f"channels.{name}.sign_bit", problem))
+        if channel.unwrap is not None and channel.wraps_at is None:
+            problem = "goes with wraps_at, as 360: give that too"
+            faults.append(InputError(path, f"channels.{name}.unwrap", problem))
         with collected(faults):
             if channel.unit:
                 factor_of(name, channel.unit, path)
@@ -165,12 +191,19 @@ def _check_clock(clock: Clock, path: Path) -> None:
     if bool(clock.source) == (clock.rate is not None):
         problem = "give either from, the column with the time, or rate_Hz of a log without one"
         raise InputError(path, "clock", problem)
+    if clock.rate is not None:
+        for key in ("wraps_at", "sort", "drop_duplicates"):
+            if getattr(clock, key):
+                raise InputError(path, f"clock.{key}", "needs a column of times: give clock.from")
     _check_stamps(clock, path, "clock")
     if clock.end is not None and clock.end <= clock.start:
         raise InputError(path, "clock.end_s", f"must lie after start_s = {clock.start:g}")
 
 
-def _check_stamps(clock: Clock | OtherClock, path: Path, key: str) -> None:
+def _check_stamps(clock: Stamped, path: Path, key: str) -> None:
+    dropped_rows(clock, path, key)
+    if clock.date and clock.wraps_at is not None:
+        raise InputError(path, f"{key}.wraps_at", "is for a counter; dates do not wrap: leave out")
     unit = known_unit(clock.unit or "s", path, f"{key}.unit")
     if unit.dimension != _own("s").dimension:
         fit = ", ".join(units_like(_own("s")))
@@ -178,6 +211,19 @@ def _check_stamps(clock: Clock | OtherClock, path: Path, key: str) -> None:
     if clock.date and clock.date != "iso" and "%" not in clock.date:
         problem = f'is {clock.date[:40]!r}; give "iso", or a pattern as "%d.%m.%Y %H:%M:%S.%f"'
         raise InputError(path, f"{key}.date", problem)
+
+
+def dropped_rows(clock: Stamped, path: Path, key: str) -> list[tuple[int, int]]:
+    """Return the first and the last row of each entry of `drop_rows`, as faults count rows."""
+    found = []
+    for entry in clock.drop_rows:
+        match = re.fullmatch(r"\s*(\d{1,12})(?:\s*-\s*(\d{1,12}))?\s*", str(entry), re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+        if not 1 <= first <= last:
+            problem = f'{str(entry)[:40]!r} is no row; give rows, as 962, or ranges, as "962-1000"'
+            raise InputError(path, f"{key}.drop_rows", problem)
+        found.append((first, last))
+    return found
 
 
 def own_unit(channel: str) -> str:

@@ -16,6 +16,14 @@ from coupled.units import POUND_N, PSF_Pa
 
 Floats = NDArray[np.float64]
 FAR_BEYOND = 3.0  # times the travel: no rig does that, so its unit is another
+ROUNDING = 1e-9  # of a channel's own spread, as records in text are rounded
+# Of what follows the rate: a delay τ makes ω·τ of the motion follow it, and leaves (ω·τ)²/2 beside.
+BESIDE_A_DELAY = 0.3  # up to ω·τ = 0.6, more than a sensor is late
+FAR_RATIO = 2.0  # of a force over its spring's: a diagnosis refuses another rig's file from here on
+# What N, and m or rad, are in other units; lbf has rules of its own.
+_FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
+_LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
+_ANGLE = {"deg": np.pi / 180.0}
 TOGETHER = 0.6  # correlation of a force with a spring's, from which its size says its unit
 _D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
@@ -123,6 +131,49 @@ def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float 
     shared, power = float(force_N @ expected), float(expected @ expected)
     together = abs(shared) >= TOGETHER * np.sqrt(float(force_N @ force_N) * power)
     return shared / power if power > 0.0 and together else None
+
+
+def bend_sign(force_N: Floats, computed: Floats, deflection: Floats) -> int:
+    """Return the sign of the slope of δ − δc on F; 0 where the two hardly go together.
+
+    Under a pull a structure yields, so that δ = δc + K·F with K > 0: −1 means that δ and δc are
+    exchanged, or scaled apart. What follows the rate of the motion, as a late sensor makes it, is
+    taken off both first.
+    """
+    rate = np.gradient(computed)
+    off = np.column_stack([np.ones(rate.size), rate])
+    apart = deflection - computed
+    left, pull = (y - off @ np.linalg.lstsq(off, y, rcond=None)[0] for y in (apart, force_N))
+    scale = float(np.sqrt((left @ left) * (pull @ pull)))
+    # A difference of rounding errors, of two channels that are the same, has no slope.
+    if float(np.std(apart)) <= ROUNDING * float(np.std(computed)) or scale == 0.0:
+        return 0
+    if float(np.std(left)) < BESIDE_A_DELAY * float(np.std(apart - left)):
+        return 0
+    share = float(left @ pull) / scale
+    return int(np.sign(share)) if abs(share) >= TOGETHER else 0
+
+
+def unit_doubt(ratio: float, turned: bool) -> str | None:
+    """Say in which unit a force would be right that is `ratio` times what a spring gives, if any.
+
+    `turned` tells that the deflection is an angle. A ratio within a factor of 2 is in question
+    only where it is that of pounds.
+    """
+    size = abs(ratio)
+    if in_pounds(size):
+        return "looks like pounds"
+    if from_newtons(size):
+        return "was N already, not lbf?"
+    if 1.0 / FAR_RATIO < size < FAR_RATIO:
+        return None
+    says = f"is {size:.2g} of what gradient and deflection say"
+    for units, kind in ((_FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
+        for word, factor in units.items():
+            wrong = size * factor if kind == "force" else size / factor
+            if abs(wrong - 1.0) < 0.1:
+                return f"{says}: the {kind} in {word}?"
+    return f"{says}: another unit, scale or rig?"
 
 
 def in_pounds(ratio: float) -> bool:

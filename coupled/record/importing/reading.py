@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, nearest, shown
 from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
-from coupled.record.importing.cells import element, moments, signed
+from coupled.record.importing.cells import Place, element, labels_of, moments, signed
 from coupled.record.importing.formats.columns import Found
-from coupled.record.importing.mapping import Channel, Clock, Layout, OtherClock, known_unit
+from coupled.record.importing.mapping import Channel, Layout, Stamped, known_unit
 from coupled.record.importing.separate import read_parquet_separately, read_separately
 from coupled.units import parse_unit
 
@@ -42,18 +43,23 @@ class Log:
 
     Where a format samples groups of columns by clocks of their own, `stamps` names the column
     with each one's times, and `groups` the group; `refused` tells why a column is not read.
-    `part` is the group that a log is a part of another of.
+    `part` is the group that a log is a part of another of. Columns of one name are called
+    `name#1`, `name#2`, …, and `doubled` has {name: those}. `decimal` is the mark in numbers that
+    are text. `notes` are lines for the user: what the reader's library warned of, which rows
+    were left out.
     """
 
     file: Path
     columns: Mapping[str, pl.Series]
     units: Mapping[str, str] = field(default_factory=dict)
-    doubled: frozenset[str] = frozenset()
+    doubled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lines: Lines | None = None
     groups: Mapping[str, str] = field(default_factory=dict)
     stamps: Mapping[str, str] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
     part: str = ""
+    decimal: Literal[".", ","] = "."
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -67,7 +73,7 @@ class Log:
     def find(self, name: str, map_file: Path, key: str) -> pl.Series:
         """Return the column of a name that a map gives under `key`."""
         if name in self.doubled:
-            raise InputError(self.file, name, "duplicate column; which is meant?")
+            raise InputError(self.file, name, _which(self.doubled[name]))
         if name in self.refused:
             raise InputError(self.file, name, self.refused[name])
         if name not in self.columns:
@@ -80,17 +86,25 @@ class Log:
     def values(self, channel: Channel, map_file: Path, key: str) -> Floats:
         """Return a channel's column as doubles, signed, NaN where a cell is empty: (rows,)."""
         name = channel.source
-        column = self.find(name, map_file, f"{key}.from")
+        column = self.point(self.find(name, map_file, f"{key}.from"))
         if channel.element is not None:
-            column = element(column, channel.element, self.file, name, self.line)
+            names = labels_of(name, column, self.columns)
+            where = Place(self.file, name, self.line)
+            column = element(column, channel.element, names, where)
         raw = numbers(self.file, name, column, gaps=True, line=self.line)
         return signed(raw, channel, self.file, self.line)
 
-    def times(self, clock: Clock | OtherClock, map_file: Path, key: str) -> Stamps:
+    def point(self, column: pl.Series) -> pl.Series:
+        """Return a column whose numbers, where they are text, have a decimal point."""
+        if self.decimal == "." or column.dtype != pl.String:
+            return column
+        return column.str.replace_all(",", ".", literal=True)
+
+    def times(self, clock: Stamped, map_file: Path, key: str) -> Stamps:
         """Return when each row was taken.
 
         Counted from the first row before it becomes a double: a clock in ns since 1970 keeps
-        all its digits.
+        all its digits. A counter is followed across the number at which it wraps.
         """
         name = clock.source
         column = self.find(name, map_file, f"{key}.from")
@@ -102,6 +116,7 @@ class Log:
         if column.dtype.is_temporal():
             unit = getattr(column.dtype, "time_unit", None)
             return _counted(column.to_physical(), {"ms": 10**3, "us": 10**6}.get(str(unit), 10**9))
+        column = self.point(column)
         check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
         factor = known_unit(clock.unit or self._time_unit(name), map_file, f"{key}.unit").factor
@@ -109,9 +124,23 @@ class Log:
         if column.dtype.is_integer() and column.len() and column[0] is not None:
             wide = column.cast(pl.Int64, strict=False) - int(column[0])
             steps = wide.cast(pl.Float64).to_numpy().astype(np.float64)
+            steps = self._unwrapped(steps, clock, map_file, key)
             return Stamps(Fraction(int(column[0])) * exact, steps * factor)
         first = float(values[0]) if values.size and np.isfinite(values[0]) else 0.0
-        return Stamps(Fraction(first) * exact, (values - first) * factor)
+        steps = self._unwrapped(values - first, clock, map_file, key)
+        return Stamps(Fraction(first) * exact, steps * factor)
+
+    def _unwrapped(self, count: Floats, clock: Stamped, map_file: Path, key: str) -> Floats:
+        """Return a counter, less its first number, without the jumps where it starts again."""
+        if clock.wraps_at is None or not np.isfinite(count).any():
+            return count
+        span = float(np.nanmax(count) - np.nanmin(count))
+        if span > clock.wraps_at:
+            problem = f"is {clock.wraps_at:g}, and {clock.source} spans {span:.6g}: larger"
+            raise InputError(map_file, f"{key}.wraps_at", problem)
+        there = np.isfinite(count)
+        count[there] = np.unwrap(count[there], period=clock.wraps_at)
+        return count
 
     def _time_unit(self, name: str) -> str:
         """Return the unit of time that the log states for a column, or s."""
@@ -145,21 +174,46 @@ def read_log(path: Path, layout: Layout) -> Log:
     if kind == "csv":
         return _read_csv(path, content, layout)
     if kind == "parquet":
-        return Log(path, read_parquet_separately(path, content))
-    return _log(path, read_separately(path, content, kind, layout))
+        columns, notes = read_parquet_separately(path, content)
+        return Log(path, columns, notes=notes)
+    found, notes = read_separately(path, content, kind, layout)
+    return replace(_log(path, found), notes=notes)
 
 
 def _log(path: Path, found: list[Found]) -> Log:
-    times = Counter(column.name for column in found)
+    names, doubled = _apart([column.name for column in found])
+    found = [replace(column, name=name) for column, name in zip(found, names, strict=True)]
     return Log(
         path,
         {c.name: pl.Series(c.name, c.values) for c in found if not c.refused},
         {c.name: c.unit for c in found if c.unit},
-        frozenset(name for name, count in times.items() if count > 1),
+        doubled,
         groups={c.name: c.group for c in found if c.group},
         stamps={c.name: c.stamps for c in found if c.stamps},
         refused={c.name: c.refused for c in found if c.refused},
     )
+
+
+def _apart(names: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
+    """Return names of which none is met twice, and {name met twice: what it is called instead}."""
+    times = Counter(names)
+    doubled: dict[str, list[str]] = {name: [] for name, count in times.items() if count > 1}
+    unique = []
+    for name in names:
+        own = name
+        if name in doubled:
+            own = f"{name}#{len(doubled[name]) + 1}"
+            while own in times:  # a column that is called so by itself
+                own = own.replace("#", "##", 1)
+            doubled[name].append(own)
+        unique.append(own)
+    return unique, {name: tuple(own) for name, own in doubled.items()}
+
+
+def _which(names: Sequence[str]) -> str:
+    count = {2: "two", 3: "three"}.get(len(names), str(len(names)))
+    those = " or ".join(f'"{shown(name)}"' for name in names[:4])
+    return f"{count} columns have this name; give from = {those}, counted from the first column"
 
 
 def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
@@ -189,6 +243,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
     names = [str(i + 1) for i in range(table.width)]
     if layout.header:
         names = [(cell or "").strip() for cell in table.row(0)]
+    names, doubled = _apart(names)
     units = dict(zip(names, table.row(heads), strict=True)) if layout.units_row else {}
     columns = {}
     for name, column in zip(names, table.slice(under).get_columns(), strict=True):
@@ -199,8 +254,9 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
         path,
         columns,
         {name: unit for name, unit in units.items() if unit},
-        frozenset(name for name in names if names.count(name) > 1),
+        doubled,
         whole,
+        decimal=layout.decimal,
     )
 
 
@@ -232,6 +288,4 @@ def _cells(column: pl.Series, layout: Layout) -> pl.Series:
     cells = column.str.strip_chars()
     if layout.missing:
         cells = cells.set(cells.is_in(layout.missing).fill_null(False), None)
-    if layout.decimal == ",":
-        cells = cells.str.replace(",", ".", literal=True)
     return cells

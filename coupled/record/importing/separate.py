@@ -15,18 +15,21 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import polars as pl
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.record.importing.formats.columns import Found, pack, unpack
+from coupled.record.importing.formats.warned import kept_warnings
 from coupled.record.importing.mapping import Layout
 
 REFUSED = 3  # exit code of a process that says itself what is wrong
 LONGEST_s = 20.0  # that a reader may take, and
 LONGEST_s_per_MiB = 10.0
+MOST_NOTES = 8  # warnings of a reader that are shown
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _WORDS = {
     **{
@@ -50,30 +53,47 @@ _READERS: dict[str, tuple[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Task:
-    """What a separate process is to read: a `kind` of file, and which of its matrices."""
+    """What a separate process is to read: a `kind` of file, and which of its matrices.
+
+    `missing` are the words that mean an empty cell.
+    """
 
     kind: str
     file: str
     matrix: str
     names: list[str] | str
+    missing: list[str]
 
 
-def read_separately(path: Path, content: bytes, kind: str, layout: Layout) -> list[Found]:
-    """Return the columns of a log that is neither text nor Parquet; raises InputError."""
-    return unpack(pl.read_ipc(_answer(path, content, kind, layout)))
+def read_separately(
+    path: Path, content: bytes, kind: str, layout: Layout
+) -> tuple[list[Found], tuple[str, ...]]:
+    """Return the columns of a log that is neither text nor Parquet, and its reader's warnings.
+
+    Raises InputError.
+    """
+    table, notes = _answer(path, content, kind, layout)
+    return unpack(table), notes
 
 
-def read_parquet_separately(path: Path, content: bytes) -> dict[str, pl.Series]:
-    """Return the columns of a Parquet file, of whatever type; raises InputError."""
-    table = pl.read_ipc(_answer(path, content, "parquet", Layout()))
-    return {name: table[name] for name in table.columns}
+def read_parquet_separately(
+    path: Path, content: bytes
+) -> tuple[dict[str, pl.Series], tuple[str, ...]]:
+    """Return the columns of a Parquet file, of whatever type, and its reader's warnings.
+
+    Raises InputError.
+    """
+    table, notes = _answer(path, content, "parquet", Layout())
+    return {name: table[name] for name in table.columns}, notes
 
 
-def _answer(path: Path, content: bytes, kind: str, layout: Layout) -> io.BytesIO:
+def _answer(
+    path: Path, content: bytes, kind: str, layout: Layout
+) -> tuple[pl.DataFrame, tuple[str, ...]]:
     if kind == "mat" and _is_hdf5(content):
         kind = "hdf5"
     _check_installed(path, kind)
-    task = Task(kind, str(path), layout.matrix, layout.names)
+    task = Task(kind, str(path), layout.matrix, layout.names, layout.missing)
     # The packages are found where this process finds them, and nowhere else.
     found = {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     try:
@@ -96,7 +116,8 @@ def _answer(path: Path, content: bytes, kind: str, layout: Layout) -> io.BytesIO
         raise InputError(path, said["key"], said["problem"])
     if done.returncode != 0:
         raise InputError(path, "", f"is not {_WORDS[kind]} file, or is damaged")
-    return io.BytesIO(done.stdout)
+    notes, _, table = done.stdout.partition(b"\n")
+    return pl.read_ipc(io.BytesIO(table)), tuple(json.loads(notes))
 
 
 def _is_hdf5(content: bytes) -> bool:
@@ -111,13 +132,28 @@ def _check_installed(path: Path, kind: str) -> None:
             raise InputError(path, "", problem)
 
 
-def _read(task: Task, content: bytes) -> pl.DataFrame:
+def read_here(task: Task, content: bytes, notes: list[str]) -> pl.DataFrame:
+    """Read a log in this process; add to `notes` what its reader warns of."""
     if task.kind == "parquet":
-        return pl.read_parquet(io.BytesIO(content))
+        with kept_warnings(notes):
+            return pl.read_parquet(io.BytesIO(content))
     name = _READERS[task.kind][0]
     module = importlib.import_module(f"coupled.record.importing.formats.{name[5:]}")
-    given = (task.matrix, task.names) if task.kind in ("mat", "hdf5") else ()
-    return pack(getattr(module, name)(Path(task.file), content, *given))
+    given: dict[str, tuple[object, ...]] = {
+        **dict.fromkeys(("mat", "hdf5"), (task.matrix, task.names)),
+        "mdf": (task.missing,),
+    }
+    with kept_warnings(notes):
+        found = getattr(module, name)(Path(task.file), content, *given.get(task.kind, ()))
+    return pack(found)
+
+
+def _shortened(notes: Sequence[str], kind: str) -> list[str]:
+    """Return a reader's warnings as lines for the user, each once, and not without end."""
+    lines = list(dict.fromkeys(" ".join(note.split()) for note in notes if note.strip()))
+    more = [f"… and {len(lines) - MOST_NOTES} more"] if len(lines) > MOST_NOTES else []
+    library = _READERS[kind][1][0] if kind in _READERS and _READERS[kind][1] else "its reader"
+    return [f"{library} warns: {shown(line)}" for line in [*lines[:MOST_NOTES], *more]]
 
 
 def _limit_memory() -> None:
@@ -131,12 +167,13 @@ def _limit_memory() -> None:
 
 def _main() -> int:
     _limit_memory()
+    task, notes = Task(**json.loads(sys.argv[1])), list[str]()
     try:
-        with contextlib.redirect_stdout(sys.stderr):  # readers print what they doubt
-            table = _read(Task(**json.loads(sys.argv[1])), sys.stdin.buffer.read())
+        table = read_here(task, sys.stdin.buffer.read(), notes)
     except InputError as error:
         sys.stdout.write(json.dumps({"key": error.key, "problem": error.problem}))
         return REFUSED
+    sys.stdout.buffer.write(json.dumps(_shortened(notes, task.kind)).encode() + b"\n")
     table.write_ipc(sys.stdout.buffer)
     return 0
 

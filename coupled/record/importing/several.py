@@ -5,7 +5,7 @@ So are the parts of one log that has groups of columns sampled apart (MDF, TDMS,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,23 +15,46 @@ from coupled.errors import InputError, nearest
 from coupled.record.importing.clock import EVEN_frames, Grid, beside, lay_grid, stamps_of
 from coupled.record.importing.mapping import Clock, LogMap, OtherClock
 from coupled.record.importing.reading import Log, Stamps, read_log
+from coupled.record.importing.rows import use_rows
 
 
 def read_logs(files: Sequence[Path], log_map: LogMap, map_file: Path) -> dict[str, Log]:
-    """Return the logs by their file names, the one that makes the frames first."""
+    """Return the logs by their names, the one that makes the frames first, with the rows used."""
     logs: dict[str, Log] = {}
     for file in files:
         if file.name in logs:
             raise InputError(file, "", "has the name of another log given: rename one of them")
         logs[file.name] = read_log(file, log_map.log)
-    for name in log_map.clocks:
-        if name not in logs:
-            raise InputError(map_file, f"clocks.{name}", _not_given(name, logs))
     if len(logs) > 1 and not log_map.clock.source:
         problem = "is needed where several logs are given: their stamps say how they lie"
         raise InputError(map_file, "clock.from", problem)
     parts = [part for log in logs.values() for part in _parts(log, logs, log_map, map_file)]
-    return {part.name: part for part in parts}
+    names = [*logs, *(part.name for part in parts)]
+    for name in log_map.clocks:
+        if name not in names:
+            raise InputError(map_file, f"clocks.{name}", _not_given(name, names))
+    by_name = {part.name: part for part in parts}
+    found = {}
+    for name, part in by_name.items():
+        clock, key = clock_of(part, log_map), _key(part, log_map)
+        found[name] = use_rows(part, clock, _used(name, by_name, log_map, map_file), map_file, key)
+    return found
+
+
+def _used(name: str, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> list[str]:
+    """Return the columns of a log that the map reads."""
+    return [
+        channel.source
+        for own, channel in log_map.channels.items()
+        if log_of(own, log_map, logs, map_file) == name
+    ]
+
+
+def _key(log: Log, log_map: LogMap) -> str:
+    """Return the key of the map under which a log's clock is, or may be, given."""
+    if log.part or log.file.name in log_map.clocks:
+        return f'clocks."{log.name}"'
+    return "clock"
 
 
 def _parts(log: Log, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> list[Log]:
@@ -60,8 +83,7 @@ def _parts(log: Log, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -
     return parts
 
 
-def _not_given(name: str, logs: Mapping[str, Log]) -> str:
-    names = [log.file.name for log in logs.values()]
+def _not_given(name: str, names: Iterable[str]) -> str:
     return f"no log {name!r} was given; {nearest(name, names)}"
 
 
@@ -72,7 +94,8 @@ def log_of(channel: str, log_map: LogMap, logs: Mapping[str, Log], map_file: Pat
     file = name or next(iter(logs.values())).file.name
     own = [each for each, log in logs.items() if log.file.name == file]
     if not own:
-        raise InputError(map_file, f"channels.{channel}.log", _not_given(name, logs))
+        names = [log.file.name for log in logs.values()]
+        raise InputError(map_file, f"channels.{channel}.log", _not_given(name, names))
     return next((each for each in own if source in logs[each].columns), own[0])
 
 
@@ -80,17 +103,30 @@ def clock_of(log: Log, log_map: LogMap) -> Clock | OtherClock:
     """Return what a log's stamps are read by.
 
     A part that was sampled apart has its times in a column of its own: the one that is called
-    as the clock's is in its group, or else the one that its format stamps it by.
+    as the clock's is in its group, or else the one that its format stamps it by. One logger
+    wrote both: its rows are sorted, and their duplicates dropped, as those of the clock are.
     """
     clock = log_map.clocks.get(log.file.name, log_map.clock)
     if not log.part:
         return clock
+    if log.name in log_map.clocks:
+        return log_map.clocks[log.name]
     main = log.groups.get(clock.source, "")
     alike = f"{log.part}{clock.source.removeprefix(main)}"
     if alike in log.columns and alike != clock.source:
-        return OtherClock.model_construct(source=alike, unit=clock.unit, date=clock.date)
-    column = next(iter(log.columns))
-    return OtherClock.model_construct(source=log.stamps[column], unit="", date="")
+        return OtherClock.model_construct(
+            source=alike,
+            unit=clock.unit,
+            date=clock.date,
+            wraps_at=clock.wraps_at,
+            sort=clock.sort,
+            drop_duplicates=clock.drop_duplicates,
+        )
+    return OtherClock.model_construct(
+        source=log.stamps[next(iter(log.columns))],
+        sort=clock.sort,
+        drop_duplicates=clock.drop_duplicates,
+    )
 
 
 def lay_grids(
@@ -100,7 +136,7 @@ def lay_grids(
     main, *others = logs
     if not others:
         return {main: lay_grid(logs[main], log_map, map_file, frame_rate_Hz)}
-    stamps = {name: _stamps(logs[name], name, log_map, map_file) for name in logs}
+    stamps = {name: _stamps(log, log_map, map_file) for name, log in logs.items()}
     first_s = {name: float(found.first_s - stamps[main].first_s) for name, found in stamps.items()}
     last_s = {name: first_s[name] + float(stamps[name].from_first_s[-1]) for name in logs}
     span_s = max(first_s.values()), min(last_s.values())
@@ -117,14 +153,13 @@ def lay_grids(
     delay_s = max(channel.delay for channel in log_map.channels.values())
     gap = log_map.clock.longest_gap
     for name in others:
-        source = clock_of(logs[name], log_map).source
+        clock, key = clock_of(logs[name], log_map), _key(logs[name], log_map)
         time_s = np.asarray(
             stamps[name].from_first_s + (first_s[name] - first_s[main] - grid.account.start_s)
         )
-        grids[name] = beside(grid, time_s, delay_s, logs[name], source, gap)
+        grids[name] = beside(grid, time_s, delay_s, logs[name], clock, key, gap)
     return grids
 
 
-def _stamps(log: Log, name: str, log_map: LogMap, map_file: Path) -> Stamps:
-    key = f"clocks.{name}" if name in log_map.clocks else "clock"
-    return stamps_of(log, clock_of(log, log_map), map_file, key)
+def _stamps(log: Log, log_map: LogMap, map_file: Path) -> Stamps:
+    return stamps_of(log, clock_of(log, log_map), (), map_file, _key(log, log_map))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,10 +13,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 
 from coupled.errors import InputError
 from coupled.record.importing import separate
 from coupled.record.importing.convert import import_log
+from coupled.record.importing.formats import mcap
+from coupled.record.importing.formats.warned import kept_warnings
 from coupled.record.importing.suggest.propose import propose
 from tests.support import formats
 from tests.support.commands import coupled
@@ -157,6 +162,132 @@ def test_a_lacking_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "a.ulg").write_bytes(b"ULog\x01\x12\x35")
     with pytest.raises(InputError, match=r"needs pyulog.*pip install 'coupled\[logs\]'"):
         read(tmp_path, "a.ulg", ONE.format(time="T", unit="", force="F"))
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_matlab_objects_are_read_or_refused_by_name(tmp_path: Path, version: str) -> None:
+    formats.write_matlab_objects(tmp_path / "a.mat", version)
+    for time, force in (
+        ("t", "F"),  # plain vectors, as if no object lay beside them
+        ("span", "F"),
+        ("LOG.runs.When", "LOG.runs.force"),
+        ("plain.T", "plain.force"),
+    ):
+        record, account = read(tmp_path, "a.mat", ONE.format(time=time, unit="", force=force))
+        np.testing.assert_allclose(record["column_force_N"], N_PER_LBF * formats.FORCE_lbf)
+        assert account.clock.frame_rate_Hz == 60.0
+    with pytest.raises(InputError, match=r"a\.mat: LOG.runs.note: holds text or objects"):
+        read(tmp_path, "a.mat", ONE.format(time="t", unit="", force="LOG.runs.note"))
+    with pytest.raises(InputError, match=r"a\.mat: kinds: is a MATLAB categorical: save it as"):
+        read(tmp_path, "a.mat", ONE.format(time="t", unit="", force="kinds"))
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_plain_vectors_beside_objects_need_no_mat_io(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str
+) -> None:
+    formats.write_matlab_objects(tmp_path / "a.mat", version)
+    task = separate.Task("mat" if version == "v7" else "hdf5", "a.mat", "", "signals", [])
+    there = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "matio" else there(name)
+    )
+    table = separate.read_here(task, (tmp_path / "a.mat").read_bytes(), [])
+    refused = dict(zip(table["name"], table["refused"], strict=True))
+    assert refused["F"] == refused["t"] == refused["LOG.gain"] == ""
+    assert refused["LOG.runs"].startswith("is a MATLAB timetable: reading it needs mat-io")
+    assert refused["kinds"].startswith("is a MATLAB categorical")
+
+
+def test_a_text_among_an_mdf_channels_numbers_is_refused_unless_it_means_none(
+    tmp_path: Path,
+) -> None:
+    counts = 0.001 * np.rint(1000.0 * formats.FORCE_lbf)
+    table = {"val_0": 17, "text_0": b"SNA", "default_addr": {"a": 0.001, "b": 0.0}}
+    formats.write_mdf(tmp_path / "a.mf4", table)
+    log_map = ONE.format(unit="", **CASES["a.mf4"][1])
+    record, _ = read(tmp_path, "a.mf4", log_map)  # no row holds 17
+    np.testing.assert_allclose(record["column_force_N"], N_PER_LBF * counts, atol=1e-9)
+    table["val_0"] = round(1000.0 * formats.FORCE_lbf[9])
+    there = np.rint(1000.0 * formats.FORCE_lbf) != table["val_0"]
+    formats.write_mdf(tmp_path / "a.mf4", table)
+    with pytest.raises(InputError, match=r'force: row 10 is the text "SNA".*log.missing = \["SNA"'):
+        read(tmp_path, "a.mf4", log_map)
+    record, account = read(tmp_path, "a.mf4", '[log]\nmissing = ["SNA"]\n' + log_map)
+    assert account.channels["column_force_N"].filled_cells == np.count_nonzero(~there)
+    np.testing.assert_allclose(record["column_force_N"][there], N_PER_LBF * counts[there])
+
+
+def test_a_formula_behind_a_value_table_is_not_run(tmp_path: Path) -> None:
+    table = {"val_0": 17, "text_0": b"SNA", "default_addr": {"formula": "X * 0.001"}}
+    formats.write_mdf(tmp_path / "a.mf4", table)
+    with pytest.raises(InputError, match=r"a\.mf4: force: is converted by a formula"):
+        read(tmp_path, "a.mf4", ONE.format(unit="", **CASES["a.mf4"][1]))
+
+
+def test_what_a_reader_library_warns_of_is_a_line(tmp_path: Path) -> None:
+    formats.write_tdms(tmp_path / "a.tdms")
+    content = bytearray((tmp_path / "a.tdms").read_bytes())
+    content[8:12] = (4714).to_bytes(4, "little")  # the version of the format
+    (tmp_path / "a.tdms").write_bytes(content)
+    _, account = read(tmp_path, "a.tdms", TWO.format(unit="", **CASES["a.tdms"][1]))
+    assert account.warnings == ("nptdms warns: Unrecognised version number: 4714",)
+
+
+def test_a_proposal_says_which_columns_are_not_read(tmp_path: Path) -> None:
+    scale = {"NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Reciprocal"}
+    with TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("g", "time", formats.TIME_s),
+                ChannelObject("g", "column encoder [mm]", 20.0 * np.sin(formats.TIME_s)),
+                ChannelObject("g", "column force [N]", formats.FORCE_lbf, scale),
+            ]
+        )
+    done = coupled(tmp_path, "import", "a.tdms", "--suggest", "m.toml", columns=200)
+    assert done.returncode == 0, done.stderr
+    assert "column force [N]: npTDMS does not know what its numbers are: Unsuppor" in done.stdout
+
+
+def test_a_ulog_of_which_parts_are_damaged_says_so(tmp_path: Path) -> None:
+    formats.write_ulog(tmp_path / "a.ulg")
+    content = bytearray((tmp_path / "a.ulg").read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 30] = b"\xff" * 30
+    (tmp_path / "a.ulg").write_bytes(content)
+    _, account = read(tmp_path, "a.ulg", TWO.format(unit="", **CASES["a.ulg"][1]))
+    assert any("the file is damaged from byte" in warning for warning in account.warnings)
+    formats.write_ulog(tmp_path / "a.ulg")
+    _, account = read(tmp_path, "a.ulg", TWO.format(unit="", **CASES["a.ulg"][1]))
+    assert account.warnings == ()
+
+
+def test_all_ways_of_warning_are_kept_and_those_of_code_are_not() -> None:
+    notes: list[str] = []
+    with kept_warnings(notes):
+        warnings.warn("of the file", UserWarning, stacklevel=1)
+        warnings.warn("of the code", DeprecationWarning, stacklevel=1)
+        logging.getLogger("some.library").warning("logged %d", 7)
+        print("printed")
+    assert notes == ["logged 7", "of the file", "printed"]
+
+
+def test_names_above_and_beside_an_array_name_its_elements() -> None:
+    message = {
+        "joint_names": ["a", "b"],
+        "units": ["N", "N"],
+        "actual": {"positions": [1.0, 2.0], "all": [5, 6, 7]},
+        "each": [
+            {"interface_names": ["x", "y"], "values": [10, 11]},
+            {"interface_names": ["y", "x"], "values": [21, 20]},
+        ],
+    }
+    found = {each.name: each.number for each in mcap._values(message, "", 0, ())}
+    assert found["actual.positions[b]"] == found["actual.positions[1]"] == 2.0
+    assert found["each[b].values[x]"] == 20
+    assert found["each[0].values[y]"] == 11
+    assert found["actual.all[2]"] == 7
+    assert "actual.positions[N]" not in found
 
 
 @pytest.mark.slow

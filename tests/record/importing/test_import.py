@@ -304,6 +304,68 @@ def test_a_force_in_pounds_is_seen_against_the_rig(tmp_path: Path) -> None:
         import_log(tmp_path / "log.csv", tmp_path / "map.toml", rig)
 
 
+@pytest.mark.parametrize(
+    ("factor", "says"),
+    [
+        (1.0, None),
+        (1.6, None),
+        (1 / 4.448, "looks like pounds"),
+        (4.448, "was N already, not lbf?"),
+        (1 / 9.807, "the force in kgf or daN?"),
+        (0.0254, "the deflection in in?"),
+        (0.01, "the deflection in cm?"),
+        (0.4, "is 0.4 of what gradient and deflection say: another unit, scale or rig?"),
+        (-3.0, "is 3 of what gradient and deflection say: another unit, scale or rig?"),
+    ],
+)
+def test_a_force_far_from_its_springs_is_in_doubt(factor: float, says: str | None) -> None:
+    doubt = plausible.unit_doubt(factor, turned=False)
+    assert doubt == says if says is None else says in str(doubt)
+
+
+def test_a_force_is_held_against_a_schedule_that_is_flat_without_dynamic_pressure(
+    tmp_path: Path,
+) -> None:
+    rig = read_rig(shipped_rigs()["report-column"])
+    gradient = rig.controls["column"].schedule.total_gradient[0]
+    table = {"controls.column.schedule.dynamic_pressure_Pa": [0.0, 1e4]}
+    table["controls.column.schedule.total_gradient_N_per_m"] = [gradient, gradient]
+    flat = rig.changed(table)
+    moved = 0.05 * np.sin(TIME_s)
+    log_map = MAP.replace("sign = -1", "").replace('"lbf"', '"N"').replace('"in"', '"m"')
+    log_map = log_map.replace('unit = "ms"', f'unit = "ms"\nframe_rate_Hz = {rig.frame_rate}')
+    imported(tmp_path, text(force=0.3 * gradient * moved, deflection=moved), log_map)
+    for each, seen in ((flat, True), (rig, False)):
+        _, account = import_log(tmp_path / "log.csv", tmp_path / "map.toml", each)
+        found = account.channels["column_force_N"].doubts
+        assert any("gradient and deflection" in doubt for doubt in found) is seen
+
+
+def test_a_deflection_that_falls_short_under_force_is_in_doubt(tmp_path: Path) -> None:
+    bent = DEFLECTION_m + 1e-4 * FORCE_N
+    lines = [f"{1e3 * t:.6f},{f:.9g},{a:.9g},{b:.9g}" for t, f, a, b in
+             zip(TIME_s, FORCE_N, DEFLECTION_m, bent, strict=True)]  # fmt: skip
+    log_map = MAP.replace("sign = -1", "").replace('"lbf"', '"N"').replace('"in"', '"m"')
+    log_map += '[channels.column_deflection_m]\nfrom = "G"\nunit = "m"\n'
+    log = "\n".join(["T,F,D,G", *lines])
+    assert "column_deflection_m" not in {k for k, v in doubts(tmp_path, log, log_map).items() if v}
+    log = "\n".join(["T,F,G,D", *lines])
+    assert doubts(tmp_path, log, log_map)["column_deflection_m"] == [
+        "falls short of column_computed_m under force: exchanged, or a scale?"
+    ]
+
+
+def test_a_late_sensor_is_no_negative_bend() -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    moved = 0.05 * np.sin(2.0 * time)
+    late = 0.05 * np.sin(2.0 * (time - 0.02))
+    force = 400.0 * moved + 120.0 * np.gradient(moved, time)
+    assert plausible.bend_sign(force, moved, late) == 0
+    assert plausible.bend_sign(force, moved, late - 1e-4 * force) == -1
+    assert plausible.bend_sign(force, moved, late + 1e-4 * force) == 1
+    assert plausible.bend_sign(force, moved, moved) == 0
+
+
 def test_figures_on_white_noise_raise_no_doubt() -> None:
     noise = np.random.default_rng(8).standard_normal(20_000)
     assert plausible.noise_level(noise) == pytest.approx(1.0, rel=0.03)

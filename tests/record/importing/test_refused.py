@@ -39,7 +39,11 @@ LOGS: dict[str, tuple[str, str | bytes, str]] = {
     "zeros": ("log.csv", bytes(999), "bytes that are no text"),
     "header only": ("log.csv", "T,F,D\n", "no row of numbers"),
     "one row": ("log.csv", "T,F,D\n0,1,2\n", "fewer than two rows"),
-    "two names": ("log.csv", GOOD.replace("T,F,D", "T,F,F"), "F: duplicate column"),
+    "two names": (
+        "log.csv",
+        GOOD.replace("T,F,D", "T,F,F"),
+        'F: two columns have this name; give from = "F#1" or "F#2"',
+    ),
     "semicolons": ("log.csv", GOOD.replace(",", ";"), "another log.delimiter"),
     "words": ("log.csv", edited(7, "100.0,hello,1"), "F: row 8 holds 'hello'"),
     "inf": ("log.csv", edited(7, "100.0,inf,1"), "F: row 8 holds no finite number"),

@@ -217,3 +217,53 @@ def test_the_command_writes_a_map_and_asks(tmp_path: Path) -> None:
         done = coupled(tmp_path, "import", "log.csv", *wrong)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert files(tmp_path) == before
+
+
+def two_places(first: str, second: str, yields_m_per_N: float) -> dict[str, np.ndarray]:
+    """Return a log whose second place yields to a pull that is logged as negative."""
+    noise = 2e-6 * np.random.default_rng(5).standard_normal(TIME_s.size)
+    more_m = DEFLECTION_m + yields_m_per_N * FORCE_N + noise
+    table = {"t": TIME_s, "stick load [N]": -FORCE_N, first: DEFLECTION_m, second: more_m}
+    return {name: np.asarray(values) for name, values in table.items()}
+
+
+@pytest.mark.parametrize(
+    ("names", "yields", "computed", "asked"),
+    [
+        (("A pos [m]", "B pos [m]"), 1e-4, "A pos [m]", False),
+        (("A pos [m]", "B pos [m]"), -1e-4, "B pos [m]", False),
+        (("A pos [m]", "B pos [m]"), 0.0, "", True),
+        (("Act pos [m]", "Grip LVDT [m]"), 0.0, "Act pos [m]", False),
+        (("Grip LVDT [m]", "Act pos [m]"), 0.0, "Act pos [m]", False),
+        (("Encoder [m]", "Grip [m]"), 1e-4, "Encoder [m]", False),
+        (("Encoder [m]", "Grip [m]"), -1e-4, "", True),
+    ],
+)
+def test_two_places_are_told_apart_by_name_or_by_force_or_asked(
+    tmp_path: Path, names: tuple[str, str], yields: float, computed: str, asked: bool
+) -> None:
+    pl.DataFrame(two_places(*names, yields)).write_csv(tmp_path / "log.csv")
+    _, table = proposed(tmp_path / "log.csv")
+    found = {
+        key: table["channels"][f"column_{key}_m"]["from"] for key in ("computed", "deflection")
+    }
+    if asked:
+        assert found == {"computed": "?", "deflection": "?"}
+    else:
+        other = next(name for name in names if name != computed)
+        assert found == {"computed": computed, "deflection": other}
+
+
+def test_a_place_alone_whose_end_is_open_is_asked(tmp_path: Path) -> None:
+    pl.DataFrame({"t": TIME_s, "pos [m]": DEFLECTION_m}).write_csv(tmp_path / "log.csv")
+    proposal, table = proposed(tmp_path / "log.csv")
+    assert table["channels"]["column_deflection_m"]["from"] == "?"
+    assert "channels.column_computed_m" in proposal.questions[0]
+
+
+def test_columns_of_one_name_are_both_seen(tmp_path: Path) -> None:
+    lines = GOOD.replace("T,F,D", "T,grip force [lbf],grip force [lbf]", 1)
+    (tmp_path / "log.csv").write_text(lines)
+    proposal, _ = proposed(tmp_path / "log.csv")
+    assert proposal.mapped == {"column_force_N": "grip force [lbf]#1"}
+    assert proposal.unmapped == ("grip force [lbf]#2",)

@@ -1,12 +1,14 @@
 """HDF5, and the MATLAB files of v7.3 that are made of it: vectors by their place, `LOG.force`.
 
-Only what the file itself holds is read: links to other files, data kept in other files and
+MATLAB's tables and dates are read by mat-io, and its other objects refused by name. Only what the
+file itself holds is read: links to other files, data kept in other files and
 views of them are passed over, since a log could name any file of its reader's.
 """
 
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ import numpy as np
 from coupled.errors import InputError
 from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, Numbers, as_numbers
 from coupled.record.importing.formats.matrix import columns_of_matrix
+from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # groups within groups
 MOST_VALUES = 200_000_000  # of one data set, which a small file can declare without end
@@ -32,6 +35,9 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
     found: dict[str, Found] = {}
     with h5py.File(io.BytesIO(content), "r") as file:
         _walk(found, file, file, "", 0)
+        objects = [name for name, column in found.items() if column.refused]
+        variables = list(dict.fromkeys(re.split(r"[.(]", name)[0] for name in objects))
+        whole = not objects or _holds_all(file)
         if matrix:
             table = _own(file, matrix.replace(".", "/"))
             values = _array(table) if isinstance(table, h5py.Dataset) else None
@@ -40,6 +46,8 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
             words = names if isinstance(names, list) else _words(file, _own(file, names))
             columns = columns_of_matrix(path, matrix, values, names, words)
             found.update({name: Found(name, column) for name, column in columns.items()})
+    if objects and whole:
+        replace_objects(found, content, variables)
     if not found:
         raise InputError(path, "", "holds no vector of numbers")
     return list(found.values())
@@ -63,7 +71,35 @@ def _walk(found: dict[str, Found], file: Any, group: Any, place: str, depth: int
         _take(found, file, _own(group, name), f"{place}.{name}" if place else str(name), depth)
 
 
+def _holds_all(file: Any) -> bool:
+    """Tell whether all data that objects may refer to lie in the file itself."""
+    elsewhere: list[str] = []
+
+    def look(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+            elsewhere.append(name)
+
+    for name in ("#refs#", "#subsystem#"):
+        group = _own(file, name)
+        if isinstance(group, h5py.Group):
+            group.visititems(look)
+    return not elsewhere
+
+
+def _refused(item: Any) -> str:
+    """Return the class of a MATLAB object, or of what is no plain array; "" for what is."""
+    if "MATLAB_sparse" in item.attrs:
+        return "sparse matrix"
+    if "MATLAB_object_decode" in item.attrs:
+        return _word(item.attrs.get("MATLAB_class", "object"))
+    return ""
+
+
 def _take(found: dict[str, Found], file: Any, item: Any, name: str, depth: int) -> None:
+    kind = _refused(item) if item is not None else ""
+    if kind:
+        found[name] = refused_object(name, kind)
+        return
     if isinstance(item, h5py.Group):
         _walk(found, file, item, name, depth + 1)
     if not isinstance(item, h5py.Dataset):

@@ -1,7 +1,7 @@
 """The vectors of a MATLAB file, by name: variables, fields of structs, columns of a matrix.
 
-Only numbers are taken. Objects, function handles and cells are looked at as data and passed
-over; nothing that a file holds is ever run.
+Only numbers are taken. Function handles and cells are looked at as data and passed over; tables
+and dates are read by mat-io, and other objects refused. Nothing that a file holds is ever run.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 from scipy import io as scipy_io
+from scipy.io.matlab import MatlabOpaque, varmats_from_mat
 
 from coupled.errors import InputError
-from coupled.record.importing.formats.columns import Found, Numbers
+from coupled.record.importing.formats.columns import Found
 from coupled.record.importing.formats.matrix import columns_of_matrix
+from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # structs within structs
 MOST_FIELDS = 10_000
@@ -29,19 +31,53 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
     that holds them.
     """
     variables = _load(path, content)
-    found: dict[str, Numbers] = {}
+    found: dict[str, Found] = {}
+    objects = []
     for name, value in variables.items():
+        before = {each for each, column in found.items() if column.refused}
         _collect(found, name, value, 0)
+        if {each for each, column in found.items() if column.refused} - before:
+            objects.append(name)
+    if objects:
+        replace_objects(found, content, objects)
     if matrix:
         words = names if isinstance(names, list) else _words(variables.get(names))
-        found.update(columns_of_matrix(path, matrix, variables.get(matrix), names, words))
+        columns = columns_of_matrix(path, matrix, variables.get(matrix), names, words)
+        found.update({name: Found(name, values) for name, values in columns.items()})
     if not found:
         raise InputError(path, "", "holds no vector of numbers")
-    return [Found(name, values) for name, values in found.items()]
+    return list(found.values())
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:
-    """Return the variables; what a damaged file raises ends this separate process."""
+    """Return the variables; what a damaged file raises ends this separate process.
+
+    scipy does not list the variables of a file with objects, and gives all objects one name:
+    each variable is then read by itself.
+    """
+    if not _has_objects(content):
+        return _load_together(path, content)
+    found: dict[str, Any] = {}
+    for name, variable in varmats_from_mat(io.BytesIO(content)):
+        loaded = scipy_io.loadmat(variable, verify_compressed_data_integrity=True)
+        value = loaded.get(name or "None")
+        own = _text(value.flat[0]["s0"]) if isinstance(value, MatlabOpaque) else name
+        if not own or own.startswith("__"):
+            continue
+        if own in found:
+            raise InputError(path, own, "duplicate variable")
+        found[own] = value
+    return found
+
+
+def _has_objects(content: bytes) -> bool:
+    """Tell whether the head of a file of v5 to v7.2 says where its objects are kept."""
+    return content[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and bool(
+        content[116:124].strip(b"\0 ")
+    )
+
+
+def _load_together(path: Path, content: bytes) -> dict[str, Any]:
     listed = [name for name, _, _ in scipy_io.whosmat(io.BytesIO(content))]
     doubled = sorted({name for name in listed if listed.count(name) > 1})
     if doubled:
@@ -53,17 +89,24 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
     return {name: value for name, value in loaded.items() if not name.startswith("__")}
 
 
-def _collect(found: dict[str, Numbers], name: str, value: Any, depth: int) -> None:
+def _text(value: Any) -> str:
+    """Return a word that scipy gives as bytes, or as an array of letters."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None:
     """Add to `found` the vectors in a variable, field by field."""
     if not isinstance(value, np.ndarray) or depth > DEEPEST or len(found) >= MOST_FIELDS:
         return
-    if value.dtype.names is not None:
+    if isinstance(value, MatlabOpaque):
+        found[name] = refused_object(name, value.flat[0]["s2"] if value.size else "")
+    elif value.dtype.names is not None:
         for place, element in enumerate(value.flat):
             own = name if value.size == 1 else f"{name}({place + 1})"
             for field in value.dtype.names:
                 _collect(found, f"{own}.{field}", element[field], depth + 1)
     elif value.dtype.kind in "biuf" and value.ndim == 2 and 1 in value.shape and value.size > 1:
-        found[name] = value.reshape(-1).astype(np.float64)
+        found[name] = Found(name, value.reshape(-1).astype(np.float64))
 
 
 def _words(value: Any) -> list[str]:

@@ -1,7 +1,9 @@
 """MCAP, as robots and test benches log, by mcap: messages in JSON, ROS 2's CDR or protobuf.
 
-The columns are `topic.field`. ROS 1's messages are left out: their decoder makes a program of what
-the file says and runs it.
+The columns are `topic.field`. Elements of an array are `field[0]`; where a list of names of the
+same length stands beside it or above it in the message, they are `field[name]` too: the order of
+the joints in a `JointState` may change from message to message. ROS 1's messages are left out:
+their decoder makes a program of what the file says and runs it.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +22,14 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory as Protobuf
 from mcap_ros2.decoder import DecoderFactory as Ros2
 
-from coupled.errors import InputError
+from coupled.errors import InputError, shown
 from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_numbers
 
 DEEPEST = 6  # messages within messages
 LONGEST = 64  # elements of an array that become columns
 STAMPS = "log_time"
+NAMES = ("names", "name", "labels", "ids")  # how fields with names of elements end
+Labels = tuple[list[str], ...]
 TIMES = ({"sec", "nanosec"}, {"seconds", "nanos"}, {"sec", "nsec"})
 
 
@@ -41,13 +46,14 @@ class _Json(DecoderFactory):
 def read_mcap(path: Path, content: bytes) -> list[Found]:
     """Return the fields of numbers, and each topic's `log_time` and `publish_time`, in ns.
 
-    An array's elements are `field[0]`, `field[1]`, …; a field that holds s and ns is one column.
+    An array's elements are `field[0]`, `field[1]`, …, and by their names `field[name]`. A place
+    at which the name changes is refused. A field that holds s and ns is one column.
     """
     reader = make_reader(io.BytesIO(content))
     summary = reader.get_summary()
     encodings = {c.message_encoding for c in summary.channels.values()} if summary else set()
     factories = [_Json(), Ros2(), Protobuf()]
-    topics: dict[str, list[dict[str, float]]] = {}
+    topics: dict[str, list[dict[str, _Value]]] = {}
     undecoded: set[str] = set()
     for schema, channel, message in reader.iter_messages():
         decode = next(
@@ -56,8 +62,9 @@ def read_mcap(path: Path, content: bytes) -> list[Found]:
         if decode is None:
             undecoded.add(channel.message_encoding)
             continue
-        row = dict(_numbers(decode(message.data), "", 0))
-        row |= {STAMPS: message.log_time, "publish_time": message.publish_time}
+        row = {each.name: each for each in _values(decode(message.data), "", 0, ())}
+        for name, ns in ((STAMPS, message.log_time), ("publish_time", message.publish_time)):
+            row[name] = _Value(name, ns)
         topics.setdefault(channel.topic, []).append(row)
     columns = [each for topic, rows in topics.items() for each in _columns(topic, rows)]
     if not columns:
@@ -67,40 +74,77 @@ def read_mcap(path: Path, content: bytes) -> list[Found]:
     return columns[:MOST_COLUMNS]
 
 
-def _columns(topic: str, rows: list[dict[str, float]]) -> list[Found]:
+@dataclass(frozen=True)
+class _Value:
+    """A number of a message, by its name in it; `called` is the element's name, if it has one."""
+
+    name: str
+    number: float
+    called: str = ""
+
+
+def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
     names = list(dict.fromkeys(name for row in rows for name in row))[:MOST_COLUMNS]
     stamps = f"{topic}.{STAMPS}"
     columns = []
     for name in names:
-        values = as_numbers([row.get(name, np.nan) for row in rows])
+        found = [row.get(name) for row in rows]
+        values = as_numbers([np.nan if each is None else each.number for each in found])
+        if values is None:
+            continue
+        called = list(dict.fromkeys(each.called for each in found if each is not None))
+        refused = ""
+        if len(called) > 1:
+            first, other = (shown(word, 40) or "without a name" for word in called[:2])
+            refused = f"is {first} in one message and {other} in another: give it by its name, as"
+            refused += f" {topic}.{name.rpartition('[')[0]}[{first}]"
         unit = "ns" if name in (STAMPS, "publish_time") or name.endswith(".stamp") else ""
-        if values is not None:
-            columns.append(Found(f"{topic}.{name}", values, unit, topic, stamps))
+        values = values[:0] if refused else values
+        columns.append(Found(f"{topic}.{name}", values, unit, topic, stamps, refused))
     return columns
 
 
-def _numbers(value: Any, name: str, depth: int) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a decoded message, by their names in it."""
+def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Value]:
+    """Yield the numbers of a decoded message; `labels` are the names of elements known so far."""
     if isinstance(value, (bool, int, float)):
-        yield name, value
+        yield _Value(name, value)
         return
     if depth > DEEPEST or isinstance(value, (str, bytes)):
         return
     if (fields := _fields(value)) is not None:
         if set(fields) in TIMES:
             s, ns = (int(fields[key]) for key in sorted(fields, key=len))
-            yield name, 1_000_000_000 * s + ns
+            yield _Value(name, 1_000_000_000 * s + ns)
             return
+        labels = (*_labels(fields), *labels)
         for key, inner in fields.items():
-            yield from _numbers(inner, f"{name}.{key}" if name else key, depth + 1)
+            yield from _values(inner, f"{name}.{key}" if name else key, depth + 1, labels)
     elif hasattr(value, "__len__") and len(value) <= LONGEST:
+        words = next((each for each in labels if len(each) == len(value)), None)
         for place, inner in enumerate(value):
-            yield from _numbers(inner, f"{name}[{place}]", depth + 1)
+            word = "" if words is None else words[place]
+            for each in _values(inner, f"{name}[{place}]", depth + 1, labels):
+                yield replace(each, called=f"{word}{each.called and '.'}{each.called}")
+            if word and words is not None and words.count(word) == 1:
+                yield from _values(inner, f"{name}[{word}]", depth + 1, labels)
+
+
+def _labels(fields: Mapping[str, Any]) -> Labels:
+    """Return the lists of words in a message, those first whose field's name says names."""
+    lists = {
+        key: [str(word) for word in value]
+        for key, value in fields.items()
+        if not isinstance(value, (str, bytes)) and hasattr(value, "__len__")
+        if 0 < len(value) <= LONGEST and _fields(value) is None
+        if all(isinstance(word, str) for word in value)
+    }
+    by_name = sorted(lists, key=lambda key: not key.lower().endswith(NAMES))
+    return tuple(lists[key] for key in by_name)
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:
     """Return the fields of a message: of JSON, of protobuf, or of ROS 2."""
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):  # of protobuf, too
         return value
     if hasattr(value, "DESCRIPTOR"):
         return {field.name: getattr(value, field.name) for field in value.DESCRIPTOR.fields}

@@ -1,12 +1,14 @@
 """MDF of version 4, as measurement systems of cars and test benches write it, by asammdf.
 
-A group of channels has a clock of its own, in s from the start of the measurement. Raw numbers
-are converted here and not by asammdf: it would compute a formula that the file holds.
+A group of channels has a clock of its own, in s from the start of the measurement. asammdf
+converts raw numbers to physical ones, but for formulas: it would compute what the file says.
 """
 
 from __future__ import annotations
 
 import io
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +24,25 @@ from coupled.record.importing.formats.columns import (
     by_their_groups,
 )
 
-NONE, LINEAR, RATIONAL, FORMULA, BETWEEN, STEPS = range(6)  # ways to convert; the rest are texts
+FORMULA = 3  # a conversion by a formula in text
+TIME = 1  # what a master counts, in s; others are angles, lengths and rows
+DEEPEST = 16  # conversions that a conversion refers to
+RUN = "is converted by a formula, which is not run: save it as plain numbers"
 MASTER = "time"  # where the clock of a group has no name
 
 
-def read_mdf(path: Path, content: bytes) -> list[Found]:
-    """Return the channels of numbers: `name`, or `group.name` where two groups have one such."""
+def read_mdf(path: Path, content: bytes, missing: Sequence[str] = ()) -> list[Found]:
+    """Return the channels of numbers: `name`, or `group.name` where two groups have one such.
+
+    Values are physical. A channel whose values are texts is refused, but for the texts
+    `missing`, which mean an empty cell.
+    """
     if content[:8] != b"MDF     " or content[8:9] != b"4":
         raise InputError(path, "", "is no MDF of version 4; its program, or asammdf, converts it")
     columns: list[Found] = []
     with MDF(io.BytesIO(content)) as mdf:
         for place, group in enumerate(mdf.groups):
-            columns += _group(mdf, place, group)
+            columns += _group(mdf, place, group, missing)
             if len(columns) > MOST_COLUMNS:
                 break
     if not columns:
@@ -41,16 +50,21 @@ def read_mdf(path: Path, content: bytes) -> list[Found]:
     return by_their_groups(columns)
 
 
-def _group(mdf: Any, place: int, group: Any) -> list[Found]:
+def _group(mdf: Any, place: int, group: Any, missing: Sequence[str]) -> list[Found]:
     label = str(getattr(group.channel_group, "acq_name", "") or "").strip() or str(place + 1)
     conversions = [channel.conversion for channel in group.channels]
-    for channel, conversion in zip(group.channels, conversions, strict=True):
-        if conversion is not None and conversion.conversion_type == FORMULA:
+    formulas = [_has_formula(conversion) for conversion in conversions]
+    for channel, formula in zip(group.channels, formulas, strict=True):
+        if formula:  # asammdf would compute it
             channel.conversion = None
-    time_s = np.asarray(mdf.get_master(place), dtype=np.float64)
     master = mdf.masters_db.get(place)
-    stamps = str(group.channels[master].name) if master is not None else MASTER
-    columns = [Found(stamps, time_s, "s", label, stamps)]
+    stamps, refused, unit = MASTER, "", "s"
+    if master is not None:
+        stamps, refused = str(group.channels[master].name), RUN if formulas[master] else ""
+        if group.channels[master].sync_type not in (0, TIME):
+            unit = str(group.channels[master].unit or "").strip()[:40]
+    time_s = np.asarray(mdf.get_master(place), dtype=np.float64)
+    columns = [Found(stamps, time_s[:0] if refused else time_s, unit, label, stamps, refused)]
     for index, channel in enumerate(group.channels):
         if index == master:
             continue
@@ -59,34 +73,46 @@ def _group(mdf: Any, place: int, group: Any) -> list[Found]:
         if raw is None:
             continue
         name, unit = str(channel.name), str(signal.unit or "").strip()[:40]
-        if conversions[index] is not None and conversions[index].conversion_type == FORMULA:
-            problem = "is converted by a formula, which is not run: save it as plain numbers"
-            columns.append(Found(name, raw[:0], unit, label, stamps, problem))
-            continue
-        values = _converted(raw, conversions[index])
-        if signal.invalidation_bits is not None:
+        values, refused = raw, RUN if formulas[index] else ""
+        if not refused and conversions[index] is not None:
+            values, refused = _physical(raw, conversions[index], missing)
+        if refused:
+            values = raw[:0]
+        elif signal.invalidation_bits is not None:
             values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
-        columns.append(Found(name, values, unit, label, stamps))
+        columns.append(Found(name, values, unit, label, stamps, refused))
     return columns
 
 
-def _converted(raw: Numbers, conversion: Any) -> Numbers:
-    """Return physical values; those whose conversion makes texts stay raw."""
-    kind = NONE if conversion is None else conversion.conversion_type
-    if kind == LINEAR:
-        return np.asarray(raw * float(conversion.a) + float(conversion.b), dtype=np.float64)
-    if kind == RATIONAL:
-        p1, p2, p3, p4, p5, p6 = (float(getattr(conversion, f"P{i}")) for i in range(1, 7))
-        ratio = np.polyval([p1, p2, p3], raw) / np.polyval([p4, p5, p6], raw)
-        return np.asarray(ratio, dtype=np.float64)
-    if kind in (BETWEEN, STEPS):
-        count = conversion.val_param_nr // 2
-        places = np.array([conversion[f"raw_{i}"] for i in range(count)])
-        values = np.array([conversion[f"phys_{i}"] for i in range(count)])
-        if kind == BETWEEN:
-            return np.asarray(np.interp(raw, places, values), dtype=np.float64)
-        # The nearest, and between two of equal distance the lower.
-        above = np.clip(np.searchsorted(places, raw), 1, max(count - 1, 1))
-        nearer = raw - places[above - 1] <= places[above] - raw
-        return np.asarray(values[np.where(nearer, above - 1, above)])
-    return raw
+def _has_formula(conversion: Any, depth: int = 0) -> bool:
+    """Tell whether a conversion, or one that it refers to, is a formula."""
+    if conversion is None or isinstance(conversion, bytes):
+        return False
+    if conversion.conversion_type == FORMULA or depth > DEEPEST:
+        return True
+    others = (conversion.referenced_blocks or {}).values()
+    return any(_has_formula(other, depth + 1) for other in others)
+
+
+def _physical(raw: Numbers, conversion: Any, missing: Sequence[str]) -> tuple[Numbers, str]:
+    """Return asammdf's own physical values, NaN for the texts `missing`, or why there are none."""
+    physical = np.asarray(conversion.convert(raw, as_object=True))
+    numbers = as_numbers(physical)
+    if numbers is not None:
+        return numbers, ""
+    cells = [_cell(each, missing) for each in physical.ravel()]
+    for row, cell in enumerate(cells):
+        if isinstance(cell, str):
+            word = json.dumps(cell[:40], ensure_ascii=False)
+            problem = f"row {row + 1} is the text {word}, by its conversion; where that means no"
+            return raw[:0], f"{problem} value, log.missing = [{word}] makes the cell empty"
+    return np.array(cells, dtype=np.float64), ""
+
+
+def _cell(value: Any, missing: Sequence[str]) -> float | str:
+    """Return a physical value as a number, NaN where it is a text that means none, or the text."""
+    if isinstance(value, (bytes, str)):
+        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+        text = text.strip("\0 ")
+        return np.nan if text in missing else text
+    return float(value)

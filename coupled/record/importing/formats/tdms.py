@@ -17,6 +17,7 @@ from coupled.record.importing.formats.columns import (
     as_numbers,
     by_their_groups,
 )
+from coupled.record.importing.formats.warned import kept_warnings
 
 MASTER = "time"  # the column that a waveform's start and step make, in s
 
@@ -33,7 +34,13 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
     columns: list[Found] = []
     clocks: dict[tuple[Any, ...], str] = {}
     for channel in channels[:MOST_COLUMNS]:
-        values = _numbers(channel)
+        notes: list[str] = []
+        with kept_warnings(notes):
+            try:
+                values = _numbers(channel)
+            except (ValueError, LookupError, TypeError, ArithmeticError) as error:
+                values = np.zeros(0)
+                notes.append(f"its scale cannot be computed ({type(error).__name__})")
         if values is None:
             continue
         label, stamps = str(channel.group_name), ""
@@ -46,7 +53,9 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
                 clocks[clock] = stamps
                 columns.append(Found(stamps, time_s, "s", _own(label, stamps), stamps))
         unit = str(channel.properties.get("unit_string", "")).strip()[:40]
-        columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps))
+        refused = f"npTDMS does not know what its numbers are: {notes[0]}" if notes else ""
+        values = values[:0] if refused else values
+        columns.append(Found(str(channel.name), values, unit, _own(label, stamps), stamps, refused))
     if not columns:
         raise InputError(path, "", "holds no channel of numbers")
     return by_their_groups(columns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from pathlib import Path
 
 from pyulog import ULog
@@ -11,6 +12,8 @@ from coupled.errors import InputError
 from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_numbers
 
 STAMPS = "timestamp"
+HEAD_bytes = 16  # of the file, before its messages
+KINDS = b"ABCDFILMOPQRS"  # of messages that the format has
 
 
 def read_ulog(path: Path, content: bytes) -> list[Found]:
@@ -18,7 +21,12 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
     if content[:7] != b"ULog\x01\x12\x35":
         raise InputError(path, "", "is no ULog file")
     columns: list[Found] = []
-    for data in ULog(io.BytesIO(content)).data_list:
+    log = ULog(io.BytesIO(content))
+    place = _damage(content)
+    if place or log.file_corruption:  # pyulog passes over it, or ends there, without a word
+        where = f"from byte {place} on" if place else "in parts"
+        warnings.warn(f"the file is damaged {where}, and rows are lost", stacklevel=1)
+    for data in log.data_list:
         topic = f"{data.name}[{data.multi_id}]" if data.multi_id else str(data.name)
         for field, values in data.data.items():
             numbers = as_numbers(values)
@@ -29,3 +37,15 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
     if not columns:
         raise InputError(path, "", "holds no topic with numbers")
     return columns
+
+
+def _damage(content: bytes) -> int:
+    """Return the place of the first message that is none, or is cut short; 0 in a whole file."""
+    place = HEAD_bytes
+    while place < len(content):
+        size = int.from_bytes(content[place : place + 2], "little")
+        kind = content[place + 2 : place + 3]
+        if not kind or kind not in KINDS or place + 3 + size > len(content):
+            return place
+        place += 3 + size
+    return 0

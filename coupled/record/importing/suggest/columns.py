@@ -10,8 +10,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.record.importing.cells import ISO, moments
-from coupled.record.importing.reading import Log
+from coupled.record.importing.cells import ISO, lists_in, moments
+from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.names import Reading, read_name
 
 Floats = NDArray[np.float64]
@@ -36,18 +36,20 @@ class Column:
     @property
     def moves(self) -> bool:
         """Whether it ever changes."""
-        return self.values.size > 1 and bool(np.nanmax(self.values) > np.nanmin(self.values))
+        there = self.values[np.isfinite(self.values)]
+        return there.size > 1 and bool(there.max() > there.min())
 
 
 def columns_of(log: Log) -> list[Column]:
     """Return a log's columns in their order; those that hold no numbers too."""
-    return [_column(log, name) for name in log.columns if name not in log.doubled]
+    return [_column(log, name) for name in log.columns]
 
 
 def _column(log: Log, name: str) -> Column:
     cells = log.columns[name]
     unit = log.units.get(name, "")
-    reading = read_name(name, unit, log.file.stem)
+    own = next((plain for plain, each in log.doubled.items() if name in each), name)
+    reading = read_name(own, unit, log.file.stem)
     if cells.dtype == pl.String:
         first = cells.drop_nulls().head(1)
         text = str(first[0]) if first.len() else ""
@@ -60,7 +62,7 @@ def _column(log: Log, name: str) -> Column:
     elif cells.dtype.is_temporal():
         counts = cells.to_physical().cast(pl.Float64).to_numpy().astype(np.float64)
         return Column(log.file.name, name, reading, "dates", counts - counts[:1])
-    values = _doubles(cells)
+    values = _doubles(log.point(cells))
     kind: Literal["numbers", "text"] = "numbers"
     if values.size == 0 or np.mean(np.isnan(values)) > FEW or np.isnan(values).all():
         filled = cells.is_not_null().to_numpy() & np.isnan(values)
@@ -72,15 +74,16 @@ def _doubles(cells: pl.Series) -> Floats:
     if not (cells.dtype.is_numeric() or cells.dtype == pl.String):
         return np.full(cells.len(), np.nan)
     values = cells.cast(pl.Float64, strict=False).to_numpy().astype(np.float64)
-    return np.where(np.isfinite(values), values, np.nan)
+    return np.where(np.abs(values) <= LATEST_ns, values, np.nan)
 
 
 def _lists(log: Log, name: str, reading: Reading, cells: pl.Series) -> Column:
-    if cells.dtype == pl.String:
-        plain = cells.str.strip_chars("[](){} ").str.replace_all(r"\s*[;,]\s*|\s+", ",")
-        cells = plain.str.split(",")
-    lengths = cells.list.len().drop_nulls()
-    values = _doubles(cells.list.get(0, null_on_oob=True))
+    lists = lists_in(log.point(cells))
+    if lists is None:  # of words, or of lists
+        nothing = np.full(cells.len(), np.nan)
+        return Column(log.file.name, name, reading, "text", nothing)
+    lengths = lists.list.len().drop_nulls()
+    values = _doubles(lists.list.get(0, null_on_oob=True))
     length = int(lengths.to_numpy().min()) if lengths.len() else 0
     return Column(log.file.name, name, reading, "lists", values, length)
 

@@ -26,11 +26,12 @@ CONTROLS: dict[ControlName, frozenset[str]] = {
 QUANTITIES = {
     "modifying_force": _set("fmod modifying"),
     "force": _set("force frc f load loadcell lc pull gauge newton lbf"),
-    "computed": _set(
-        "computed encoder enc pot lvdt servo cmd command commanded control target setpoint ref"
-    ),
-    "deflection": _set("deflection defl grip hand true laser actual measured state sensor"),
+    "computed": _set("computed servo actuator cmd command commanded control target setpoint ref"),
+    "deflection": _set("deflection defl grip hand true actual measured state sensor"),
 }
+# What measures a place, which says of which end it is only where no other word does.
+DEVICES = {"computed": _set("encoder enc pot lvdt"), "deflection": _set("laser")}
+ENDS = ("computed", "deflection")
 PLACES = _set("position pos angle disp displacement travel")  # of which end they leave open
 # A motion's channel by any of these sets of words, the longest found first.
 MOTION = {
@@ -132,9 +133,13 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     if is_torque(words) and not _is(unit, "N"):
         return None
     quantities = [quantity for quantity, names in QUANTITIES.items() if present & names]
+    quantities = quantities or [q for q, names in DEVICES.items() if present & names]
+    either = False
     if not quantities and present & PLACES:
-        of_log = [q for q in ("computed", "deflection") if set(log_words) & QUANTITIES[q]]
-        quantities = of_log or ["deflection"]
+        quantities = [q for q in ENDS if set(log_words) & QUANTITIES[q]]
+        either = len(quantities) != 1
+        quantities = quantities or ["deflection"]
+    either |= set(ENDS) <= set(quantities)  # words of both ends
     if not quantities and _is(unit, "N"):
         quantities = ["force"]
     surface = present & {"elevator", "aileron", "rudder"}
@@ -143,7 +148,6 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     if present & {"theta", "phi", "psi", "attitude", "bank", "heading"}:
         return None
     control: ControlName = controls[0] if controls else "column"
-    either = not present & frozenset.union(*QUANTITIES.values())
     sure = len(controls) == 1 and not either
     return Reading(channel(control, quantities[0]), unit, sure, either_end=either)
 

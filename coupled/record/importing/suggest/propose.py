@@ -23,6 +23,7 @@ from coupled.record.importing.reading import Log, read_log
 from coupled.record.importing.suggest import sizes
 from coupled.record.importing.suggest.columns import Column, columns_of
 from coupled.record.importing.suggest.dialect import guess_layout
+from coupled.record.importing.suggest.ends import settle_ends
 from coupled.record.importing.suggest.names import is_torque, words_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
@@ -35,12 +36,16 @@ Line = tuple[str, object, str]  # a key, its value, and a remark
 
 @dataclass(frozen=True)
 class Proposal:
-    """A map as text, the questions that it still asks, and the columns that it leaves out."""
+    """A map as text, the questions that it still asks, and the columns that it leaves out.
+
+    `warnings` are what the readers of the logs warned of, and why columns are not read.
+    """
 
     text: str
     questions: tuple[str, ...]
     mapped: Mapping[str, str]  # channel: column
     unmapped: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -48,6 +53,7 @@ class Proposal:
             "channels": dict(self.mapped),
             "questions": list(self.questions),
             "unmapped": list(self.unmapped),
+            "warnings": list(self.warnings),
         }
 
 
@@ -61,13 +67,14 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     columns = [column for log in read for column in columns_of(log)]
     logs = [file.name for file in files]
     chosen = _chosen([c for c in columns if c.reading.channel != "time"])
+    chosen, asked = settle_ends(chosen)
     clock, clocks = _clocks(_stamps_first(columns, read, chosen), logs)
     sections = [("log", _layout_lines(layout)), ("clock", clock)]
     sections += [(f"clocks.{json.dumps(name)}", lines) for name, lines in clocks.items()]
     for channel in CHANNELS:
         if channel in chosen:
             control = _control(channel, rig)
-            lines = _channel_lines(channel, chosen[channel], control, logs[0])
+            lines = _channel_lines(channel, chosen[channel], control, logs[0], asked)
             sections.append((f"channels.{channel}", lines))
     sections = _signs(sections, chosen)
     mapped = {channel: _named(chosen[channel], logs) for channel in CHANNELS if channel in chosen}
@@ -83,7 +90,10 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
         for key, value, remark in lines
         if value == "?"
     )
-    return Proposal(_text(sections, logs, unmapped), questions, mapped, unmapped)
+    warnings = [note for log in read for note in log.notes]
+    warnings += [f"{name}: {why}" for log in read for name, why in log.refused.items()]
+    text = _text(sections, logs, unmapped)
+    return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
 
 
 def _stamps_first(
@@ -128,7 +138,10 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
         if column.log != log or column.reading.channel != "time":
             continue
         steps = np.diff(column.values)
-        if column.kind == "text" or not steps.size or np.nanmin(steps) < 0.0:
+        steps = steps[np.isfinite(steps)]
+        if column.kind in ("text", "lists") or not steps.size:
+            continue
+        if steps.min() < 0.0 or steps.max() <= 0.0:  # none, or one that stands still
             continue
         lines: list[Line] = [("from", column.name, "")]
         fit = [column.reading.unit] if column.reading.unit else sizes.time_units(steps)
@@ -147,6 +160,7 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
 
 def _rate(values: Floats, unit: str) -> list[Line]:
     """Return the line of the frames' rate, where the rows do not come evenly."""
+    values = values[np.isfinite(values)]
     known = parse_unit(unit)
     time_s = values * known.factor if known is not None else values
     rate = sizes.even_rate(time_s)
@@ -185,9 +199,13 @@ def _control(channel: str, rig: Rig | None) -> Control | None:
     return rig.controls.get(name) if rig is not None and name in CONTROL_NAMES else None
 
 
-def _channel_lines(channel: str, column: Column, control: Control | None, main: str) -> list[Line]:
+def _channel_lines(
+    channel: str, column: Column, control: Control | None, main: str, asked: Mapping[str, str]
+) -> list[Line]:
     remark = "" if column.reading.sure else "is it this? its name leaves that open"
     lines: list[Line] = [("from", column.name, remark)]
+    if channel in asked:
+        lines = [("from", "?", asked[channel])]
     if column.log != main:
         lines.append(("log", column.log, ""))
     if column.kind == "lists":
@@ -243,7 +261,8 @@ def _signs(
         if there.any() and move_oppositely(force.values[there], moved.values[there]):
             remark = f"moves against {moved.name}: -1 here, or there? a pull is positive in both"
             for name, lines in sections:
-                if name == f"channels.{control}_force_N":
+                asked = any(key == "sign" for key, _, _ in lines)
+                if name == f"channels.{control}_force_N" and not asked:
                     lines.append(("sign", "?", remark))
     return sections
 

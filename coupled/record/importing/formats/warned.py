@@ -1,0 +1,48 @@
+"""What the libraries that read logs warn of, kept: it is a line for the user, or a refusal."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import warnings
+from collections.abc import Iterator
+
+# Warnings that speak of code and not of the file.
+OF_CODE = (DeprecationWarning, PendingDeprecationWarning, FutureWarning, ResourceWarning)
+
+
+class _Kept(logging.Handler):
+    """Keeps what a library logs as a warning or worse."""
+
+    def __init__(self, notes: list[str]) -> None:
+        super().__init__(logging.WARNING)
+        self.notes = notes
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.notes.append(record.getMessage())
+
+
+@contextlib.contextmanager
+def kept_warnings(notes: list[str]) -> Iterator[None]:
+    """Keep in `notes` all that libraries warn of, log or print within, a line each.
+
+    Warnings that speak of code, as a deprecation, are not of the file, and are left out.
+    """
+    said, keeper = io.StringIO(), _Kept(notes)
+    loggers = [logging.getLogger(), *map(logging.getLogger, logging.root.manager.loggerDict)]
+    own = [each for each in loggers if each is loggers[0] or not each.propagate]
+    for logger in own:
+        logger.addHandler(keeper)
+    try:
+        with (
+            warnings.catch_warnings(record=True, action="always") as caught,
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+        ):
+            yield
+    finally:
+        for logger in own:
+            logger.removeHandler(keeper)
+        notes += [str(each.message) for each in caught if not issubclass(each.category, OF_CODE)]
+        notes += said.getvalue().splitlines()

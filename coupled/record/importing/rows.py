@@ -1,0 +1,198 @@
+"""Which rows of a log are used, and in what order, where the map's clock says so.
+
+`drop_rows` comes first, then `sort`, then `drop_duplicates`. Each change is noted; rows are
+never dropped or moved without the map's word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from coupled.errors import InputError
+from coupled.record.importing.mapping import Stamped, dropped_rows
+from coupled.record.importing.reading import Log, Stamps
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+# Into how many pieces, in the order of time, rows of others may split a run of rows in the log's.
+# Late rows split a run once or twice; two recordings at the same times, at every row.
+MOST_PIECES = 4
+COARSE = 0.1  # share of repeated stamps from which the stamps are coarse, and no row is double
+
+
+def use_rows(log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str) -> Log:
+    """Return the log with the rows that the map's clock asks for, in that order.
+
+    `used` are the columns that the map reads of this log: rows that repeat the stamp and these
+    are duplicates. Raises InputError for a row that is not there, and for rows of two times.
+    """
+    log = _drop(log, clock, row_count(log, clock, used, map_file, key), map_file, key)
+    if clock.sort:
+        log = _sort(log, clock, map_file, key)
+    if clock.drop_duplicates:
+        log = _drop_duplicates(log, clock, used, map_file, key)
+    return log
+
+
+def row_count(log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str) -> int:
+    """Return how many rows the clock's column has; without one, the first column of `used`."""
+    if clock.source:
+        return log.find(clock.source, map_file, f"{key}.from").len()
+    return next((log.columns[name].len() for name in used if name in log.columns), 0)
+
+
+def stamps_in_file(log: Log, clock: Stamped, map_file: Path, key: str) -> Stamps:
+    """Return when each row was taken, in the rows' order, whatever that is."""
+    stamps = log.times(clock, map_file, key)
+    if stamps.from_first_s.size < 2:
+        raise InputError(log.file, clock.source, "has fewer than two rows")
+    lacking = np.isnan(stamps.from_first_s)
+    if lacking.any():
+        line = log.line(int(np.argmax(lacking)))
+        problem = f"row {line} has no time; {key}.drop_rows = [{line}] leaves it out"
+        raise InputError(log.file, clock.source, problem)
+    return stamps
+
+
+def check_order(log: Log, time_s: Floats, clock: Stamped, key: str) -> None:
+    """Refuse times that go back anywhere in the log, and name what the map may say to it."""
+    steps_s = np.diff(time_s)
+    back = np.flatnonzero(steps_s < 0.0)
+    if not back.size:
+        return
+    row = int(back[0])
+    line = log.line(row + 1)
+    if row == 0 and back.size == 1 and steps_s.size > 1:
+        line = log.line(0)
+        problem = f"row {line}: the first stamp is {-steps_s[0]:.6g} s later than the next one, as"
+        problem += f" a stale one of an earlier run is: {key}.drop_rows = [{line}] leaves it out"
+        raise InputError(log.file, clock.source, problem)
+    back_s = f"time goes back from {time_s[row]:.6f} to {time_s[row + 1]:.6f} s"
+    remedies = [] if clock.sort else ["sort = true for rows out of order"]
+    if not clock.date:
+        remedies.append("wraps_at = N for a counter that starts again after N")
+    remedies.append(f"drop_rows = [{line}] for a wrong stamp")
+    problem = f"row {line}: {back_s} after the first row; {key} may have {', or '.join(remedies)}"
+    raise InputError(log.file, clock.source, problem)
+
+
+def check_steps(
+    log: Log, time_s: Floats, first: int, clock: Stamped, key: str, longest_gap: int
+) -> None:
+    """Refuse stamps that repeat, and gaps of more rows than `longest_gap`, from row `first` on."""
+    steps_s = np.diff(time_s)
+    if (steps_s == 0.0).any():
+        row = int(np.argmax(steps_s == 0.0))
+        line = log.line(first + row + 1)
+        problem = f"row {line} repeats the time of the row before, {time_s[row]:.6f} s after the"
+        problem += " first row; "
+        if np.mean(steps_s == 0.0) > COARSE:
+            problem += "stamps are coarse: where rows are even, give clock.rate_Hz and no from"
+        elif clock.drop_duplicates:
+            problem += f"the two rows differ: {key}.drop_rows = [{line}] leaves this one out"
+        else:
+            problem += f"{key}.drop_duplicates = true leaves it out where all else is the same"
+        raise InputError(log.file, clock.source, problem)
+    median_s = float(np.median(steps_s))
+    gaps = np.flatnonzero(steps_s > (longest_gap + 1.5) * median_s)
+    if not gaps.size:
+        return
+    row = int(gaps[0])
+    if first + row == 0 and gaps.size == 1 and steps_s.size > 1:
+        line = log.line(0)
+        problem = f"row {line}: the first stamp is {steps_s[0]:.6g} s before the next one, as a"
+        problem += f" stale one is: {key}.drop_rows = [{line}] leaves it out"
+        raise InputError(log.file, clock.source, problem)
+    lost = round(steps_s[row] / median_s) - 1
+    problem = f"row {log.line(first + row + 1)}: {lost} rows are missing after {time_s[row]:.6f} s;"
+    problem += f" longest_gap_rows = {longest_gap} allows no more; cut by start_s or end_s"
+    raise InputError(log.file, clock.source, problem)
+
+
+def _drop(log: Log, clock: Stamped, rows: int, map_file: Path, key: str) -> Log:
+    ranges = dropped_rows(clock, map_file, key)
+    if not ranges:
+        return log
+    lines = _lines(log, rows)
+    dropped = np.zeros(rows, dtype=bool)
+    for first, last in ranges:
+        hit = (lines >= first) & (lines <= last)
+        if not hit.any():
+            span = f"its rows are {lines[0]} to {lines[-1]}" if rows else "it has no rows"
+            problem = f"{first} is no row of {log.file.name}; {span}"
+            raise InputError(map_file, f"{key}.drop_rows", problem)
+        dropped |= hit
+    note = f"{int(dropped.sum())} of {rows} rows dropped, by {key}.drop_rows"
+    return _take(log, np.flatnonzero(~dropped), rows, note)
+
+
+def _sort(log: Log, clock: Stamped, map_file: Path, key: str) -> Log:
+    time_s = stamps_in_file(log, clock, map_file, key).from_first_s
+    order = np.argsort(time_s, kind="stable")
+    steps_s = np.diff(time_s)
+    if not (steps_s < 0.0).any():
+        return log
+    run = np.concatenate(([0], np.cumsum(steps_s < 0.0)))  # rows between two steps back
+    by_time = run[order]
+    pieces = np.bincount(by_time[np.concatenate(([True], np.diff(by_time) != 0))])
+    mixed = np.flatnonzero(pieces > MOST_PIECES)
+    if mixed.size:
+        first, last = (int(row) for row in np.flatnonzero(run == mixed[-1])[[0, -1]])
+        problem = (
+            f"row {log.line(first)}: the rows from here on lie between others, one by one: two"
+        )
+        problem += " recordings, which sort would mix; leave one out, as by"
+        problem += f' {key}.drop_rows = ["{log.line(first)}-{log.line(last)}"]'
+        raise InputError(log.file, clock.source, problem)
+    moved = int(np.count_nonzero(order != np.arange(order.size)))
+    return _take(log, order, time_s.size, f"{moved} of {time_s.size} rows moved, by {key}.sort")
+
+
+def _drop_duplicates(
+    log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str
+) -> Log:
+    time_s = stamps_in_file(log, clock, map_file, key).from_first_s
+    same = np.concatenate(([False], np.diff(time_s) == 0.0))
+    for name in used:
+        column = log.columns.get(name)
+        if column is not None and column.len() == same.size:
+            same &= _repeats(column)
+    if not same.any():
+        return log
+    note = f"{int(same.sum())} duplicate rows dropped, by {key}.drop_duplicates"
+    return _take(log, np.flatnonzero(~same), same.size, note)
+
+
+def _lines(log: Log, rows: int) -> Rows:
+    """Return where each row stands in the file, counted from 1."""
+    return log.lines if log.lines is not None else np.arange(1, rows + 1, dtype=np.int64)
+
+
+def _repeats(column: pl.Series) -> NDArray[np.bool_]:
+    """Tell which cells are the same as the one before; empty cells are alike."""
+    if column.dtype.is_nested():
+        cells = column.to_list()
+        repeats = [False, *(a == b for a, b in pairwise(cells))]
+        return np.array(repeats[: len(cells)], dtype=bool)
+    same = column.eq_missing(column.shift(1)).to_numpy()
+    same[:1] = False
+    return np.asarray(same, dtype=bool)
+
+
+def _take(log: Log, order: Rows, rows: int, note: str) -> Log:
+    """Return the log with these rows in all columns that are as long as its clock's."""
+    if not order.size:
+        raise InputError(log.file, "", "has no rows left: clock.drop_rows names them all")
+    columns = {
+        name: column.gather(order) if column.len() == rows else column
+        for name, column in log.columns.items()
+    }
+    lines = _lines(log, rows)[order]
+    return replace(log, columns=columns, lines=lines, notes=(*log.notes, note))
