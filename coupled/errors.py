@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
+from typing import TextIO
 
 LONGEST = 200  # characters of a user's word that a message repeats
+LONGEST_VALUE = 60  # characters of a value that a message repeats
 LONGEST_MESSAGE = 3000  # characters of a whole message
 MISSING = "is missing"  # the problem of a key that must be given
 LISTED = 100  # known words that a hint lists
@@ -29,6 +32,32 @@ def shown(text: str, longest: int = LONGEST) -> str:
     """Return a user's word as a message repeats it: on one line, printable, and cut if long."""
     plain = printable(text[: longest + 1]).replace("\n", "?").replace("\t", "?")
     return plain if len(plain) <= longest else plain[:longest] + "…"
+
+
+def shown_value(value: object) -> str:
+    """Return a value of a file or of a call as a message repeats it, cut if long."""
+    if isinstance(value, int) and abs(value) > 10**300:
+        return "an integer of hundreds of digits"
+    text = f"of type {type(value).__name__}"
+    if isinstance(value, (bool, int, float, str, list, tuple, dict, set, type(None))):
+        with suppress(ValueError):  # of an integer of thousands of digits, which Python writes not
+            text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
+
+
+def say_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a library's warning as one line, without the place in the code that it comes from.
+
+    To be set as `warnings.showwarning`.
+    """
+    print(f"note: {_sentence(str(message))}", file=file or sys.stderr)
 
 
 def _sentence(text: str) -> str:
@@ -56,8 +85,9 @@ class InputError(ValueError):
         self, file: object, key: str, problem: str, more: Sequence[InputError] = ()
     ) -> None:
         self.more = tuple(more)
-        self.file, self.key, self.problem = shown(str(file)), shown(key), _sentence(problem)
-        where = f"{self.file}: {self.key}: " if key else f"{self.file}: "
+        self.file, self.key = shown(str(file)), shown(str(key))
+        self.problem = _sentence(str(problem))
+        where = f"{self.file}: {self.key}: " if self.key else f"{self.file}: "
         super().__init__(where + self.problem)
 
     def __reduce__(

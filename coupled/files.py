@@ -12,12 +12,14 @@ import contextlib
 import difflib
 import hashlib
 import json
+import math
 import os
 import platform
 import re
 import secrets
 import shutil
 import stat
+import tempfile
 import time
 import tomllib
 from collections.abc import Callable, Iterable
@@ -151,6 +153,8 @@ def check_targets(
     made: Path | None = None,
 ) -> None:
     """Refuse files of which one could not be written, is an input, or is meant twice."""
+    if made is not None and made.resolve() == made.resolve().parent:
+        raise InputError(made, "", "is the root of the file system; give a folder of its own")
     read = {identity for path in inputs for identity in _identities(path)}
     written: set[object] = set()
     for path in paths:
@@ -231,12 +235,27 @@ def write_text(path: Path, text: str) -> None:
 
 def json_text(table: Any, indent: int = 2, sort_keys: bool = False) -> str:
     """Return a table as JSON, its letters as they are; escaped where a file name is no text."""
-    text = json.dumps(table, indent=indent, sort_keys=sort_keys, ensure_ascii=False)
+    plain = finite(table)
+    text = json.dumps(
+        plain, indent=indent, sort_keys=sort_keys, ensure_ascii=False, allow_nan=False
+    )
     try:
         text.encode("utf-8")
     except UnicodeEncodeError:
-        text = json.dumps(table, indent=indent, sort_keys=sort_keys)
+        text = json.dumps(plain, indent=indent, sort_keys=sort_keys, allow_nan=False)
     return text + "\n"
+
+
+def finite(table: Any) -> Any:
+    """Return nested tables and lists with None for each number that is not finite.
+
+    JSON has neither infinity nor NaN, and a reader that keeps to its standard refuses the file.
+    """
+    if isinstance(table, dict):
+        return {key: finite(value) for key, value in table.items()}
+    if isinstance(table, (list, tuple)):
+        return [finite(value) for value in table]
+    return None if isinstance(table, float) and not math.isfinite(table) else table
 
 
 def unwritable(path: Path, error: OSError) -> InputError:
@@ -255,6 +274,25 @@ def clear(folder: Path) -> None:
     A process looks once at a folder.
     """
     _clear(folder.absolute())
+
+
+def temporary_folder() -> Path:
+    """Make a folder in the system's temporary one, and return it; whoever asks removes it.
+
+    It bears the name of this process, so that another clears it if this one is killed.
+    """
+    made = Path(tempfile.gettempdir()) / unfinished_name("")
+    made.mkdir(mode=0o700)
+    return made
+
+
+def clear_temporary(again: bool = False) -> None:
+    """Remove what killed processes of this computer left in the system's temporary folder.
+
+    A process looks once, unless `again` is asked for.
+    """
+    with contextlib.suppress(OSError):
+        (_clear.__wrapped__ if again else _clear)(Path(tempfile.gettempdir()))
 
 
 @lru_cache(maxsize=1000)

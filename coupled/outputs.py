@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Iterator
@@ -10,6 +11,9 @@ from types import TracebackType
 
 from coupled.errors import InputError
 from coupled.files import clear, unfinished_name, unwritable
+
+# What a write meets on a disk that takes no more, without the name of the file.
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 class Outputs:
@@ -63,6 +67,8 @@ class Outputs:
                 _remove_empty(folder)
         if isinstance(error, InputError):
             raise self._renamed(error) from None
+        if isinstance(error, OSError) and error.errno in FULL and self._staged:
+            raise unwritable(next(iter(self._staged)), error) from None
 
     def _make(self, folder: Path) -> None:
         missing = [place for place in (folder, *folder.parents) if not place.exists()]

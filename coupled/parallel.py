@@ -12,17 +12,19 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
-from coupled.errors import InputError
+from coupled.errors import InputError, say_warning
 
+MOST_WORKERS = 512  # processes: more than any machine has cores for
 _PATIENCE_s = 10.0
 _ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
 T = TypeVar("T")
@@ -212,8 +214,23 @@ def _hand_over(
         future.add_done_callback(done.put)
 
 
+def limit_memory() -> None:
+    """Let this process ask for half of the machine's memory: a small file can declare any size."""
+    with suppress(ImportError, ValueError, OSError):
+        resource: Any = importlib.import_module("resource")  # not on every system
+        half = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+        resource.setrlimit(resource.RLIMIT_DATA, (half, half))
+
+
 def cores(workers: int) -> int:
-    """Return how many processes a number of workers means: 0 is one a core."""
+    """Return how many processes a number of workers means: 0 is one a core.
+
+    Raises InputError for a number that no machine has.
+    """
+    if not 0 <= workers <= MOST_WORKERS:
+        raise InputError(
+            "workers", "", f"is {workers}; give 1 to {MOST_WORKERS}, or 0 for all cores"
+        )
     return workers or os.cpu_count() or 1
 
 
@@ -242,7 +259,8 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     try:
         yield pool
     except BrokenExecutor:
-        problem = "a worker died; what is finished is kept, and the same command goes on"
+        problem = "a worker died; what is finished is kept, and the same command goes on. A script"
+        problem += ' calls this under `if __name__ == "__main__":`, or with workers=1'
         raise InputError("--workers", "", problem) from None
     except BaseException:
         ours.close()  # interrupted, or nothing to be done with the rest: no worker is waited for
@@ -259,6 +277,7 @@ def _begin_worker(alive: Connection) -> None:
     """Leave interrupts to the parent, and end with it, even if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    warnings.showwarning = say_warning
 
     def follow() -> None:
         wait([alive])  # it is never written to, so that this is its end
@@ -277,7 +296,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=_PATIENCE_s, set_as_default=False)
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, AssertionError):  # the last of a malformed address
         raise InputError("--cluster", "", f"{address} does not answer") from None
     try:
         client.wait_for_workers(1, timeout=_PATIENCE_s)

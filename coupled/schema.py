@@ -14,9 +14,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from coupled.errors import MISSING, InputError, collected, nearest, together
+from coupled.errors import MISSING, InputError, collected, nearest, shown_value, together
 from coupled.files import read_text, toml_tables
 
 
@@ -32,9 +32,12 @@ class Given(Section):
     What a file may not say is refused here too, as an InputError that names the class.
     """
 
-    def __init__(self, **values: Any) -> None:
-        name = f"coupled.{type(self).__name__}"
-        keys = file_keys(type(self), "m")
+    def __init__(self, *positional: Any, **values: Any) -> None:
+        name, keys = f"coupled.{type(self).__name__}", file_keys(type(self), "m")
+        if positional:
+            needed = [key for key, info in type(self).model_fields.items() if info.is_required()]
+            first = next(iter(needed or keys))
+            raise TypeError(f"{name}: takes its values by name; give {first}=…")
         plain = {key: _plain(value) for key, value in values.items()}
         known_keys(plain, keys, name, "")
         for key, value in plain.items():
@@ -43,6 +46,12 @@ class Given(Section):
             super().__init__(**plain)
         except ValidationError as error:
             raise _first_fault(error, keys, name, "") from None
+
+
+class Lenient(Section):
+    """A section that another program may write more into: unknown keys are left out."""
+
+    model_config = ConfigDict(extra="ignore")
 
 
 def _plain(value: Any) -> Any:
@@ -71,6 +80,18 @@ def quantity(unit: str, default: Any = ..., *, written: bool = False, **bounds: 
 def named(key: str, default: Any = ..., **bounds: Any) -> Any:
     """Declare a field whose key in a file is a word that Python, or pydantic, keeps for itself."""
     return Field(default, json_schema_extra={"key": key}, **bounds)
+
+
+def text_like(pattern: str, wanted: str) -> AfterValidator:
+    """Return what lets a text pass that matches a pattern; `wanted` is said of any other."""
+    matches = re.compile(pattern).fullmatch
+
+    def check(text: str) -> str:
+        if matches(text) is None:
+            raise ValueError(wanted)
+        return text
+
+    return AfterValidator(check)
 
 
 def file_keys(section: type[Section], d: str) -> dict[str, str]:
@@ -125,7 +146,7 @@ def _dots(line: str) -> int:
 def known_keys(table: Any, keys: Mapping[str, object], file: object, path: str) -> dict[str, Any]:
     """Return the table, once it is one and has only known keys."""
     if not isinstance(table, dict):
-        raise InputError(file, path, f"should be a table, is {_shown(table)}")
+        raise InputError(file, path, f"should be a table, is {shown_value(table)}")
     faults = []
     for key in table:
         if key in keys:
@@ -193,15 +214,41 @@ def build(section: type[S], table: Any, file: object, path: str, d: str = "m") -
             values[keys[key]] = value
     made: S | None = None
     try:
-        made = section(**values)
+        made = _made(section, values)
     except ValidationError as error:
         faults += _faults(error, keys, file, path)
-    except InputError as error:  # of a section that names itself
-        dotted = f"{path}.{error.key}" if path else error.key
-        faults.append(InputError(file, dotted, error.problem))
     if faults or made is None:
         raise together(faults)
     return made
+
+
+def read_as(section: type[S], table: Any, file: object, path: str = "") -> S:
+    """Return what a program wrote, checked; `path` is the dotted place of the table in `file`.
+
+    Raises InputError for each value that the section does not allow.
+    """
+    keys = file_keys(section, "m")
+    if not isinstance(table, dict):
+        known_keys(table, keys, file, path)
+    try:
+        return section(**{keys[key]: value for key, value in table.items() if key in keys})
+    except ValidationError as error:
+        raise _first_fault(error, keys, file, path) from None
+
+
+def _made(section: type[S], values: Mapping[str, Any]) -> S:
+    """Return a section of values by field; raises pydantic's ValidationError.
+
+    A section that Python code makes names its class in faults; here the fault is a file's.
+    """
+    made = section.__new__(section)
+    BaseModel.__init__(made, **values)
+    return made
+
+
+def faults_of(error: ValidationError, section: type[Section], name: str) -> InputError:
+    """Return the faults of a section that Python code makes, by its fields' names."""
+    return _first_fault(error, {field: field for field in section.model_fields}, name, "")
 
 
 def grouped(changes: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -247,7 +294,7 @@ def changed(
             )
         values[keys[key]] = value
     try:
-        return type(section)(**values)
+        return _made(type(section), values)
     except ValidationError as error:
         raise _first_fault(error, keys, file, path) from None
 
@@ -266,9 +313,19 @@ def _refuse_unreal(value: Any, file: object, key: str) -> None:
         if not isinstance(number, (int, float)):
             continue
         if LARGEST < abs(number) < float("inf"):
-            raise InputError(file, key, f"{_shown(number)} is larger than any real one")
+            raise InputError(file, key, f"{shown_value(number)} is larger than any real one")
         if 0.0 < abs(number) < SMALLEST:
-            raise InputError(file, key, f"{_shown(number)} is smaller than any real one; give 0")
+            raise InputError(
+                file, key, f"{shown_value(number)} is smaller than any real one; give 0"
+            )
+
+
+# What is said of a value in place of the words of Python.
+_WANTED = {
+    **dict.fromkeys(("dict_type", "model_type", "mapping_type"), "should be a table"),
+    **dict.fromkeys(("list_type", "tuple_type"), "should be a list"),
+    "string_type": "should be text",
+}
 
 
 def _first_fault(
@@ -288,14 +345,8 @@ def _faults(
         if place:
             place[0] = by_field.get(place[0], place[0])
         dotted = ".".join(([path] if path else []) + place)
-        message = fault["msg"]
-        message = f"{message[0].lower()}{message[1:]}, is {_shown(fault['input'])}"
+        message = _WANTED.get(fault["type"]) or fault["msg"].removeprefix("Value error, ")
+        message = f"{message[0].lower()}{message[1:]}, is {shown_value(fault['input'])}"
         problem = MISSING if fault["type"] == "missing" else message
         found.setdefault(dotted, InputError(file, dotted, problem))
     return list(found.values())
-
-
-def _shown(value: object) -> str:
-    huge = isinstance(value, int) and abs(value) > 10**300
-    text = "an integer of hundreds of digits" if huge else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -37,6 +37,7 @@ ORDER = [
     "outputs",
     "parallel",
     "schema",
+    "arguments",
     "resources",
 ]
 ORDER += [

@@ -8,11 +8,12 @@ from os import PathLike, fspath
 from typing import Any, TypedDict, Unpack
 
 from coupled.api.rigs import load_rig
+from coupled.arguments import public
 from coupled.authority.compare import AS_THE_RIG, Comparison, Flight, fly_and_judge
 from coupled.authority.compare import compare as compare_manoeuvres
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError
 from coupled.flight.conditions import Conditions, build_conditions
-from coupled.flight.manoeuvre import EVERY_CONFIGURATION, Configuration, Manoeuvre, PressureProfile
+from coupled.flight.manoeuvre import Configuration, Manoeuvre, PressureProfile
 from coupled.flight.pilot import Pilot
 from coupled.flight.runfile import read_run
 from coupled.record.channels import CONTROL_NAMES, ControlName
@@ -35,6 +36,7 @@ class Terms(TypedDict, total=False):
     name: str
 
 
+@public
 def load_run(run: Path) -> list[Manoeuvre]:
     """Return the cases of a run file, or of a shipped run by its name: a manoeuvre each.
 
@@ -50,6 +52,7 @@ def load_run(run: Path) -> list[Manoeuvre]:
     return read_run(fspath(run))
 
 
+@public
 def fly(
     what: Manoeuvre | Rig | Path,
     *,
@@ -88,10 +91,10 @@ def fly(
     manoeuvre = _manoeuvre(what, pilots, duration_s, terms)
     if configuration is None:
         return fly_and_judge(manoeuvre, AS_THE_RIG, progress)
-    _known(configuration, manoeuvre)
     return fly_and_judge(manoeuvre.configured(configuration), configuration, progress)
 
 
+@public
 def compare(
     what: Manoeuvre | Sequence[Manoeuvre] | Rig | Path,
     *,
@@ -129,11 +132,11 @@ def compare(
         for manoeuvre in what:
             _alone(manoeuvre, pilots, duration_s, terms)
         cases = list(what)
+        if not cases:
+            raise InputError("coupled.compare", "what", "needs at least one manoeuvre")
     else:
         cases = [_manoeuvre(what, pilots, duration_s, terms)]
     if configurations is not None:
-        for configuration in configurations:
-            _known(configuration, cases[0])
         cases = [replace(case, configurations=tuple(configurations)) for case in cases]
     return compare_manoeuvres(cases, progress)
 
@@ -196,9 +199,3 @@ def _alone(
     if given:
         problem = "is said by the manoeuvre itself; change it by dataclasses.replace"
         raise InputError(manoeuvre.file, given[0], problem)
-
-
-def _known(configuration: str, manoeuvre: Manoeuvre) -> None:
-    if configuration not in EVERY_CONFIGURATION:
-        hint = nearest(configuration, EVERY_CONFIGURATION)
-        raise InputError(manoeuvre.file, "configuration", f"no {configuration!r}; {hint}")

@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
-from pathlib import Path
+from os import PathLike, fspath
 
 from coupled.api.records import read_record
 from coupled.api.rigs import load_rig
+from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
 from coupled.gap.trimmed import rig_of_manifests
-from coupled.record.channels import CONTROL_NAMES, ControlName
-from coupled.record.record import Record
+from coupled.record.channels import ControlName
+from coupled.record.record import DataFrame, Record
 from coupled.rig.rig import Rig
 
-Given = Record | str | PathLike[str]
+Given = Record | DataFrame | str | PathLike[str]
 
 
+@public
 def diagnose(
     rig: Rig | str | PathLike[str] | None,
-    records: Given | Sequence[Given] | Mapping[str, Record],
+    records: Given | Sequence[Given] | Mapping[str, Given],
     control: ControlName = "column",
     progress: Callable[[str, int, int], None] | None = None,
-    healthy: Given | Sequence[Given] | Mapping[str, Record] | None = None,
+    healthy: Given | Sequence[Given] | Mapping[str, Given] | None = None,
 ) -> Diagnosis:
     """Diagnose a mismatch between simulation and record: where, which effect, how large.
 
     `rig` is the rig that the records should be of: a rig, its file, or the name of a shipped
     one; None for that of the manifest beside the records. Its aircraft is trimmed as the records
-    begin. `records` is one record or several of that rig, as `Record`, as files, or by name;
-    each needs `time_s` and what its stages need (force and deflections of the control, q̄).
+    begin. `records` is one record or several of that rig, as `Record`, as a DataFrame, as files, or
+    by name; each needs `time_s` and what its stages need (force and deflections of the control, q̄).
     `healthy` are records of the machine when it was well; what differs from those is judged.
 
     `found.verdict` is `no_gap`, `effect`, `mostly`, `ambiguous` or `unexplained`;
@@ -51,9 +52,6 @@ def diagnose(
     >>> round(found.improved.controls["column"].loader.bend, 5)
     0.0004
     """
-    if control not in CONTROL_NAMES:
-        problem = f"is {control!r}; one of {', '.join(CONTROL_NAMES)}"
-        raise InputError("diagnose", "control", problem)
     named = named_records(records)
     if rig is None:
         nominal = rig_of_manifests(named)
@@ -63,19 +61,26 @@ def diagnose(
     return diagnose_records(nominal, named, control, progress, well)
 
 
-def named_records(records: Given | Sequence[Given] | Mapping[str, Record]) -> dict[str, Record]:
+def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dict[str, Record]:
     """Return records by the name that a fault is to say: the file's, or a number."""
+    if isinstance(records, (Record, DataFrame, str, PathLike)):
+        records = [records]
+    if not records:
+        raise InputError("coupled.diagnose", "records", "needs at least one")
     if isinstance(records, Mapping):
-        return dict(records)
-    several = [records] if isinstance(records, (Record, str, PathLike)) else list(records)
-    if not several:
-        raise InputError("diagnose", "records", "needs at least one")
+        return {name: _record(given) for name, given in records.items()}
     named: dict[str, Record] = {}
-    for i, given in enumerate(several, 1):
-        if isinstance(given, Record):
-            named["record" if len(several) == 1 else f"record {i}"] = given
-        elif str(given) in named:
-            raise InputError(given, "", "is given twice")
-        else:
-            named[str(given)] = read_record(Path(given))
+    for i, given in enumerate(records, 1):
+        numbered = "record" if len(records) == 1 else f"record {i}"
+        name = fspath(given) if isinstance(given, (str, PathLike)) else numbered
+        if name in named:
+            raise InputError(name, "", "is given twice")
+        named[name] = _record(given)
     return named
+
+
+def _record(given: Given) -> Record:
+    """Return a record given as such, as a DataFrame, or as a file."""
+    if isinstance(given, Record):
+        return given
+    return Record.from_frame(given) if isinstance(given, DataFrame) else read_record(given)

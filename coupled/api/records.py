@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
+from coupled.arguments import public
 from coupled.record import record as files
 from coupled.record.importing import convert
 from coupled.record.importing.account import ImportAccount
-from coupled.record.record import Record
+from coupled.record.record import DataFrame, Record
 from coupled.rig.rig import Rig
 
 
+@public
 def read_record(path: str | PathLike[str]) -> Record:
     """Return the record of a CSV or Parquet file, and its manifest where there is one.
 
@@ -31,11 +33,12 @@ def read_record(path: str | PathLike[str]) -> Record:
     return files.read_record(Path(path))
 
 
-def write_record(record: Record, path: str | PathLike[str]) -> None:
+@public
+def write_record(record: Record | DataFrame, path: str | PathLike[str]) -> None:
     """Write a record as CSV or Parquet, by the path's extension, and a manifest beside it.
 
-    Both files appear, or neither. Raises InputError for another extension, and where it cannot
-    be written.
+    A DataFrame is written as the record that it holds (`Record.from_frame`). Both files appear, or
+    neither. Raises InputError for another extension, and where it cannot be written.
 
     >>> import coupled, tempfile, pathlib
     >>> flight = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=1)
@@ -44,9 +47,11 @@ def write_record(record: Record, path: str | PathLike[str]) -> None:
     ...     sorted(path.name for path in pathlib.Path(folder).iterdir())
     ['flight.csv', 'flight.manifest.json']
     """
-    files.write_record(record, Path(path))
+    whole = record if isinstance(record, Record) else Record.from_frame(record)
+    files.write_record(whole, Path(path))
 
 
+@public
 def import_log(
     log: str | PathLike[str] | Sequence[str | PathLike[str]],
     log_map: str | PathLike[str] | None = None,

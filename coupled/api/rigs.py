@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from os import PathLike, fspath
 
+from coupled.arguments import public
 from coupled.resources import find, shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 
 
+@public
 def load_rig(rig: str | PathLike[str]) -> Rig:
     """Return the rig of a file, or a shipped one by its name, checked.
 

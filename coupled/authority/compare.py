@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.arguments import public
 from coupled.authority.figures import remarks
 from coupled.authority.held import (
     asked_and_reached,
@@ -78,6 +79,7 @@ class Comparison(Sequence[Flight]):
         """
         return remarks(self.flights, system) if self.flights else []
 
+    @public
     def flight(self, configuration: str, case: str | None = None) -> Flight:
         """Return the flight in a configuration; `case` is needed where there are several.
 
@@ -94,10 +96,12 @@ class Comparison(Sequence[Flight]):
             raise InputError("comparison", "configuration", problem)
         return ours[configuration]
 
+    @public
     def loss(self, configuration: str, case: str | None = None) -> float:
         """Return the share of the surface command that is lost, without unit; NaN if unmoved."""
         return self.flight(configuration, case).outcome.loss
 
+    @public
     def felt_ratio(self, configuration: str, case: str | None = None) -> float:
         """Return the force felt over the force specified; NaN if the control never moves."""
         return self.flight(configuration, case).outcome.felt_ratio

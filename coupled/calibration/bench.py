@@ -176,7 +176,10 @@ def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) 
 
 
 def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats:
-    """Return v₁ as noted, v₂ that brought it back, v₃ as noted and the side, shape (4, nulls)."""
+    """Return v₁ as noted, v₂ that brought it back, v₃ as noted and the side, shape (4, nulls).
+
+    A null at which the voltmeter does not tell one of them from 0 V is left out.
+    """
     control = bench.control
     loader = rig.controls[control].loader
     if bench.nulls == 0 or loader.basic_gradient <= 0.0:
@@ -201,12 +204,17 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
         rest = rests_at(float(_by_way_of(supply, side, allowance)), float(supply))
         return float(_reading(np.array(scales.s1 * rest), tools.meter, tools.meter_step, rng))
 
+    # A loader that rests in its friction or breakout shows 0 V: there is nothing to bring back.
+    least = tools.meter + tools.meter_step
+    moved = v1 > least
     v2 = [
         _turn_until(partial(shown, side=side), wanted, tools)
-        for side, wanted in zip(sides, v1, strict=True)
+        for side, wanted in zip(sides[moved], v1[moved], strict=True)
     ]
     # What was turned is read as well.
-    return np.stack((v1, _reading(np.array(v2), tools.meter, tools.meter_step, rng), v3, sides))
+    turned = _reading(np.array(v2), tools.meter, tools.meter_step, rng)
+    found = np.stack((v1[moved], turned, v3[moved], sides[moved]))
+    return found[:, (np.abs(found[1:3]) > least).all(axis=0)]
 
 
 def _by_way_of(force: Floats, side: float, allowance: float) -> Floats:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.arguments import public
 from coupled.calibration import arc, scales
 from coupled.calibration.accuracy import expected
 from coupled.calibration.assumed import stale
@@ -31,6 +32,7 @@ DEFAULT_RIG = "report-column"
 EXTREME = 3.0  # of a hand's wander: as far as friction takes a control with it
 
 
+@public
 def calibrate(
     readings: Readings | Path | str,
     rig: Rig | Path | str = DEFAULT_RIG,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import polars as pl
 
+from coupled.arguments import public
 from coupled.authority.compare import Flight, compare
 from coupled.campaign.latency import fly_undelayed
 from coupled.campaign.unjudged import UnjudgedError
@@ -39,6 +40,7 @@ class CheckResult:
         )
 
 
+@public
 def check(
     runs: str | Path | Sequence[str | Path | Sequence[Manoeuvre]],
     progress: Progress | None = None,
@@ -54,6 +56,8 @@ def check(
     True
     """
     several = [runs] if isinstance(runs, (str, Path)) else runs
+    if not several:
+        raise InputError("coupled.check", "runs", "needs at least one")
     read = [
         read_expecting(str(r)) if isinstance(r, (str, Path)) else _expecting(r) for r in several
     ]
@@ -66,6 +70,8 @@ def read_expecting(name: str) -> list[Manoeuvre]:
 
 
 def _expecting(scenarios: Sequence[Manoeuvre]) -> list[Manoeuvre]:
+    if not scenarios:
+        raise InputError("coupled.check", "runs", "holds a run without a case")
     if not scenarios[0].expect:
         raise InputError(
             scenarios[0].file, "expect", "is missing: without one there is nothing to check"

@@ -24,6 +24,14 @@ LOCK = ".lock"
 UNFINISHED = ".coupled-"  # what `files` makes begins so until it is whole
 
 
+ANOTHER = "holds another sweep, or what this one reads has changed since; give a new folder"
+
+
+def _header(identity: str) -> str:
+    """Return the first line of a sweep's journal."""
+    return json.dumps({"sweep": identity}) + "\n"
+
+
 class Journal:
     """The flights that are done; in memory only their numbers, `done`."""
 
@@ -33,13 +41,20 @@ class Journal:
         self._columns = plan.columns
         self._read(plan.identity)
 
+    @staticmethod
+    def check(folder: Path, plan: SweepPlan) -> None:
+        """Refuse a folder whose journal is another sweep's."""
+        first = read_bytes(folder / JOURNAL).partition(b"\n")
+        if first[1] and first[0] + b"\n" != _header(plan.identity).encode():
+            raise InputError(folder, "", ANOTHER)
+
     @property
     def complete(self) -> bool:
         """Whether every flight of the sweep is done."""
         return len(self.done) == self._columns.flights
 
     def _read(self, identity: str) -> None:
-        header = json.dumps({"sweep": identity}) + "\n"
+        header = _header(identity)
         whole = b""
         if self.path.exists():
             content = read_bytes(self.path)
@@ -49,11 +64,7 @@ class Journal:
             return
         first, *lines = whole.decode("utf-8")[:-1].split("\n")
         if first + "\n" != header:
-            raise InputError(
-                self.path.parent,
-                "",
-                "holds another sweep, or what this one reads has changed since; give a new folder",
-            )
+            raise InputError(self.path.parent, "", ANOTHER)
         for number, line in enumerate(lines, 2):
             flight = self._entry(line, number).flight
             if flight in self.done:
@@ -92,19 +103,25 @@ class Journal:
 @contextmanager
 def opened(folder: Path, plan: SweepPlan) -> Iterator[Journal]:
     """Give the journal of a sweep's folder, made if need be, to this process alone."""
-    if folder.is_dir() and _foreign(folder) and not (folder / JOURNAL).exists():
-        raise InputError(folder, "", "is not empty, and holds no sweep; give a new folder")
     try:
+        if folder.is_dir() and _foreign(folder) and not (folder / JOURNAL).exists():
+            raise InputError(folder, "", "is not empty, and holds no sweep; give a new folder")
+        if (folder / JOURNAL).exists():
+            Journal.check(folder, plan)  # before anything is written beside another sweep
         folder.mkdir(parents=True, exist_ok=True)
         # SQLite's lock works on every system, and is the kernel's: nothing is left by a kill.
         lock = sqlite3.connect(folder / LOCK, timeout=0.0, isolation_level=None)
-    except (OSError, sqlite3.Error):
+    except InputError:
+        raise
+    except (OSError, ValueError, sqlite3.Error):
         raise InputError(folder, "", "cannot be written there") from None
     try:
         try:
             lock.execute("BEGIN EXCLUSIVE")
-        except sqlite3.Error:
-            raise InputError(folder, "", "another sweep is writing there") from None
+        except sqlite3.Error as error:
+            busy = error.sqlite_errorcode == sqlite3.SQLITE_BUSY
+            problem = "another sweep is writing there" if busy else f"cannot be written: {error}"
+            raise InputError(folder, "", problem) from None
         journal = _journal(folder, plan)
         clear(folder)
         yield journal

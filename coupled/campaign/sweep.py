@@ -11,6 +11,7 @@ from typing import Any
 
 import polars as pl
 
+from coupled.arguments import public
 from coupled.authority.figures import sweep_remarks
 from coupled.campaign.flights import fly_sweep
 from coupled.campaign.journal import opened
@@ -63,6 +64,7 @@ class SweepResult:
         return [key for key in self.plan.keys if self.table[key].dtype.is_numeric()]
 
 
+@public
 def sweep(
     plan: SweepPlan | Mapping[str, Any] | Path | str,
     folder: Path | str | None = None,

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from coupled.flight.expectation import Figure
 from coupled.flight.manoeuvre import Configuration
-from coupled.rig.parameters import PLAIN_NAME
+from coupled.rig.parameters import PlainName
 from coupled.schema import Section, quantity
 
 MOST_FLIGHTS = 1_000_000
@@ -36,7 +36,7 @@ class Survive(Section):
 class SweepFile(Section):
     """The keys of a sweep file."""
 
-    name: str = quantity("", pattern=PLAIN_NAME)
+    name: PlainName
     run: str = quantity("", min_length=1)
     case: str | None = None
     configurations: list[Configuration] = []

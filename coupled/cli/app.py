@@ -25,6 +25,7 @@ from coupled.cli.process import (
     Stop,
     prepare_streams,
     prepare_threads,
+    prepare_warnings,
     said_of,
     silence_streams,
 )
@@ -66,6 +67,7 @@ def main() -> None:
     gc.set_threshold(_GARBAGE)
     prepare_streams()
     prepare_threads()
+    prepare_warnings()
     with Stop() as stop:
         try:
             code = _run()

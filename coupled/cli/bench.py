@@ -22,7 +22,7 @@ from coupled.cli.rigs import (
     rig_and_control,
     say_stale,
 )
-from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, say
+from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, say, say_note
 from coupled.errors import InputError
 from coupled.files import check_target
 from coupled.outputs import Outputs
@@ -99,6 +99,12 @@ def bench(
         keep_json(table, json_file, outputs)
     if json_file != "-":
         say(f"readings: {path}  ({len(readings.row)} readings, {len(readings.null_row)} nulls)")
+    if len(readings.null_row) < nulls:
+        lost = nulls - len(readings.null_row)
+        say_note(
+            f"{lost} of {nulls} nulls show 0 V and are left out: the loader has no basic gradient,"
+            " or its friction or breakout holds it against the force"
+        )
     print_json(table, json_file)
 
 

@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
+from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
 from coupled.cli.rigs import say_stale
@@ -138,7 +139,7 @@ def fly(
     print_json(figures, json_file)
     if flight.ended_early:
         err.print(f"[yellow]ended early:[/] {flight.ended_early}; the record so far is kept")
-        raise typer.Exit(1)
+    _end([flight])
 
 
 @app.command(epilog="[dim]Example: coupled plot out/t37.csv --figure out/t37.pdf[/]")
@@ -185,5 +186,8 @@ def _sentence(card: str) -> str:
 
 
 def _end(flights: Sequence[Flight]) -> None:
-    if any(flight.outcome.ended_early for flight in flights):
-        raise typer.Exit(1)
+    """End a command by what ended its flights before their time, if anything did."""
+    early = [flight.ended_early for flight in flights if flight.ended_early]
+    if early:
+        stopped = any(why.startswith("interrupted") for why in early)
+        raise typer.Exit(INTERRUPTED if stopped else 1)

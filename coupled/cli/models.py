@@ -27,7 +27,10 @@ def models(
         list[str] | None, typer.Argument(help="Models to look at. (default: all that are here)")
     ] = None,
     workers: Annotated[
-        int, typer.Option("--workers", "-j", help="Processes; 0 is one a core.", min=0)
+        int,
+        typer.Option(
+            "--workers", "-j", help="Processes, at most one a core; 0: one a core.", min=0, max=512
+        ),
     ] = 0,
     json_file: JsonOption = "",
 ) -> None:
@@ -43,7 +46,8 @@ def models(
     check_json(json_file, [])
     chosen = list(names or known)
     found: dict[str, Surveyed] = {}
-    count = 1 if len(chosen) < 4 else cores(workers)
+    # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
+    count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
     with progress() as advance, executor(count) as pool:
         calls = [(name, known[name]) for name in chosen]
         for one in as_done(pool, survey, calls, 2 * count):

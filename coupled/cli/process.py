@@ -8,7 +8,10 @@ import io
 import os
 import signal
 import sys
+import warnings
 from types import FrameType
+
+from coupled.errors import say_warning
 
 REFUSED = 2  # input that cannot be used
 INTERRUPTED = 130  # as a shell tells of Ctrl-C: 128 and the number of SIGINT
@@ -80,6 +83,11 @@ def prepare_threads() -> None:
     """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+
+
+def prepare_warnings() -> None:
+    """Let a warning of a library be one line for a user, not a place in its code."""
+    warnings.showwarning = say_warning
 
 
 def silence_streams() -> None:

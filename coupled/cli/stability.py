@@ -77,11 +77,12 @@ def stability(
             advance(f"{name}, {kind}", done, len(asked))
             every.append(plane(data, name, kind))
     planes = {name: [each for each in every if each.control == name] for name in bent}
-    most, worst = (100.0 * share for share in disagreement(every))
+    apart = disagreement(every)
     listed = {
         "rig": data.name,
         "controls": [each.as_dict() for each in limits],
-        "greatest_difference_percent": worst,
+        "greatest_difference_percent": None if apart.worst is None else 100.0 * apart.worst,
+        "limits_without_theory": apart.alone,
     }
     with progress("drawing the maps"), Outputs() as outputs:
         save(draw_stability(data, planes), outputs.at(path))
@@ -89,11 +90,7 @@ def stability(
         keep_json(listed, json_file, outputs)
     if json_file != "-":
         print_limits(out, limits, bob, units)
-        count = sum(len(each.crossings) for each in every)
-        say(
-            f"{count} limits on the map: 95 % of those simulated lie within {most:.2f} % of linear"
-            f" theory, all within {worst:.2f} %"
-        )
+        say(apart.words)
         say(f"written: {path}")
         say(f"written: {table}")
     print_json(listed, json_file)

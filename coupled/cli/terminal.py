@@ -15,7 +15,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from coupled.errors import InputError, printable
-from coupled.files import check_target, json_text, write_text
+from coupled.files import check_target, finite, json_text, write_text
 from coupled.outputs import Outputs
 
 LONGEST_WORD = 1000  # characters of a word, a name or a path that is printed
@@ -95,9 +95,9 @@ def print_json(table: Any, target: str) -> None:
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
-        text = json.dumps(table, indent=2) + "\n"
+        text = json.dumps(finite(table), indent=2) + "\n"
     if sys.stdout.isatty() and printable(text) != text:
-        text = json.dumps(table, indent=2) + "\n"
+        text = json.dumps(finite(table), indent=2) + "\n"
     try:
         sys.stdout.write(text)
         sys.stdout.flush()

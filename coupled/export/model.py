@@ -12,7 +12,12 @@ from coupled.errors import InputError, nearest
 from coupled.files import read_bytes
 from coupled.flight.airframe import packaged_models
 from coupled.flight.altered import ALTERATIONS
-from coupled.flight.modelfile import NothingToScaleError, loadable
+from coupled.flight.modelfile import (
+    NothingToScaleError,
+    UnreadableModelError,
+    loadable,
+    parsed,
+)
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 
@@ -63,6 +68,8 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
     except NothingToScaleError as error:
         problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
         raise InputError(file, f"flight.{error.scaled.name}", problem) from None
+    except UnreadableModelError as error:
+        raise InputError(file, "flight.model", str(error)) from None
     found: Files = {folder / f"{name}.xml": _including(main, systems)}
     for path in sorted((home / name).rglob("*.xml")):
         place = folder / PurePosixPath(path.relative_to(home / name).as_posix())
@@ -160,7 +167,7 @@ def _shared(files: Files, folder: PurePosixPath) -> Files:
     found: Files = {}
     waiting = list(files.values())
     while waiting:
-        for element in _parsed(waiting.pop()).iter():
+        for element in parsed_leniently(waiting.pop()).iter():
             name = element.attrib.get("file", "").removesuffix(".xml")
             places = {"engine": "Engines", "thruster": "Engines", "system": "Systems"}
             if not name or element.tag not in places:
@@ -175,8 +182,9 @@ def _shared(files: Files, folder: PurePosixPath) -> Files:
     return found
 
 
-def _parsed(text: bytes) -> ElementTree.Element:
+def parsed_leniently(text: bytes) -> ElementTree.Element:
+    """Return the root of a file's XML, an empty one where it cannot be read."""
     try:
-        return ElementTree.fromstring(text)
-    except ElementTree.ParseError:
+        return parsed(text, "")
+    except UnreadableModelError:
         return ElementTree.Element("unreadable")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from xml.etree import ElementTree
 
 import numpy as np
 
 from coupled.export.host import BENCH_PRESSURE
 from coupled.export.load import POINT, TANKS
-from coupled.export.model import Files
+from coupled.export.model import Files, parsed_leniently
 from coupled.export.script import Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
@@ -100,5 +99,5 @@ def _moved_slowly(files: Files) -> Iterator[str]:
     for place, text in files.items():
         if place.suffix != ".xml" or b"<kinematic" not in text:
             continue
-        for moving in ElementTree.fromstring(text).iter("kinematic"):
+        for moving in parsed_leniently(text).iter("kinematic"):
             yield from ((output.text or "").strip() for output in moving.findall("output"))

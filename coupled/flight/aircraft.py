@@ -9,6 +9,7 @@ from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import Alterations
 from coupled.flight.gusts import Gusts
 from coupled.flight.loading import Loading
+from coupled.flight.ownmodel import check_own_model
 from coupled.flight.wrapper import Aircraft, Wrapper
 from coupled.rig.parameters import Flight
 
@@ -33,8 +34,31 @@ def make_aircraft(
     Raises InputError.
 
     Before each frame the conditions act in their order, then the gusts; then the factors follow
-    a trim that was moved.
+    a trim that was moved. A model of the user's own is tried in a process of its own first.
     """
+    check_own_model(flight, frame_s, controls, models, file)
+    return make_unchecked(
+        *(flight, frame_s, controls, models, file),
+        record=record,
+        run_file=run_file,
+        conditions=conditions,
+        gusts=gusts,
+    )
+
+
+def make_unchecked(
+    flight: Flight,
+    frame_s: float,
+    controls: Sequence[str] = ("column",),
+    models: Sequence[Path] = (),
+    file: object = "rig",
+    *,
+    record: Sequence[str] = (),
+    run_file: object = "run",
+    conditions: Sequence[Wrapper] = (),
+    gusts: Gusts | None = None,
+) -> JSBSimAirframe:
+    """Return an aircraft as `make_aircraft` does, of a model that ends no process."""
 
     def plain_aircraft(names: Sequence[str]) -> Aircraft:
         return JSBSimAirframe(flight, frame_s, ("column",), models, file, names)

@@ -37,7 +37,13 @@ from coupled.flight.everyframe import (
     stepper,
 )
 from coupled.flight.gusts import GUST_DOWN
-from coupled.flight.modelfile import NothingToScaleError, catalogue, loadable, models_in
+from coupled.flight.modelfile import (
+    NothingToScaleError,
+    UnreadableModelError,
+    catalogue,
+    loadable,
+    models_in,
+)
 from coupled.flight.newton import newton_trim
 from coupled.flight.putback import put_back
 from coupled.flight.surfacemap import flown_through, stops_found
@@ -149,7 +155,7 @@ class JSBSimAirframe:
         for folder in reversed(models):
             known |= models_in(folder)
         if self._flight.folder:
-            known[name] = Path(self._flight.folder)
+            known[name] = self._own_folder(name)
         if name not in known:
             raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
@@ -165,6 +171,11 @@ class JSBSimAirframe:
         except NothingToScaleError as error:
             problem = f"{name} has no {error.scaled.quantity} that could be scaled; leave it at 1"
             raise self.fault(error.scaled.name, problem) from None
+        except UnreadableModelError as error:
+            raise self.fault("model", f"{name} does not load: {error}") from None
+        except RecursionError:
+            problem = f"{name} does not load: its functions refer to one another without end"
+            raise self.fault("model", problem) from None
         except OSError as error:
             problem = f"{name} with factors on it cannot be written to a temporary folder: {error}"
             raise self.fault("", problem) from None
@@ -183,6 +194,17 @@ class JSBSimAirframe:
         # By this list, since asking the manager for a malformed name ends the process.
         self._catalog = catalogue(fdm.query_property_catalog(""))
         return fdm
+
+    def _own_folder(self, name: str) -> Path:
+        """Return the folder that the rig says its model lies in."""
+        folder = Path(self._flight.folder)
+        try:
+            there = (folder / name / f"{name}.xml").is_file()
+        except (OSError, ValueError):  # a name that no folder can have
+            there = False
+        if not there:
+            raise self.fault("model_folder", f"holds no {name}/{name}.xml")
+        return folder
 
     def _set(self, name: str, value: float) -> None:
         """Set a property that the rig file names, if it is there and is the model's to set."""

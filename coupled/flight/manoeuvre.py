@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
+from coupled.arguments import public
 from coupled.errors import InputError, nearest
 from coupled.flight.conditions import Conditions
 from coupled.flight.expectation import Expect
@@ -19,7 +20,7 @@ from coupled.flight.pilot import Pilot
 from coupled.flight.pilot.base import Values
 from coupled.record.channels import ControlName, record_channels, unit_of
 from coupled.rig.equations import bend_loss, felt_gradient
-from coupled.rig.parameters import PLAIN_NAME, Control
+from coupled.rig.parameters import Control, PlainName
 from coupled.rig.rig import Rig
 from coupled.rig.serving import check_led, has_services, service_channels
 from coupled.rig.structure import Structure
@@ -39,6 +40,7 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
 EVERY_CONFIGURATION: tuple[Configuration, ...] = (*CONFIGURATIONS, "calibrated low")
 
 
+@public
 class PressureProfile(Given):
     """The dynamic pressure of a bench over time, straight between points and held at the ends.
 
@@ -78,7 +80,7 @@ class Measure(Section):
 class Flown(Section):
     """The keys of a run file that any manoeuvre has."""
 
-    name: str = quantity("", pattern=PLAIN_NAME)
+    name: PlainName
     duration: float = quantity("s", gt=0, le=7200)
     seed: int = quantity("", 0, ge=0)
     record_properties: list[str] = []
@@ -93,6 +95,7 @@ class Source:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
+@public
 @dataclass(frozen=True)
 class Manoeuvre:
     """What is flown: a rig, and a pilot on some of its controls, for `duration_s` seconds.

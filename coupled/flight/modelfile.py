@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import copy
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
+
+from coupled.files import MOST_TEXT_bytes, clear_temporary, read_bytes, temporary_folder
 
 Element = ElementTree.Element
 
@@ -68,6 +69,22 @@ class NothingToScaleError(Exception):
         self.scaled = scaled
 
 
+class UnreadableModelError(Exception):
+    """A file of a model cannot be read as XML."""
+
+
+def parsed(text: bytes, name: str) -> Element:
+    """Return the root of a model's XML. Raises UnreadableModelError, naming the file.
+
+    Python's parser says what is no XML by ParseError, an encoding that it does not know by
+    LookupError or ValueError.
+    """
+    try:
+        return ElementTree.fromstring(text)
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise UnreadableModelError(f"{name} is no XML that can be read: {error}") from None
+
+
 def models_in(folder: Path) -> dict[str, Path]:
     """Return the models of a folder: {name: the folder}."""
     return {each.name: folder for each in folder.iterdir() if _is_model(each)}
@@ -90,7 +107,8 @@ def loadable(
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
     With `ballast` it has one point mass more, of no weight yet.
-    Raises NothingToScaleError, or OSError where there is no temporary folder to write to.
+    Raises NothingToScaleError, UnreadableModelError for a file that is no XML, or OSError where
+    there is no temporary folder to write to.
     """
     if not scaled and not ballast:
         yield models
@@ -98,14 +116,18 @@ def loadable(
     folder = models / name
     state = (folder / f"{name}.xml").stat()
     text = _scalable(folder, tuple(scaled), ballast, state.st_mtime_ns, state.st_size)
-    with tempfile.TemporaryDirectory(prefix="coupled-") as temporary:
-        made = Path(temporary) / name
+    clear_temporary()
+    temporary = temporary_folder()
+    try:
+        made = temporary / name
         made.mkdir()
         for entry in folder.iterdir():
             if entry.name != f"{name}.xml":
                 _stand_in(made / entry.name, entry.absolute())
         (made / f"{name}.xml").write_bytes(text)
-        yield Path(temporary)
+        yield temporary
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _stand_in(place: Path, entry: Path) -> None:
@@ -124,7 +146,7 @@ def _scalable(
     folder: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
 ) -> bytes:
     """Return a model's text with parts of it scalable; `changed_ns` and `size` tell versions."""
-    root = ElementTree.parse(folder / f"{folder.name}.xml").getroot()
+    root = _read(folder / f"{folder.name}.xml")
     for one in scaled:
         aerodynamics = _section(root, folder, "aerodynamics")
         if aerodynamics is None:
@@ -137,12 +159,16 @@ def _scalable(
     return text
 
 
+def _read(file: Path) -> Element:
+    return parsed(read_bytes(file, MOST_TEXT_bytes), file.name)
+
+
 def _section(root: Element, folder: Path, name: str) -> Element | None:
     """Return a section of a model, with what stands in a file of its own read into it."""
     section = root.find(name)
     if section is not None and (file := section.attrib.pop("file", None)) is not None:
         own = folder / (file if file.endswith(".xml") else f"{file}.xml")
-        section[:] = list(ElementTree.parse(own).getroot())
+        section[:] = list(_read(own))
     return section
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 from coupled.errors import InputError, collected, nearest, together
 from coupled.flight.conditions import Conditions, build_conditions
@@ -27,13 +27,15 @@ from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
 from coupled.resources import find, find_named, shipped_rigs, shipped_runs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import change, read_rig
-from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity
+from coupled.schema import Section, build, file_keys, known_keys, load_toml, quantity, text_like
 
 
 class Case(Section):
     """A variant of the run: dotted keys of rig and pilot, with their values here."""
 
-    label: str = quantity("", pattern=r"^[^\x00-\x1f\x7f]{1,120}$")
+    label: Annotated[
+        str, text_like(r"[^\x00-\x1f\x7f]{1,120}", "should be one line of 1 to 120 characters")
+    ]
     rig: dict[str, Any] = {}
     pilot: dict[str, Any] = {}
 

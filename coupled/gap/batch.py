@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,8 +19,9 @@ from typing import Any
 
 import coupled
 from coupled.errors import InputError, collected, nearest, together
-from coupled.files import check_target, sha256, write_text
+from coupled.files import check_target, json_text, read_json, sha256, write_text
 from coupled.gap.diagnose import diagnose
+from coupled.gap.findings.document import diagnosis_from
 from coupled.gap.findings.result import FORMAT
 from coupled.parallel import as_done, cores, executor
 from coupled.record.channels import ControlName
@@ -108,28 +108,28 @@ class Row:
     rig: str
     verdict: str
     effects: tuple[str, ...]
-    parameters: tuple[tuple[str, float], ...]
+    parameters: tuple[tuple[str, float | None], ...]
     guilty: tuple[str, ...]
     rivals: tuple[tuple[str, ...], ...]
     closed: float | None
     why: str = ""  # it was refused, or failed
 
     @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Row:
-        """Return the line of a diagnosis' JSON."""
-        effects = document["effects"]
+    def of(cls, document: Mapping[str, Any], job: Job) -> Row:
+        """Return the line of a job's diagnosis. Raises InputError for JSON that holds none."""
+        kept = diagnosis_from(document, job.out)
         return cls(
-            record=document["record"],
-            rig=document["made"]["rig"],
-            verdict=document["verdict"],
-            effects=tuple(effect["name"] for effect in effects),
+            record=job.name,
+            rig=job.rig.stem,
+            verdict=kept.verdict,
+            effects=tuple(effect.name for effect in kept.effects),
             parameters=tuple(
-                (name, one["value"]) for e in effects for name, one in e["parameters"].items()
+                (name, one.value) for e in kept.effects for name, one in e.parameters.items()
             ),
-            guilty=tuple(s for s, stage in document["stages"].items() if stage.get("guilty")),
-            rivals=tuple(tuple(group) for group in document["rivals"]),
-            closed=document["shrink"].get("closed"),
-            why=document.get("why", ""),
+            guilty=tuple(name for name, stage in kept.stages.items() if stage.guilty),
+            rivals=tuple(tuple(group) for group in kept.rivals),
+            closed=kept.shrink.closed,
+            why=kept.why,
         )
 
 
@@ -140,7 +140,8 @@ def summary(rows: Sequence[Row]) -> str:
     table.writerow(HEAD)
     for row in rows:
         cells = [row.record, row.rig, row.verdict, " ".join(row.effects)]
-        cells += [" ".join(f"{name}={value:.5g}" for name, value in row.parameters)]
+        named = [(name, value) for name, value in row.parameters if value is not None]
+        cells += [" ".join(f"{name}={value:.5g}" for name, value in named)]
         cells += [" ".join(row.guilty), " ".join("|".join(group) for group in row.rivals)]
         table.writerow([*cells, "" if row.closed is None else f"{row.closed:.4f}"])
     return text.getvalue()
@@ -169,9 +170,16 @@ def made_by(job: Job) -> dict[str, str]:
 
 
 def known_row(job: Job, made: Mapping[str, str]) -> Row | None:
-    """Return the line of a diagnosis that stands there already, made by just this."""
-    known = _known(job.out)
-    return Row.of(known) if known.get("made") == made and known.get("format") == FORMAT else None
+    """Return the line of a diagnosis that stands there already, made by just this.
+
+    None where there is none, and where the file is damaged: the diagnosis is then made again.
+    """
+    try:
+        known = read_json(job.out, "a diagnosis is wanted")
+        row = Row.of(known, job)
+    except InputError:
+        return None
+    return row if known.get("made") == made and known.get("format") == FORMAT else None
 
 
 def answer(
@@ -198,18 +206,10 @@ def _nothing(verdict: str, why: str) -> dict[str, Any]:
     return {"format": FORMAT, "verdict": verdict, "why": why} | nothing
 
 
-def _known(path: Path) -> dict[str, Any]:
-    try:
-        known = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return known if isinstance(known, dict) else {}
-
-
 def _keep(job: Job, made: Mapping[str, str], answered: Mapping[str, Any]) -> Row:
     document = {"record": job.name} | dict(answered) | {"made": dict(made)}
-    write_text(job.out, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
-    return Row.of(document)
+    write_text(job.out, json_text(document, indent=1))
+    return Row.of(document, job)
 
 
 def run_all(todo: list[Job], progress: Progress, workers: int = 0, cluster: str = "") -> list[Row]:

@@ -16,12 +16,13 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 from coupled.errors import InputError
+from coupled.files import read_bytes
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import packaged_models
 from coupled.flight.direct import check_direct_controls
+from coupled.flight.modelfile import UnreadableModelError, parsed
 from coupled.record.channels import CONTROL_NAMES, PITCH, ROLL, ControlName
 from coupled.resources import aircraft_folder, shipped_rigs
 from coupled.rig.parameters import Flight
@@ -159,12 +160,12 @@ def _mass_kg(file: Path) -> float:
 def _quantity(file: Path, tag: str, units: dict[str, float]) -> float:
     """Return a number of a model's file in SI, 0 where it does not say."""
     try:
-        element = ElementTree.parse(file).getroot().find(f".//{tag}")
+        element = parsed(read_bytes(file), file.name).find(f".//{tag}")
         if element is None:
             return 0.0
         first = next(iter(units.values()))
         return float(element.text or 0.0) * units.get(element.get("unit", "").upper(), first)
-    except (OSError, ValueError, ElementTree.ParseError):
+    except (InputError, ValueError, UnreadableModelError):
         return 0.0
 
 

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from io import StringIO
+from functools import lru_cache
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.category import StrCategoryLocator
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, fontManager, get_font
+from matplotlib.text import Text
+from matplotlib.ticker import FixedLocator
 
-from coupled.errors import InputError
+from coupled.errors import InputError, printable
 from coupled.files import write_whole
 
 FORMATS = (".png", ".pdf", ".svg")
+BOX = "□"  # in place of a letter that no font has
+# Fonts with the letters of languages that matplotlib's own font lacks, of the common systems.
+OTHER_FONTS = (
+    *("Noto Sans CJK JP", "Noto Sans CJK SC", "Source Han Sans", "WenQuanYi Zen Hei", "IPAGothic"),
+    *("Hiragino Sans", "PingFang SC", "Microsoft YaHei", "Yu Gothic", "MS Gothic", "Malgun Gothic"),
+    *("Noto Sans Devanagari", "Noto Sans Thai", "Noto Sans", "Arial Unicode MS"),
+)
 
 
 def check_format(path: Path) -> None:
@@ -23,19 +35,73 @@ def check_format(path: Path) -> None:
         raise InputError(path, "", f"a figure ends in {', '.join(FORMATS)}")
 
 
+def make_drawable(figure: Figure) -> None:
+    """Give each text of a figure letters that can be drawn.
+
+    Control characters, which a viewer would act on, become `?`. A letter that the text's font
+    lacks is drawn in an installed font of `OTHER_FONTS` that has it, or else as an empty box.
+    """
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        word, fonts = _drawable(text.get_text(), text.get_fontproperties())
+        if word != text.get_text():
+            text.set_text(word)
+        if fonts:
+            text.set_fontfamily(fonts)
+    for axis in (one for axes in figure.axes for one in (axes.xaxis, axes.yaxis)):
+        if not isinstance(axis.get_major_locator(), (FixedLocator, StrCategoryLocator)):
+            continue  # numbers, which any font has
+        places = axis.get_ticklocs()
+        words = axis.get_major_formatter().format_ticks(places.tolist())
+        found = [_drawable(str(word), FontProperties()) for word in words]
+        if [word for word, _ in found] != words:
+            axis.set_ticks(places, labels=[word for word, _ in found])
+        if fonts := max((fonts for _, fonts in found), key=len, default=[]):
+            axis.set_tick_params(labelfontfamily=fonts)
+
+
+def _drawable(word: str, font: FontProperties) -> tuple[str, list[str]]:
+    """Return a text that can be drawn, and the fonts that it needs beyond its own."""
+    plain = printable(word)
+    if plain.isascii():
+        return plain, []
+    lacking = {c for c in plain if c not in "\n\t"} - _letters(fontManager.findfont(font))
+    if not lacking:
+        return plain, []
+    installed = {entry.name: entry.fname for entry in fontManager.ttflist}
+    fonts = []
+    for name in OTHER_FONTS:
+        if name in installed and lacking & _letters(installed[name]):
+            fonts.append(name)
+            lacking -= _letters(installed[name])
+    boxed = "".join(BOX if c in lacking else c for c in plain)
+    return boxed, [*font.get_family(), *fonts] if fonts else []
+
+
+@lru_cache(maxsize=16)
+def _letters(file: str) -> frozenset[str]:
+    """Return the letters that a font has."""
+    return frozenset(map(chr, get_font(file).get_charmap()))
+
+
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, whole; the same figure gives the same bytes."""
+    """Write a figure, whole; the same figure gives the same bytes on the same machine."""
     check_format(path)
+    make_drawable(figure)
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()[1:]
     no_date: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind, {})
     with rc_context({"svg.hashsalt": "coupled"}):
-        write_whole(path, lambda part: figure.savefig(part, dpi=130, format=kind, metadata=no_date))
+        # Into memory first: matplotlib raises what it likes where a disk is full.
+        drawn = BytesIO()
+        figure.savefig(drawn, dpi=130, format=kind, metadata=no_date)
+    write_whole(path, lambda part: part.write_bytes(drawn.getvalue()))
 
 
 def svg_text(figure: Figure) -> str:
     """Return a figure as SVG, its letters as outlines: it looks alike wherever it is shown."""
     FigureCanvasSVG(figure)
+    make_drawable(figure)
     made = StringIO()
     with rc_context({"svg.hashsalt": "coupled", "svg.fonttype": "path"}):
         figure.savefig(made, format="svg", metadata={"Date": None})

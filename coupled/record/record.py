@@ -11,12 +11,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.errors import InputError, nearest
+from coupled.arguments import public
+from coupled.errors import InputError, nearest, shown, shown_value
 from coupled.files import MOST_TEXT_bytes, check_format, json_text, read_bytes, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import TIME
@@ -32,6 +33,24 @@ SUFFIXES = (".csv", ".parquet")
 FORMAT = 1  # of a record and its manifest; one without is from before this was written
 
 
+@runtime_checkable
+class DataFrame(Protocol):
+    """A DataFrame of polars or pandas: named columns."""
+
+    @property
+    def columns(self) -> Any:
+        """The columns' names."""
+
+    def to_dict(self, *how: Any, **more: Any) -> Any:
+        """Return the columns by name."""
+
+
+class ChannelError(InputError, KeyError):
+    """A channel that a record does not have."""
+
+    __str__ = InputError.__str__
+
+
 @dataclass(frozen=True)
 class EndedEarly:
     """Why, and after how long, a flight ended before its time."""
@@ -43,13 +62,14 @@ class EndedEarly:
         return f"{self.reason} at {self.time_s:.2f} s"
 
 
+@public
 @dataclass(frozen=True)
 class Record:
     """Channels over time: `data` has shape (rows, channels), SI, one row a frame.
 
-    `record["column_force_N"]` is a channel, shape (rows,); a name that is not there raises
-    KeyError with the nearest. Each channel's unit ends its name; a pull, right wheel and right
-    pedal are positive. `manifest` says what made the record.
+    `record["column_force_N"]` is a channel, shape (rows,); a name that is not there raises an
+    InputError, which is a KeyError too, with the nearest. Each channel's unit ends its name; a
+    pull, right wheel and right pedal are positive. `manifest` says what made the record.
 
     >>> import coupled
     >>> record = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=2).record
@@ -66,9 +86,38 @@ class Record:
     data: Floats
     manifest: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        name = "coupled.Record"
+        if len(set(self.channels)) < len(self.channels):
+            raise InputError(name, "channels", "names a channel twice")
+        if self.data.ndim != 2 or self.data.shape[1] != len(self.channels):
+            shape = f"(rows, {len(self.channels)})"
+            problem = f"has the shape {self.data.shape}; give {shape}, a column a channel"
+            raise InputError(name, "data", problem)
+        if self.data.dtype.kind not in "fiu":
+            raise InputError(name, "data", f"holds {self.data.dtype}; give numbers")
+
+    @classmethod
+    def from_frame(cls, frame: DataFrame) -> Record:
+        """Return the record of a DataFrame of polars or pandas, a column a channel, SI.
+
+        `time_s` is a column or the index, and must rise; a null is NaN. Raises InputError, naming
+        the column.
+
+        >>> import coupled, polars
+        >>> frame = polars.DataFrame({"time_s": [0.0, 0.01], "column_force_N": [0.0, 1.5]})
+        >>> coupled.Record.from_frame(frame)
+        Record(2 rows, 0.02 s at 100 Hz; 2 channels: time_s, column_force_N)
+        """
+        return record_of(columns_of(frame), "DataFrame")
+
     def __getitem__(self, channel: str) -> Floats:
+        if not isinstance(channel, str):
+            problem = f"is {shown_value(channel)}; give the name of a channel"
+            raise ChannelError("record", "channel", problem)
         if channel not in self.channels:
-            raise KeyError(f"no channel {channel}; {nearest(channel, self.channels)}")
+            problem = f"no channel {shown(channel)}; {nearest(channel, self.channels)}"
+            raise ChannelError("record", "", problem)
         return self.data[:, self.channels.index(channel)]
 
     def __contains__(self, channel: str) -> bool:
@@ -95,7 +144,12 @@ class Record:
     def ended_early(self) -> EndedEarly | None:
         """Why and when the flight ended before its time, by the manifest; None if it did not."""
         ended = self.manifest.get("ended_early")
-        return EndedEarly(str(ended["reason"]), float(ended["time_s"])) if ended else None
+        if not isinstance(ended, Mapping):
+            return None
+        reason, time_s = ended.get("reason"), ended.get("time_s")
+        if not isinstance(reason, str) or not isinstance(time_s, (int, float)):
+            return None
+        return EndedEarly(reason, float(time_s))
 
     def between(self, start_s: float, end_s: float) -> Record:
         """Return the rows with start ≤ t < end."""
@@ -173,14 +227,49 @@ def read_record(path: Path) -> Record:
     live = manifest.get("live")
     unfinished = isinstance(live, dict) and live.get("unfinished") is True
     columns = read_columns(path, gaps=True, torn=unfinished)
+    return record_of(columns, path, manifest)
+
+
+def record_of(
+    columns: Mapping[str, Floats], file: object, manifest: Mapping[str, Any] | None = None
+) -> Record:
+    """Return the record of columns by name; `file` is named in faults. Raises InputError."""
     if TIME not in columns:
-        raise InputError(path, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
+        raise InputError(file, TIME, f"is missing; a record has it ({nearest(TIME, columns)})")
     if len(columns) < 2 or len(columns[TIME]) < 2:
-        raise InputError(path, "", "holds no channel over time")
+        raise InputError(file, "", "holds no channel over time")
     if not np.all(np.diff(columns[TIME]) > 0.0):
-        raise InputError(path, TIME, "must rise from row to row, without a gap")
-    data = np.column_stack(list(columns.values()))
-    return Record(tuple(columns), data, manifest)
+        raise InputError(file, TIME, "must rise from row to row, without a gap")
+    return Record(tuple(columns), np.column_stack(list(columns.values())), manifest or {})
+
+
+def columns_of(frame: DataFrame) -> dict[str, Floats]:
+    """Return the columns of a DataFrame of polars or pandas as numbers. Raises InputError."""
+    table: Any = frame
+    index = getattr(getattr(table, "index", None), "name", None)
+    if index is not None and index not in table.columns:
+        table = table.reset_index()
+    columns: dict[str, Floats] = {}
+    for name in table.columns:
+        if not isinstance(name, str):
+            raise InputError("DataFrame", "columns", f"has {name!r:.60}; give channels' names")
+        if name in columns:
+            raise InputError("DataFrame", name, "is there twice")
+        values = np.asarray(table[name].to_numpy())
+        if values.dtype.kind == "O":  # numbers with gaps
+            values = _with_gaps(values, name)
+        if values.dtype.kind not in "fiu":
+            raise InputError("DataFrame", name, f"holds {values.dtype}; give numbers")
+        columns[name] = values.astype(float)
+    return columns
+
+
+def _with_gaps(values: NDArray[Any], name: str) -> Floats:
+    """Return the numbers of a column of objects, NaN for None."""
+    for row, value in enumerate(values.tolist()):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float))):
+            raise InputError("DataFrame", f"row {row}: {name}", f"{value!r:.40} is no number")
+    return values.astype(float)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:

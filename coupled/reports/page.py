@@ -15,6 +15,7 @@ from typing import ClassVar, Literal
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from coupled.errors import printable
 from coupled.reports.inline import inline_svg
 
 _MINUS = re.compile(r"(?<![\w.)-])-(?=\d)")
@@ -151,6 +152,14 @@ def typeset(text: str) -> str:
     return _UNIT.sub("\u00a0", _MINUS.sub("−", text))
 
 
+def _shown(value: object) -> object:
+    """Return what a template shows: a user's text without what a browser would act on.
+
+    Control characters, and marks that turn the direction of writing, become `?`.
+    """
+    return printable(value) if type(value) is str else value
+
+
 @cache
 def _template() -> Template:
     environment = Environment(
@@ -159,6 +168,7 @@ def _template() -> Template:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_shown,
     )
     environment.filters["typeset"] = typeset
     return environment.get_template("report.html")

@@ -8,13 +8,21 @@ forward are positive.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from coupled.errors import InputError
-from coupled.schema import Section, named, quantity
+from coupled.schema import Section, named, quantity, text_like
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
+PlainName = Annotated[
+    str,
+    text_like(
+        PLAIN_NAME,
+        "should be letters, digits, dots, dashes and underscores, the first a letter or a digit,"
+        " at most 80 characters",
+    ),
+]
 MAX_ROWS = 32  # of a schedule's table
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
 GAUGE_SLOTS = 256  # of the gauge's, likewise
@@ -213,7 +221,9 @@ class Calibration(Section):
     """
 
     readings: int = quantity("", 0, ge=0)
-    date: str = quantity("", "", pattern=r"^[^\x00-\x1f\x7f]{0,40}$")
+    date: Annotated[
+        str, text_like(r"[^\x00-\x1f\x7f]{0,40}", "should be one line of at most 40 characters")
+    ] = ""
     s1: float = quantity("V_per_{d}", 0.0, ge=0)
     s1_error: float = quantity("V_per_{d}", 0.0, ge=0)
     s2: float = quantity("V_per_N", 0.0, ge=0)
@@ -262,7 +272,9 @@ class Control(Section):
 class Flight(Section):
     """The JSBSim model, how it is loaded, trimmed and flown, factors on its moments, the air."""
 
-    model: str = quantity("", min_length=1)
+    model: Annotated[
+        str, text_like(r"[^\x00-\x1f\x7f/\\]{1,120}", "should be the name of a JSBSim model")
+    ]
     folder: str = named("model_folder", "")
     altitude: float = quantity("m")
     calibrated_airspeed: float = quantity("m_per_s", gt=0)

@@ -10,8 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
+from pydantic import ValidationError
+
+from coupled.arguments import public
 from coupled.errors import InputError, nearest
 from coupled.record.channels import (
     CONTROL_NAMES,
@@ -24,14 +27,24 @@ from coupled.rig.parameters import (
     DELAY_SLOTS,
     GAUGE_SLOTS,
     MAX_ROWS,
-    PLAIN_NAME,
     Control,
     Flight,
+    PlainName,
 )
 from coupled.rig.structure import Structure, check_structure
-from coupled.schema import Section, build, changed, file_keys, grouped, known_keys, quantity
+from coupled.schema import (
+    Section,
+    build,
+    changed,
+    faults_of,
+    file_keys,
+    grouped,
+    known_keys,
+    quantity,
+)
 
 
+@public
 class Rig(Section):
     """A control-loading rig, and the aircraft that it is coupled to.
 
@@ -48,13 +61,20 @@ class Rig(Section):
     coupled.errors.InputError: t37: controls.column.loader.mass_kg: input should be greater than 0…
     """
 
-    name: str = quantity("", pattern=PLAIN_NAME)
+    _WANTED: ClassVar[str] = "a Rig (coupled.load_rig returns one)"
+    name: PlainName
     frame_rate: float = quantity("Hz", ge=1, le=2000)
     loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
     controls: dict[ControlName, Control]
     flight: Flight | None = None
     noise: dict[str, float] = {}
     structure: Structure = Structure()
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise faults_of(error, type(self), "coupled.Rig") from None
 
     @property
     def substeps(self) -> int:

@@ -32,9 +32,13 @@ def _placed(flight: Any, file: object) -> Any:
     if not isinstance(given, str) or not given:
         return flight
     base = file.parent if isinstance(file, Path) else Path()
-    folder = (base / given).resolve()
     name = flight.get("model")
-    if isinstance(name, str) and not (folder / name / f"{name}.xml").is_file():
+    try:
+        folder = (base / given).resolve()
+        there = not isinstance(name, str) or (folder / name / f"{name}.xml").is_file()
+    except (OSError, ValueError):  # a name that no folder can have
+        raise InputError(file, "flight.model_folder", "is no name of a folder") from None
+    if not there:
         problem = f"{given!r} holds no {name}/{name}.xml; give the folder that the model's lies in"
         raise InputError(file, "flight.model_folder", problem)
     return {**flight, "model_folder": str(folder)}

@@ -98,7 +98,7 @@ def test_a_key_reads_back_as_it_was_written(made: Path) -> None:
     assert (key.version, key.seed) == (DEFAULT, SEED)
     assert key.text() == path.read_text()
     for truth in key.records.values():
-        assert truth_from(json.loads(json.dumps(truth.as_dict()))) == truth
+        assert truth_from(json.loads(json.dumps(truth.as_dict())), path) == truth
 
 
 @pytest.mark.slow

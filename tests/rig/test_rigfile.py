@@ -87,7 +87,7 @@ def test_a_rig_written_is_read_back_the_same(name: str, tmp_path: Path) -> None:
         ("controls.column.gains.s1_over_s3", 1.0, "unknown key"),
         ("controls.column.calibration.bend_in_per_lb", 0.016, "give bend_m_per_N instead"),
         ("controls.column.calibration.readings", -1, "greater than or equal to 0"),
-        ("controls.column.calibration.date", "a\nb", "match pattern"),
+        ("controls.column.calibration.date", "a\nb", "one line of at most 40 characters"),
     ],
 )
 def test_a_fault_is_one_line_with_its_key(key: str, value: Any, says: str) -> None:

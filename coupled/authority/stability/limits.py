@@ -126,10 +126,39 @@ def gradient_range(control: Control) -> tuple[float, float]:
     return min(every), max(every)
 
 
-def disagreement(planes: Iterable[Plane]) -> tuple[float, float]:
-    """Return how far simulated limits lie from linear ones, as shares: 95 % of them, and all."""
-    found = [c.difference for plane in planes for c in plane.crossings] or [0.0]
-    return float(np.quantile(found, 0.95)), max(found)
+@dataclass(frozen=True)
+class Disagreement:
+    """How far simulated limits lie from those of linear theory, as shares.
+
+    `most` bounds 95 % of those that both have, `worst` all; None where they share none. `alone` is
+    the number of simulated limits that linear theory does not have.
+    """
+
+    limits: int
+    alone: int
+    most: float | None
+    worst: float | None
+
+    @property
+    def words(self) -> str:
+        """What the comparison shows, in a sentence."""
+        said = f"{self.limits} limits on the map"
+        if self.alone:
+            said += f", {self.alone} of which linear theory does not have"
+        if self.most is None or self.worst is None:
+            return said
+        return (
+            f"{said}: 95 % of those simulated lie within {100.0 * self.most:.2f} % of linear"
+            f" theory, all within {100.0 * self.worst:.2f} %"
+        )
+
+
+def disagreement(planes: Iterable[Plane]) -> Disagreement:
+    """Return how far simulated limits lie from linear ones."""
+    every = [c.difference for plane in planes for c in plane.crossings]
+    found = [share for share in every if share is not None]
+    most = float(np.quantile(found, 0.95)) if found else None
+    return Disagreement(len(every), len(every) - len(found), most, max(found, default=None))
 
 
 def _limit(rig: Rig, name: ControlName, kind: Kind, gradient: float) -> Limit:

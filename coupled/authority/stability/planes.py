@@ -76,9 +76,9 @@ class Crossing:
     theory: float | None
 
     @property
-    def difference(self) -> float:
-        """By how much simulation and theory differ, as a share; infinite without theory."""
-        return math.inf if self.theory is None else abs(self.simulated / self.theory - 1.0)
+    def difference(self) -> float | None:
+        """By how much simulation and theory differ, as a share; None without theory."""
+        return abs(self.simulated / self.theory - 1.0) if self.theory else None
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from coupled.blind.trials.key import Key
 from coupled.blind.trials.readings import same_law
 from coupled.blind.trials.truth import Truth
 from coupled.errors import InputError
-from coupled.files import check_format, read_json
+from coupled.files import read_json
+from coupled.gap.findings.document import KeptEffect, diagnosis_from
 
-VERDICTS = ("no_gap", "effect", "mostly", "ambiguous", "unexplained", "refused", "failed")
 NAMING = ("effect", "mostly")  # those that name effects as certain
 MISSING = "missing"  # the verdict of a record without a diagnosis
-FORMAT = 2  # the newest of a diagnosis that is read
 
 
 @dataclass(frozen=True)
@@ -161,45 +159,24 @@ def _read(path: Path, truth: Truth) -> Answer:
     nothing: frozenset[str] = frozenset()
     if not path.is_file():
         return Answer(path.stem, truth, MISSING, {}, nothing, nothing, nothing, None)
-    table = read_json(path, "a diagnosis is wanted")
-    if not isinstance(table, dict) or table.get("verdict") not in VERDICTS:
-        raise InputError(path, "verdict", f"is missing or not one of {', '.join(VERDICTS)}")
-    check_format(table.get("format"), FORMAT, path, "diagnosis")
-    made = table.get("made")
-    rig = made.get("rig", truth.rig) if isinstance(made, dict) else truth.rig
+    kept = diagnosis_from(read_json(path, "a diagnosis is wanted"), path)
+    rig = truth.rig if kept.made.rig is None else kept.made.rig
     if rig != truth.rig:
         raise InputError(path, "made.rig", f"is {rig}, in the key {truth.rig}: give this set's key")
-    try:
-        return _answer(path.stem, truth, table)
-    except (KeyError, TypeError, AttributeError, ValueError):
-        raise InputError(path, "", "is no diagnosis as coupled diagnose writes it") from None
-
-
-def _answer(name: str, truth: Truth, table: Mapping[str, Any]) -> Answer:
-    found = {str(effect["name"]): _found(effect) for effect in table["effects"]}
-    rivals = {str(rival) for group in table.get("rivals", []) for rival in group}
-    stages = table["stages"].items()
-    closed = table.get("shrink", {}).get("closed")
+    found = {effect.name: _found(effect) for effect in kept.effects}
     return Answer(
-        name,
+        path.stem,
         truth,
-        table["verdict"],
+        kept.verdict,
         found,
-        frozenset(found) | rivals,
-        frozenset(stage for stage, judged in stages if judged.get("guilty")),
-        frozenset(c for _, judged in stages for c in judged.get("missing", [])),
-        None if closed is None else float(closed),
-        {str(stage): dict(shares) for stage, shares in table.get("budget", {}).items()},
+        frozenset(found).union(*kept.rivals),
+        frozenset(name for name, stage in kept.stages.items() if stage.guilty),
+        frozenset(channel for stage in kept.stages.values() for channel in stage.missing),
+        kept.shrink.closed,
+        kept.budget,
     )
 
 
-def _found(effect: Mapping[str, Any]) -> FoundEffect:
-    intervals = {
-        str(name): Interval(_number(values.get("low")), _number(values.get("high")))
-        for name, values in effect.get("parameters", {}).items()
-    }
-    return FoundEffect(min(max(float(effect["probability"]), 0.0), 1.0), intervals)
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
+def _found(effect: KeptEffect) -> FoundEffect:
+    intervals = {name: Interval(one.low, one.high) for name, one in effect.parameters.items()}
+    return FoundEffect(effect.probability, intervals)

@@ -8,21 +8,39 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from coupled.blind.trials.deck import KNOWN
 from coupled.blind.trials.truth import Truth, truth_from
-from coupled.errors import InputError
+from coupled.errors import InputError, collected, together
 from coupled.files import check_format, read_json, read_text
-from coupled.schema import MOST_TOML_bytes
+from coupled.rig.parameters import PLAIN_NAME
+from coupled.schema import Lenient, load_toml, quantity, read_as, text_like
 
 FORMATS = {f"coupled blind key {version}": version for version in KNOWN}
 SEAL_FORMAT = 1
 SEAL = "seal.toml"
+
+
+class KeptKey(Lenient):
+    """The tables of a key's file."""
+
+    seed: int
+    salt: str
+    records: dict[str, Any] = quantity("", min_length=1)
+
+
+class KeptSeal(Lenient):
+    """The keys of a seal's file."""
+
+    trials: int = 1
+    records: int | None = quantity("", None, ge=1)
+    rigs: int | None = quantity("", None, ge=0)
+    key_sha256: Annotated[str, text_like("[0-9a-f]{64}", "should be the hash of the key")]
 
 
 @dataclass(frozen=True)
@@ -79,46 +97,42 @@ def read_key(path: Path) -> Key:
     if not isinstance(given, str) or given not in FORMATS:
         known = " or ".join(map(repr, FORMATS))
         raise InputError(path, "format", f"should be {known}; coupled blind make writes it")
-    records = table.get("records")
-    if not isinstance(records, dict) or not records:
-        raise InputError(path, "records", "is missing or empty")
-    truths = {name: _truth(path, name, entry) for name, entry in records.items()}
-    try:
-        return Key(FORMATS[given], int(table["seed"]), str(table["salt"]), truths)
-    except (KeyError, TypeError, ValueError):
-        raise InputError(path, "seed", "needs seed and salt, as coupled blind make wrote") from None
-
-
-def _truth(path: Path, name: str, entry: Any) -> Truth:
-    try:
-        return truth_from(entry)
-    except (KeyError, TypeError, ValueError, AttributeError):
-        problem = "is no entry of a key as coupled blind make writes it"
-        raise InputError(path, f"records.{name}", problem) from None
+    kept = read_as(KeptKey, table, path)
+    truths: dict[str, Truth] = {}
+    faults: list[InputError] = []
+    for name, entry in kept.records.items():
+        with collected(faults):
+            if not re.fullmatch(PLAIN_NAME, name):
+                raise InputError(path, f"records.{name}", "is no record's name, as r001")
+            truths[name] = truth_from(entry, path, f"records.{name}")
+    if faults:
+        raise together(faults)
+    return Key(FORMATS[given], kept.seed, kept.salt, truths)
 
 
 def read_seal(path: Path) -> Seal:
     """Return the seal of a set. Raises InputError."""
-    text = read_text(path, "the seal of coupled blind make is wanted", MOST_TOML_bytes)
-    try:
-        table = tomllib.loads(text)
-    except ValueError:
-        raise InputError(
-            path, "", "is not valid TOML; the seal of coupled blind make is wanted"
-        ) from None
+    table = load_toml(path)
     check_format(table.get("format"), SEAL_FORMAT, path, "seal")
-    version = table.get("trials", 1)
-    if version not in KNOWN:
+    kept = read_as(KeptSeal, table, path)
+    if kept.trials not in KNOWN:
         problem = f"this coupled knows trials of version {', '.join(map(str, KNOWN))}"
         raise InputError(path, "trials", problem)
-    sealed = table.get("key_sha256")
-    if not isinstance(sealed, str):
-        raise InputError(path, "key_sha256", "is missing")
-    return Seal(sealed, version, table.get("records"), table.get("rigs"))
+    return Seal(kept.key_sha256, kept.trials, kept.records, kept.rigs)
 
 
 def check_seal(key: Path, seal: Path) -> None:
-    """Refuse a key that is not the sealed one."""
-    sealed = read_seal(seal).key_sha256
-    if sealed != digest(read_text(key, "the key of coupled blind make is wanted")):
+    """Refuse a key that is not the sealed one, and a seal whose numbers are not those of the key.
+
+    The seal's `rigs` cannot be checked: a key names only those rigs that its records have.
+    """
+    sealed = read_seal(seal)
+    if sealed.key_sha256 != digest(read_text(key, "the key of coupled blind make is wanted")):
         raise InputError(key, "", f"is not the key that {seal} seals: one of them was changed")
+    known = read_key(key)
+    for name, said, held in (
+        ("trials", sealed.version, known.version),
+        ("records", sealed.records, len(known.records)),
+    ):
+        if said is not None and said != held:
+            raise InputError(seal, name, f"is {said}, and the key that it seals has {held}")

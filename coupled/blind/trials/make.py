@@ -23,6 +23,7 @@ from coupled.files import check_targets, read_json, read_text, write_text
 from coupled.parallel import as_done, cores, executor
 from coupled.rig.rig import Rig
 from coupled.rig.rigwrite import rig_text
+from coupled.schema import Lenient, quantity, read_as
 
 Progress = Callable[[str, int, int], None]
 RECORDS, RIGS, LIST, NOTE = "records", "rigs", "records.toml", "make.json"
@@ -46,6 +47,15 @@ class Numbers:
     def __str__(self) -> str:
         """Return what of them is no secret."""
         return f"{self.records} records and {self.rigs} rigs of version {self.version}"
+
+
+class KeptNumbers(Lenient):
+    """The numbers of an unfinished make, as its note has them."""
+
+    seed: int = quantity("", ge=0)
+    records: int = quantity("", ge=1)
+    rigs: int = quantity("", ge=0)
+    version: int = DEFAULT
 
 
 @dataclass(frozen=True)
@@ -222,16 +232,9 @@ def _clear(places: Places) -> None:
 
 
 def _read_numbers(note: Path) -> Numbers:
-    table = read_json(note, UNREADABLE)
-    try:
-        return Numbers(**table)
-    except TypeError:
-        raise InputError(note, "", UNREADABLE) from None
+    kept = read_as(KeptNumbers, read_json(note, UNREADABLE), note)
+    return Numbers(kept.seed, kept.records, kept.rigs, kept.version)
 
 
 def _read_truth(note: Path) -> Truth:
-    table = read_json(note, UNREADABLE)
-    try:
-        return truth_from(table)
-    except (KeyError, TypeError, ValueError):
-        raise InputError(note, "", UNREADABLE) from None
+    return truth_from(read_json(note, UNREADABLE), note)

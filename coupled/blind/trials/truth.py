@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from coupled.blind.twin.conditions import Conditions
+from coupled.errors import MISSING, InputError
+from coupled.schema import Lenient, named, read_as
+
+Category = Literal["none", "single", "pair", "outsider", "lacking"]
+FEWEST_EFFECTS: Mapping[Category, int] = {
+    "none": 0,
+    "single": 1,
+    "pair": 2,
+    "outsider": 1,
+    "lacking": 1,
+}
+# The conditions of a record that its key need not name.
+_CONDITIONS = (
+    *("noise", "bristle_J", "presliding_m", "elastic_share", "corner_Hz"),
+    *("force_skew_s", "motion_skew_s"),
+)
 
 
 @dataclass(frozen=True)
@@ -139,36 +155,89 @@ class Truth:
         return table
 
 
-def truth_from(table: Mapping[str, Any]) -> Truth:
-    """Return the truth that `Truth.as_dict` wrote. Raises KeyError, TypeError or ValueError."""
-    sizes = None
-    if "ratio" in table:
-        alone = tuple(map(float, table["alone"]))
-        sizes = Sizes(dict(table["clean_gap"]), alone, float(table["ratio"]))
-    known = {item.name for item in fields(Conditions)}
-    conditions = None
-    if "duration_s" in table:
-        given = {key: value for key, value in table.items() if key in known}
-        conditions = Conditions(**given | {"excitation": tuple(table["excitation"])})
+class KeyEffect(Lenient):
+    """A true effect, as a key has it."""
+
+    name: str
+    stage: str
+    parameters: dict[str, float]
+
+
+class KeyReading(Lenient):
+    """Another reading of the truth, as a key has it."""
+
+    names: list[str]
+    stages: list[str]
+    sure: bool
+
+
+class KeyEntry(Lenient):
+    """The truth of a record, as a key has it; what only some records have is None elsewhere."""
+
+    category: Category = named("class")
+    rig: str
+    effects: list[KeyEffect]
+    stages: list[str]
+    gap: dict[str, float]
+    missing: list[str]
+    alike: list[str] = []
+    readings: list[KeyReading] = []
+    budget: dict[str, dict[str, float]] = {}
+    also: list[str] = []
+    tolerance: dict[str, float] = {}
+    seed: list[int] = []
+    clean_gap: dict[str, float] = {}
+    alone: list[float] = []
+    ratio: float | None = None
+    duration_s: float | None = None
+    excitation: list[str] = []
+    level_N: float | None = None
+    noise: dict[str, float] = {}
+    bristle_J: float | None = None
+    presliding_m: float | None = None
+    elastic_share: float = 0.0
+    corner_Hz: dict[str, float] = {}
+    force_skew_s: float = 0.0
+    motion_skew_s: float = 0.0
+
+
+def truth_from(entry: Any, file: object, path: str = "") -> Truth:
+    """Return the truth that `Truth.as_dict` wrote; raises InputError for anything else.
+
+    `path` is the dotted place of the entry in `file`.
+    """
+    table = read_as(KeyEntry, entry, file, path)
+    fewest = FEWEST_EFFECTS[table.category]
+    if len(table.effects) < fewest:
+        problem = f"has {len(table.effects)}, and a record of class {table.category} has {fewest}"
+        raise InputError(file, f"{path}.effects".lstrip("."), f"{problem} or more")
+    sizes = conditions = None
+    if table.ratio is not None:
+        sizes = Sizes(table.clean_gap, tuple(table.alone), table.ratio)
+    if table.duration_s is not None:
+        if table.level_N is None:
+            raise InputError(file, f"{path}.level_N".lstrip("."), MISSING)
+        conditions = Conditions(
+            duration_s=table.duration_s,
+            excitation=tuple(table.excitation),
+            level_N=table.level_N,
+            **{name: getattr(table, name) for name in _CONDITIONS},
+        )
     return Truth(
-        category=str(table["class"]),
-        rig=str(table["rig"]),
-        effects=tuple(
-            TrueEffect(str(e["name"]), str(e["stage"]), dict(e["parameters"]))
-            for e in table["effects"]
-        ),
-        stages=tuple(map(str, table["stages"])),
-        gap=dict(table["gap"]),
-        missing=tuple(map(str, table["missing"])),
-        alike=tuple(map(str, table.get("alike", ()))),
+        category=table.category,
+        rig=table.rig,
+        effects=tuple(TrueEffect(e.name, e.stage, e.parameters) for e in table.effects),
+        stages=tuple(table.stages),
+        gap=table.gap,
+        missing=tuple(table.missing),
+        alike=tuple(table.alike),
         readings=tuple(
-            Reading(tuple(one["names"]), tuple(one["stages"]), bool(one["sure"]))
-            for one in table.get("readings", ())
+            Reading(tuple(one.names), tuple(one.stages), one.sure) for one in table.readings
         ),
-        budget=dict(table.get("budget", {})),
-        also=tuple(map(str, table.get("also", ()))),
-        tolerance=dict(table.get("tolerance", {})),
+        budget=table.budget,
+        also=tuple(table.also),
+        tolerance=table.tolerance,
         sizes=sizes,
         conditions=conditions,
-        seed=tuple(map(int, table.get("seed", ()))),
+        seed=tuple(table.seed),
     )

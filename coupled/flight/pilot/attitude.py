@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from coupled.arguments import public
 from coupled.flight.pilot.base import (
     STRONGEST,
     Action,
@@ -21,6 +22,7 @@ from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
+@public
 class Attitude(Pilot):
     """A hand that captures an attitude `change_rad` from where it finds it, and holds it.
 
@@ -49,6 +51,7 @@ class Attitude(Pilot):
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the hand, with a memory of its own."""
+        needs_aircraft(rig, control, start.file)
         found, integral, last = None, 0.0, self.start_s
         names = motion_channels(list(rig.controls), flown=True)
         angle, rate = names.index(ATTITUDE[control]), names.index(RATE[control])

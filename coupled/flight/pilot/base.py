@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.packing import Hand
@@ -56,6 +57,7 @@ class Start:
 STRONGEST = 5000.0  # N; 14 CFR 25.143 asks at most 670 N of a pilot, for a short time
 
 
+@public
 class Pilot(Given):
     """What every pilot has.
 
@@ -67,6 +69,7 @@ class Pilot(Given):
     start_s: float = quantity("", 1.0, ge=0, le=7200)
     reach_m: float = quantity("", 0.0, ge=0)
     reach_rad: float = quantity("", 0.0, ge=0)
+    _WANTED: ClassVar[str] = "a pilot (as coupled.Step(force_N=50))"
     _BY_UNIT: ClassVar[tuple[str, ...]] = ("reach",)  # keys that end in the control's unit
 
     @classmethod

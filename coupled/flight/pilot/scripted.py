@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot, Start, edges
 from coupled.record.channels import ControlName, unit_of
@@ -17,6 +18,7 @@ from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
+@public
 class _Levels(Pilot):
     """A force that goes from level to level."""
 
@@ -43,6 +45,7 @@ class _Levels(Pilot):
         return Action(force=force)
 
 
+@public
 class Step(_Levels):
     """A force held for `duration_s`, or to the end where that is 0.
 
@@ -66,6 +69,7 @@ class Step(_Levels):
         return [(self.start_s, 1.0), *end]
 
 
+@public
 class Ramp(Pilot):
     """A force that grows evenly over `ramp_s`, and is then held.
 
@@ -90,6 +94,7 @@ class Ramp(Pilot):
         return Action(force=force)
 
 
+@public
 class Doublet(_Levels):
     """A force one way, then as long the other way.
 
@@ -110,6 +115,7 @@ class Doublet(_Levels):
         return [(t, 1.0), (t + half, -1.0), (t + 2 * half, 0.0)]
 
 
+@public
 class ThreeTwoOneOne(_Levels):
     """The 3-2-1-1 of aircraft identification: alternating pulses of 3, 2, 1 and 1 units.
 
@@ -130,6 +136,7 @@ class ThreeTwoOneOne(_Levels):
         return list(zip(at.tolist(), [1.0, -1.0, 1.0, -1.0, 0.0], strict=True))
 
 
+@public
 class FrequencySweep(Pilot):
     """A sine whose frequency goes exponentially from `low_Hz` (0.1) to `high_Hz` (2).
 
@@ -168,6 +175,7 @@ class FrequencySweep(Pilot):
         return Action(force=force)
 
 
+@public
 class Clamp(Pilot):
     """Holds the grip at a deflection; the force is what that takes.
 

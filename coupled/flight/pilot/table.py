@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from coupled.arguments import public
 from coupled.errors import InputError, nearest
 from coupled.flight.pilot.base import STRONGEST, Action, Floats, Pilot, Start, Values
 from coupled.record.channels import TIME, ControlName, channel
@@ -15,6 +16,7 @@ from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 
+@public
 class ForceTable(Pilot):
     """A force over time, straight between rows, from arrays or from a file.
 

@@ -21,6 +21,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from coupled.arguments import public
 from coupled.errors import InputError
 from coupled.flight.pilot.base import (
     STRONGEST,
@@ -72,6 +73,7 @@ _THROUGH: Mapping[ControlName, What] = {"column": "pitch", "wheel": "roll"}
 _LESSENED: tuple[What, ...] = ("airspeed", "sideslip")
 
 
+@public
 class Track(Pilot):
     """Tracks a target: a change of what the aircraft flew at `start_s`, and a sum of sines.
 
@@ -148,6 +150,7 @@ class Track(Pilot):
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
         """Return the arm and its command, practised on the rig as it is specified."""
+        needs_aircraft(rig, control, start.file)
         hand = Hand(
             *self._arm(control),
             lag_s=self.lag_s,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from coupled.arguments import public
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
@@ -111,6 +112,7 @@ class Diagnosis(Findings):
         held = "" if self.baseline is None else self.baseline.words
         return " ".join(words for words in (self.trim, held, said, *self.left_out) if words)
 
+    @public
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
         """Return the JSON's content: the keys of the contract, and those of docs/diagnosis.md."""
         found: dict[str, Any] = {

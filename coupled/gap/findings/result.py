@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from coupled.arguments import public
 from coupled.gap.findings.budget import StageBudget
 from coupled.gap.findings.credibility import Credibility, remainder
 from coupled.gap.findings.where import Remains, Where
@@ -208,6 +209,7 @@ class Findings:
     settings: tuple[SettingResult, ...]
     budget: tuple[StageBudget, ...]
 
+    @public
     def stage(self, name: str) -> StageResult:
         """Return a stage by its name; KeyError where the records have none of it."""
         for stage in self.stages:

@@ -7,7 +7,6 @@ one line that the file is damaged.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import importlib.util
 import io
@@ -22,6 +21,7 @@ from pathlib import Path
 import polars as pl
 
 from coupled.errors import InputError, shown
+from coupled.parallel import limit_memory
 from coupled.record.importing.formats.columns import Found, pack, unpack
 from coupled.record.importing.formats.warned import kept_warnings
 from coupled.record.importing.mapping import Layout
@@ -156,17 +156,8 @@ def _shortened(notes: Sequence[str], kind: str) -> list[str]:
     return [f"{library} warns: {shown(line)}" for line in [*lines[:MOST_NOTES], *more]]
 
 
-def _limit_memory() -> None:
-    """Let this process ask for half of the machine's memory: a small file can declare any size."""
-    with contextlib.suppress(ImportError, ValueError, OSError):
-        import resource
-
-        half = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
-        resource.setrlimit(resource.RLIMIT_DATA, (half, half))
-
-
 def _main() -> int:
-    _limit_memory()
+    limit_memory()
     task, notes = Task(**json.loads(sys.argv[1])), list[str]()
     try:
         table = read_here(task, sys.stdin.buffer.read(), notes)

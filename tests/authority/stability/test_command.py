@@ -38,6 +38,7 @@ def test_a_plane_holds_cells_and_limits(coarse: None) -> None:
     assert np.array_equal(found.simulated > 0.0, found.theory > 0.0)
     assert found.crossings
     for crossing in found.crossings:
+        assert crossing.difference is not None
         assert crossing.difference < 0.01
         along = Along(bench(), "column", "frame", crossing.share / K_REPORT)
         rig, hand = along.posed(crossing.simulated)

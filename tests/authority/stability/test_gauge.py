@@ -96,6 +96,7 @@ def test_a_slow_gauge_brings_the_limit_of_a_hand_and_of_the_grips_mass_down() ->
             values = planes.axis(kind, 25)
             growths = simulated_along(rig, "column", kind, G_STIFF, values)
             limit = crossings(rig, "column", kind, G_STIFF, values, growths)[0]
+            assert limit.difference is not None
             assert limit.difference < 0.01
             found.append(limit.simulated)
     assert limits["hand"] == pytest.approx([1.19, 0.90, 0.72, 0.46], rel=0.01)

@@ -134,6 +134,7 @@ def test_a_grip_held_fast_meets_the_routh_limit_as_the_exchange_quickens() -> No
         values = np.geomspace(0.8 * low, 1.3 * low, 5)
         found = simulated_along(rig, "column", "servo", G_STIFF, values)
         (limit,) = crossings(rig, "column", "servo", G_STIFF, values, found)
+        assert limit.difference is not None
         assert limit.difference < 0.003
         apart.append(limit.simulated / low - 1.0)
     assert 0.0 < apart[1] < 0.35 * apart[0]  # a substep late, first order in it

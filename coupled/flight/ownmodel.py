@@ -1,0 +1,128 @@
+"""A user's own JSBSim model, loaded in a process of its own before this one loads it.
+
+JSBSim is compiled code that some faults of a model's files end, past any `except`: a property's
+name that is malformed, a huge index, a section that is missing. Then only that process ends, and
+the fault is one line. What comes with JSBSim, or with this package, is loaded at once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from coupled.errors import InputError
+from coupled.files import clear_temporary
+from coupled.resources import aircraft_folder
+from coupled.rig.parameters import Flight
+
+TRIED = "coupled.flight.tryout"  # what loads it there
+REFUSED = 3  # exit code of a process that says what is wrong
+LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
+# What of a flight section changes which files are loaded, or what is made of them.
+_LOADED = (
+    *("model", "folder", "steps_per_frame", "trim", "mass", "elevator_effectiveness"),
+    *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
+)
+_MOST_FILES = 10_000
+
+
+def check_own_model(
+    flight: Flight, frame_s: float, controls: Sequence[str], models: Sequence[Path], file: object
+) -> None:
+    """Refuse a model that ends JSBSim; `file` describes the rig, for faults.
+
+    A model is tried once for each state of its files and of what is asked of it.
+    """
+    home = _own_home(flight, models)
+    if home is None:
+        return
+    asked = json.dumps([getattr(flight, name) for name in _LOADED])
+    said = _tried(
+        str(home), _state(home / flight.model), asked, _Request(flight, frame_s, tuple(controls))
+    )
+    if said:
+        raise InputError(file, "flight.model", f"{flight.model} {said}")
+
+
+class _Request:
+    """What is to be flown; equal to any other, since the rest of a call tells them apart."""
+
+    def __init__(self, flight: Flight, frame_s: float, controls: tuple[str, ...]) -> None:
+        self.flight, self.frame_s, self.controls = flight, frame_s, controls
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Request)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def _own_home(flight: Flight, models: Sequence[Path]) -> Path | None:
+    """Return the folder in which a user's own model lies; None of a model that is shipped."""
+    if flight.folder:
+        return Path(flight.folder)
+    own = [folder for folder in models if folder != aircraft_folder()]
+    return next((f for f in own if (f / flight.model / f"{flight.model}.xml").is_file()), None)
+
+
+def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return the files of a model with their sizes and times, by which a change is seen."""
+    found = []
+    with suppress(OSError, ValueError):  # a folder that cannot be, which the load refuses
+        for path in sorted(folder.rglob("*.xml"))[:_MOST_FILES]:
+            known = path.stat()
+            found.append((str(path), known.st_mtime_ns, known.st_size))
+    return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _tried(home: str, state: object, asked: str, request: _Request) -> str:
+    """Return what keeps a model from being loaded; empty where it can be, or is refused here too.
+
+    `state` and `asked` tell one model from another.
+    """
+    task = {
+        "flight": request.flight.model_dump_json(),
+        "frame_s": request.frame_s,
+        "controls": request.controls,
+        "home": home,
+    }
+    found = {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", TRIED],
+            check=False,
+            input=json.dumps(task).encode(),
+            capture_output=True,
+            env={**os.environ, **found},
+            timeout=LONGEST_s,
+        )
+    except subprocess.TimeoutExpired:
+        return f"is not loaded within {LONGEST_s:.0f} s: a fault of its files"
+    finally:
+        clear_temporary(again=True)
+    if done.returncode == 0:
+        return ""
+    lines = [line.strip() for line in done.stderr.decode("utf-8", "replace").splitlines()]
+    last = next((line for line in reversed(lines) if line), "")[-200:]
+    if done.returncode == REFUSED:
+        return f"cannot be loaded: {last}"
+    why = f"ends JSBSim as it is loaded ({_how(done.returncode)}): a fault of its files"
+    return f"{why}; JSBSim's last words: {last}" if last else why
+
+
+def _how(code: int) -> str:
+    """Return how a process ended, in words."""
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"signal {-code}"

@@ -1,0 +1,42 @@
+"""The process in which a user's model is loaded, trimmed and flown for some frames (`ownmodel`).
+
+It ends with 0 where that goes well or is refused by a line, which the parent finds again; with
+REFUSED and the reason on the standard error where Python cannot read the model.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import sys
+from pathlib import Path
+
+from coupled.errors import InputError
+from coupled.flight.aircraft import make_unchecked
+from coupled.flight.ownmodel import REFUSED
+from coupled.parallel import limit_memory
+from coupled.rig.parameters import Flight
+
+_FRAMES = 5
+
+
+def main() -> int:
+    """Fly what the standard input asks for, and return the exit code."""
+    faulthandler.disable()
+    limit_memory()
+    task = json.loads(sys.stdin.buffer.read())
+    flight = Flight.model_validate_json(task["flight"])
+    try:
+        made = make_unchecked(flight, task["frame_s"], task["controls"], [Path(task["home"])])
+        for _ in range(_FRAMES):
+            made.step((0.0, 0.0, 0.0))
+    except InputError:
+        return 0
+    except Exception as error:
+        print(f"{type(error).__name__}: {error}".replace("\n", " "), file=sys.stderr)
+        return REFUSED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
