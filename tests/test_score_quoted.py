@@ -36,7 +36,7 @@ from coupled.plots.trials import draw_score
 from tests.support.commands import ROOT
 
 SCORED = "the version of 25 November 2026"  # whose diagnoses the file scores
-SINCE = "No threshold was set on them, and they were scored once."
+SINCE = "No threshold was tuned on these records, and they were scored once."
 JSON, FIGURE = ROOT / "docs" / "blind-score.json", ROOT / "docs" / "blind-score.png"
 README, TABLE = ROOT / "README.md", ROOT / "docs" / "diagnosis.md"
 NOT_SCORED = Share(0, 0, None, None, None)  # by an older version
@@ -92,16 +92,17 @@ def sentence(score: Score) -> str:
         return f"{COUNTS.get(found.right, found.right)} of {found.of}"
 
     clear, outside = score.clear_singles, score.outsiders.unexplained
-    blamed = f"records without an effect {'was' if score.false_alarms.right == 1 else 'were'}"
     return (
-        f"The diagnoses of {SCORED} were scored on {score.records} sealed records of an independent"
-        " twin (`coupled blind`), with other friction, other noise and effects outside the library:"
-        f" of single effects that double their stage's residual {percent(clear.named)} were named"
-        f" exactly and {percent(clear.stage)} at the right stage, of fainter ones"
-        f" {count(score.faint_singles.wrong)} wrongly, of pairs {percent(score.pairs.whole)};"
-        f" {count(score.false_alarms)} {blamed} blamed, {percent(outside)} of {outside.of}"
-        f" outsiders were called unexplained, and {percent(score.intervals.covered)} of the 95 %"
-        f" intervals held the truth. {SINCE} [Method, table and misses](docs/diagnosis.md)."
+        f"The diagnosis, in {SCORED}, was scored on {score.records} sealed records of an independent"
+        " twin (`coupled blind`), with different friction and noise and with faults outside the"
+        f" library. Of single effects that double their stage's residual, {percent(clear.named)}"
+        f" were identified exactly and {percent(clear.stage)} located at the right stage. Of weaker"
+        f" single effects, {count(score.faint_singles.wrong)} got a wrong name. Of pairs,"
+        f" {percent(score.pairs.whole)} were identified completely. There were false alarms in"
+        f" {count(score.false_alarms)} records without an effect. {percent(outside)} of {outside.of}"
+        f" faults outside the library were reported as unexplained, and"
+        f" {percent(score.intervals.covered)} of the 95 % intervals included the true value."
+        f" {SINCE} [Method, table and misses](docs/diagnosis.md)."
     )
 
 

@@ -23,7 +23,7 @@ from tests.support.commands import ROOT
 FILE = ROOT / "docs" / "benchmarks.json"
 FRAME = "A coupled frame, with the loader at 2 kHz and the record on,"
 FRAME_BOUNDS = {1: 1.4, 3: 1.7}  # times run(), by how many controls
-HELD = "A benchmark holds two workers to 1.8 times the flights a second of one, in flat memory"
+HELD = "A benchmark requires 1.8 times the rate of one worker from two, in constant memory"
 LIBRARIES = ("jsbsim", "numba", "numpy", "polars")
 Figures = Mapping[str, float]
 
@@ -79,7 +79,10 @@ def under(name: str) -> str:
     """Return what a benchmark was measured on, and what else the machine did."""
     entry = everything()[name]
     cores, load = entry["machine"]["cores"], entry["load_before"]
-    return f"{cores} cores, whose load average was {load:g} before"
+    return (
+        f"({cores} cores, load average {load:g} at the start;"
+        " [docs/benchmarks.json](docs/benchmarks.json))"
+    )
 
 
 def frame_cost() -> str:
@@ -88,27 +91,25 @@ def frame_cost() -> str:
     each = [list(kept_figures(name).values()) for name in names.values()]
     if not all(each):
         return (
-            f"{FRAME} may cost {FRAME_BOUNDS[1]} times JSBSim's own `run()`, with three controls"
-            f" {FRAME_BOUNDS[3]} times."
+            f"{FRAME} may take {FRAME_BOUNDS[1]} times as long as JSBSim's `run()`, with three"
+            f" controls {FRAME_BOUNDS[3]} times."
         )
     one, three = (f"{min(x):.2f} to {max(x):.2f} times" for x in each)
     return (
-        f"{FRAME} costs {one} JSBSim's own `run()`, with three controls {three}, measured side by"
-        f" side on {under(names[3])} ([docs/benchmarks.json](docs/benchmarks.json)); the benchmarks"
-        f" bound it by {FRAME_BOUNDS[1]} and {FRAME_BOUNDS[3]}."
+        f"{FRAME} takes {one} as long as JSBSim's `run()`, with three controls {three}"
+        f" {under(names[3])}. The benchmarks allow {FRAME_BOUNDS[1]} and {FRAME_BOUNDS[3]}."
     )
 
 
 def sweep_rate() -> str:
-    """Return what the README says of a sweep's rate; no figure without a measurement."""
+    """Return what the guide says of a sweep's rate; no figure without a measurement."""
     kept = kept_figures("sweep")
     if not kept:
         return f"{HELD} (`pytest -m bench tests/benchmarks/test_campaign.py -s`)."
     return (
-        f"{kept['flights']:,.0f} flights of {kept['seconds']:g} s take {kept['taken_s']:.0f} s"
-        f" with two workers, {kept['two_of_one']:.2f} times as many a second as with one and"
-        f" {kept['of_bare']:.2f} of what bare JSBSim flies, in flat memory, measured on"
-        f" {under('sweep')} ([docs/benchmarks.json](docs/benchmarks.json))."
+        f"Two workers fly {kept['flights']:,.0f} flights of {kept['seconds']:g} s in"
+        f" {kept['taken_s']:.0f} s, at {kept['two_of_one']:.2f} times the rate of one worker and"
+        f" {kept['of_bare']:.2f} times that of JSBSim alone, in constant memory {under('sweep')}."
     )
 
 
@@ -118,11 +119,12 @@ def diagnosis_seconds() -> str:
     ends = ", wall_s by all"
     taken = {key.removesuffix(ends): s for key, s in kept_figures(name).items() if ends in key}
     if not taken:
-        return "How long a diagnosis takes goes by what is found: dry friction takes longest."
-    each = ", ".join(f"{s:.1f} s for {what}" for what, s in taken.items() if what != "none")
+        return "The time that a diagnosis takes depends on the effect; dry friction takes longest."
+    found = {what: s for what, s in taken.items() if what != "none"}
+    quick, slow = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
     return (
-        f"A record of 60 s with no gap takes {taken['none']:.1f} s, one with a gap {each}, with the"
-        f" code compiled, measured on {under(name)} ([docs/benchmarks.json](docs/benchmarks.json))."
+        f"A record of 60 s takes {taken['none']:.1f} s without a gap, and {found[quick]:.1f} s"
+        f" ({quick}) to {found[slow]:.1f} s ({slow}) with one effect {under(name)}."
     )
 
 
