@@ -76,13 +76,9 @@ def kept_figures(name: str) -> dict[str, float]:
 
 
 def under(name: str) -> str:
-    """Return what a benchmark was measured on, and what else the machine did."""
-    entry = everything()[name]
-    cores, load = entry["machine"]["cores"], entry["load_before"]
-    return (
-        f"({cores} cores, load average {load:g} at the start;"
-        " [docs/benchmarks.json](docs/benchmarks.json))"
-    )
+    """Return where a benchmark's figures are kept, and on how many cores they were measured."""
+    cores = everything()[name]["machine"]["cores"]
+    return f"([measured](docs/benchmarks.json) on {cores} cores)"
 
 
 def frame_cost() -> str:
@@ -108,8 +104,8 @@ def sweep_rate() -> str:
         return f"{HELD} (`pytest -m bench tests/benchmarks/test_campaign.py -s`)."
     return (
         f"Two workers fly {kept['flights']:,.0f} flights of {kept['seconds']:g} s in"
-        f" {kept['taken_s']:.0f} s, at {kept['two_of_one']:.2f} times the rate of one worker and"
-        f" {kept['of_bare']:.2f} times that of JSBSim alone, in constant memory {under('sweep')}."
+        f" {kept['taken_s']:.0f} s: {kept['two_of_one']:.2f} times the rate of one worker,"
+        f" {kept['of_bare']:.2f} times that of JSBSim alone {under('sweep')}."
     )
 
 
