@@ -93,14 +93,14 @@ def sentence(score: Score) -> str:
 
     clear, outside = score.clear_singles, score.outsiders.unexplained
     return (
-        f"The diagnosis, in {SCORED}, was scored on {score.records} sealed records of an independent"
-        " twin (`coupled blind`), with different friction and noise and with faults outside the"
+        f"The diagnosis, in {SCORED}, was scored on {score.records} sealed records of an"
+        " independent twin (`coupled blind`), with different friction and noise and with faults outside the"
         f" library. Of single effects that double their stage's residual, {percent(clear.named)}"
         f" were identified exactly and {percent(clear.stage)} located at the right stage. Of weaker"
         f" single effects, {count(score.faint_singles.wrong)} got a wrong name. Of pairs,"
         f" {percent(score.pairs.whole)} were identified completely. There were false alarms in"
-        f" {count(score.false_alarms)} records without an effect. {percent(outside)} of {outside.of}"
-        f" faults outside the library were reported as unexplained, and"
+        f" {count(score.false_alarms)} records without an effect. {percent(outside)} of"
+        f" {outside.of} faults outside the library were reported as unexplained, and"
         f" {percent(score.intervals.covered)} of the 95 % intervals included the true value."
         f" {SINCE} [Method, table and misses](docs/diagnosis.md)."
     )

@@ -19,8 +19,9 @@ once (a structure with mass, a soft play behind its damper) is stopped where δ 
 further, and a structure with mass keeps no speed outward.
 
 Where x moves inward, as the gradient rises with q̄, the stop takes more by the same rule, and the
-loader follows by its own motion. So δ does not pass r by more than rounding, whatever is asked
-for, on any structure. On a loader with a transport delay or a servo the stop acts at once.
+loader follows by its own motion. δ then exceeds r by rounding only: over random structures, forces
+and gradients a test bounds the excess by 1e-9 m. On a loader with a transport delay or a servo the
+stop acts at once.
 """
 
 from __future__ import annotations
