@@ -95,8 +95,8 @@ def sentence(score: Score) -> str:
     return (
         f"The diagnosis, in {SCORED}, was scored on {score.records} sealed records of an"
         " independent twin (`coupled blind`), with different friction and noise and with faults"
-        f" outside the library. Of single effects that double their stage's residual, {percent(clear.named)}"
-        f" were identified exactly and {percent(clear.stage)} located at the right stage. Of weaker"
+        " outside the library. Of single effects that double their stage's residual,"
+        f" {percent(clear.named)} were identified exactly and {percent(clear.stage)} located at the right stage. Of weaker"
         f" single effects, {count(score.faint_singles.wrong)} got a wrong name. Of pairs,"
         f" {percent(score.pairs.whole)} were identified completely. There were false alarms in"
         f" {count(score.false_alarms)} records without an effect. {percent(outside)} of"
