@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from coupled.record.record import Record
     from coupled.rig.rig import Rig
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Attitude",

@@ -1,4 +1,4 @@
-"""The aircraft away from its published approach: print the second table of README.md beside this.
+"""The aircraft away from its published approach: print the last table of validation.md.
 
     python aircraft/awjsra/elsewhere.py
 
@@ -122,14 +122,14 @@ def table() -> str:
     idle, at_idle = greatest_lift(65.0, 0.0)
     clean, at_clean = greatest_lift(0.0, 0.0)
     lines.append(
-        f"\nGreatest lift coefficient, of air and cold jets, at 60 kt: {powered:.2f} at"
-        f" {at_powered}° with flaps 65° and three quarters of the throttle, {idle:.2f} at"
-        f" {at_idle}° idle; {clean:.2f} at {at_clean}° clean and idle."
+        f"\nMaximum lift coefficient of air and cold jets at 60 kt: {powered:.2f} at"
+        f" {at_powered}° with flaps 65° and 75 % throttle, {idle:.2f} at {at_idle}° idle;"
+        f" {clean:.2f} at {at_clean}° clean and idle."
     )
     lifted, slowed = images()
     lines.append(
-        f"Ground effect, which is not modelled, would change the wing's lift at touchdown by"
-        f" {100 * lifted:+.0f} % through the induced angle and {100 * slowed:+.0f} % through the"
+        f"Ground effect is not modelled. At touchdown it would change the wing's lift by"
+        f" {100 * lifted:+.0f} % through the induced angle and by {100 * slowed:+.0f} % through the"
         " speed."
     )
     return "\n".join(lines)

@@ -147,20 +147,19 @@ def determined(found: Found) -> str:
     """Return how many numbers are determined, and by what, as a sentence."""
     rows, count = len(modelled(found.values)), len(HELD)
     return (
-        f"Of the {count} numbers the {rows} fitted rows determine"
-        f" {np.sum(found.rows_alone):.1f} when each may be off by a third of its aim,"
-        f" {np.sum(found.unassumed):.1f} with {len(SHARP)} of them sharpened, and"
-        f" {np.sum(found.shares):.1f} with what is assumed of the trim: an angle of attack of"
-        f" {ALPHA_deg[0]:g}° ± {ALPHA_deg[1]:g}°, and a column within {100 * COLUMN:g} % of its"
-        " neutral. For neither a published figure was at hand. The rest is what each number was"
-        " held near."
+        f"The {rows} fitted rows determine {np.sum(found.rows_alone):.1f} of the {count} numbers if"
+        f" each has a standard deviation of a third of its aim, {np.sum(found.unassumed):.1f} with"
+        f" {len(SHARP)} of them weighted more, and {np.sum(found.shares):.1f} with two assumptions"
+        f" on the trim: an angle of attack of {ALPHA_deg[0]:g}° ± {ALPHA_deg[1]:g}°, and a column"
+        f" within {100 * COLUMN:g} % of its neutral. Neither has a published figure. The priors"
+        " determine the rest."
     )
 
 
 def numbers() -> str:
     """Return the numbers as a Markdown table, and how many of them are determined."""
     found = fit()
-    lines = ["| | value | held near | share, rows alone | share, all |"]
+    lines = ["| | value | prior | share, rows alone | share, all |"]
     lines.append("| --- | --- | --- | --- | --- |")
     for name, (near, width), value, deviation, alone, share in zip(
         HELD,
@@ -207,7 +206,7 @@ def blind_rows() -> str:
         missed = "" if blind.met else ", **missed**"
         shares = [f"{round(100 * x) or 0:+d} %" for x in (row.off, blind.off)]
         lines.append(f"| {row.what} | {shares[0]} | {shares[1]}{missed} | {100 * row.aim:.0f} % |")
-    lines += ["", f"{met} of {len(fitted)} would have been predicted within their aim."]
+    lines += ["", f"{met} of {len(fitted)} are predicted within their aim."]
     return "\n".join([*lines, f"Made from inputs {inputs()}."])
 
 

@@ -1,4 +1,4 @@
-"""Published against flown: print the tables of README.md beside this file.
+"""Published against flown: print the first tables of validation.md beside this file.
 
     python aircraft/awjsra/validate.py
 
@@ -321,9 +321,9 @@ def remarks(rig: Rig) -> str:
     swing = next(mode for mode in modes if mode.imag > 0.0)
     spiral, roll = sorted((m.real for m in modes if m.imag == 0.0), key=abs)
     return (
-        f"Column force per g read otherwise: {steady_lb:.0f} lb at"
-        f" constant speed, {pounds / (load.max() - load[0]):.0f} lb by the greatest load factor in"
-        f" a flown step of 1 in. Lateral modes: Dutch roll {abs(swing):.2f} rad/s,"
+        f"Column force per g by other definitions: {steady_lb:.0f} lb at constant speed,"
+        f" {pounds / (load.max() - load[0]):.0f} lb from the peak load factor after a step of 1 in."
+        f" Lateral modes: Dutch roll {abs(swing):.2f} rad/s,"
         f" ζ {-swing.real / abs(swing):.2f}; roll {roll:.2f} 1/s; spiral {spiral:+.3f} 1/s."
     )
 
@@ -339,15 +339,15 @@ def account(rig: Rig, unfitted: list[Row]) -> str:
     asked = by_roots * nozzle.published / nozzle.flown
     missed = sum(not row.met for row in of["roots"])
     return (
-        f"Not fitted: {len(unfitted)} rows. {len(of['geometry'])} are mechanics of published"
-        f" thrust, weight and thrust line; {len(of['equation'])} carry out a published equation;"
-        f" {len(of['gradient'])} rest on the chosen {chosen:.2f} lb/in and on fitted figures. The"
-        f" {len(of['roots'])} forces at {by_roots:.1f} lb/in, which was not chosen, still rest on"
-        f" fitted figures; they are off by {100 * force.off:+.0f} % and {100 * nozzle.off:+.0f} %,"
-        f" {missed} of them missed. No row predicts the aerodynamics independently of the fit. The"
-        f" nozzles' force does not settle the gradient: it asks for {asked:.1f} lb/in with the"
-        f" model's moments and {published:.1f} lb/in with the published ones, force per g for"
-        f" {chosen:.2f} and {by_roots:.1f}."
+        f"{len(unfitted)} rows were not fitted: {len(of['geometry'])} follow from published"
+        f" thrust, weight and thrust line, {len(of['equation'])} from a published equation, and"
+        f" {len(of['gradient'])} from the chosen {chosen:.2f} lb/in and fitted figures. The"
+        f" {len(of['roots'])} forces at {by_roots:.1f} lb/in also depend on fitted figures; they"
+        f" differ by {100 * force.off:+.0f} % and {100 * nozzle.off:+.0f} %, {missed} by more than"
+        f" the aim. No row tests the aerodynamics independently of the fit. The published forces"
+        f" imply different gradients: the nozzles' {asked:.1f} lb/in with the model's moments and"
+        f" {published:.1f} lb/in with the published ones, force per g {chosen:.2f} and"
+        f" {by_roots:.1f}."
     )
 
 

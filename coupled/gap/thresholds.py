@@ -1,8 +1,7 @@
 """Every threshold of the diagnosis, in the order in which it runs, and what each was set on.
 
-"Blind trials" are records of `coupled blind make`, with the seeds that docs/diagnosis.md and
-docs/decisions.md name; a score is published on a set on which none of these was set. "Chosen"
-says that a value was set by judgement and that no count is known to stand behind it.
+"Blind trials" are records of `coupled blind make`; a score is published for a set on which no
+threshold was set. "Chosen" marks a value set by judgement, without a count that supports it.
 """
 
 from __future__ import annotations

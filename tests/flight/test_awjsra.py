@@ -111,14 +111,14 @@ def test_newton_and_jsbsims_own_trim_agree_where_both_can() -> None:
     assert airframe(clean).motion()[:count] == pytest.approx(own[:count], abs=2e-3, rel=2e-4)
 
 
-def in_readme(name: str) -> str:
-    readme = (HOME / "README.md").read_text(encoding="utf-8")
-    held = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", readme, re.DOTALL)
+def in_tables(name: str) -> str:
+    page = (HOME / "validation.md").read_text(encoding="utf-8")
+    held = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
     assert held is not None
     return held.group(1)
 
 
-def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> None:
+def test_published_against_flown_is_within_its_aims_and_as_the_page_says() -> None:
     validate = validation()
     found = list(validate.rows(RIG))
     assert len(found) == 21
@@ -126,7 +126,7 @@ def test_published_against_flown_is_within_its_aims_and_as_the_readme_says() -> 
         assert row.met == (row.rests_on != "roots"), row
     slow = next(row for row in found if "slow" in row.what)
     assert validate.flown_root(RIG) == pytest.approx(slow.flown, rel=0.03)
-    assert in_readme("validate") == validate.report()
+    assert in_tables("validate") == validate.report()
 
 
 def test_the_gradient_of_the_published_roots() -> None:
@@ -143,7 +143,7 @@ def fitting() -> ModuleType:
 
 def test_the_fits_tables_were_made_from_the_files_that_are_here() -> None:
     """After any change of them: `python aircraft/awjsra/fit.py`, with and without --leave-out."""
-    assert f"Made from inputs {fitting().inputs()}." in in_readme("leave-out")
+    assert f"Made from inputs {fitting().inputs()}." in in_tables("leave-out")
 
 
 def percents(table: str) -> list[list[float]]:
@@ -163,8 +163,8 @@ def test_the_fit_finds_the_models_numbers_and_says_what_determines_them() -> Non
     found = fit.fit()
     in_model = [trimmed()[f"awjsra/{name}"] for name in fit.HELD]
     assert found.values == pytest.approx(in_model, abs=6e-4)  # three decimals are kept
-    assert in_readme("determined") == fit.determined(found)
-    held, made = in_readme("numbers"), fit.numbers().rpartition("\n\n")[0]
+    assert in_tables("determined") == fit.determined(found)
+    held, made = in_tables("numbers"), fit.numbers().rpartition("\n\n")[0]
     assert without_percents(held) == without_percents(made)
     for new, old in zip(percents(made), percents(held), strict=True):
         assert new == pytest.approx(old, abs=0.0101)  # 68.4999 % here is 68.5001 % elsewhere
@@ -174,18 +174,18 @@ def test_the_fit_finds_the_models_numbers_and_says_what_determines_them() -> Non
 
 
 @pytest.mark.slow
-def test_a_row_left_out_is_missed_or_met_as_the_readme_says() -> None:
+def test_a_row_left_out_is_missed_or_met_as_the_page_says() -> None:
     """The whole table anew; some minutes."""
-    made, held = fitting().blind_rows(), in_readme("leave-out")
+    made, held = fitting().blind_rows(), in_tables("leave-out")
     for new, old in zip(percents(made), percents(held), strict=True):
         assert new == pytest.approx(old, abs=0.02, rel=0.02)
     assert made.count("**missed**") == held.count("**missed**")
     assert made.splitlines()[-2:] == held.splitlines()[-2:]
 
 
-def test_trims_elsewhere_are_as_the_readme_says() -> None:
+def test_trims_elsewhere_are_as_the_page_says() -> None:
     validation()
-    assert in_readme("elsewhere") == script("elsewhere").table()
+    assert in_tables("elsewhere") == script("elsewhere").table()
 
 
 def test_the_spring_tab_is_the_published_equation() -> None:
