@@ -100,7 +100,7 @@ def fly(
     if hangar is not None and flight.ended is None:
         hangar.take_back(lent)
     flown = (data[: flight.done], noise)
-    return _flown(manoeuvre, channels, flown, beside, flight.ended, found)
+    return _flown(manoeuvre, channels, flown, beside, flight.ended, noted=found)
 
 
 def _surface_stops(manoeuvre: Manoeuvre, airframe: Airframe) -> dict[str, Any]:

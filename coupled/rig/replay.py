@@ -298,9 +298,8 @@ def _loader(
             base = s.loader.external
             s.loader.external = base + held[k]
             if p.reach.reach > 0.0:
-                set_reach(
-                    p.reach, s.reach, p.loader, p.friction, s.modification, s.loader, p.linkage
-                )
+                stages = (p.loader, p.friction, m, s.loader, p.linkage, s.linkage)
+                set_reach(p.reach, s.reach, *stages)
             for node in range(k * substeps + 1, (k + 1) * substeps + 1):
                 s.loader.external = base + held[k] + served[node]
                 here = bounds(p.reach, s.reach, p.loader, p.linkage, s.loader.computed)

@@ -37,7 +37,8 @@ def _placed(flight: Any, file: object) -> Any:
         folder = (base / given).resolve()
         there = not isinstance(name, str) or (folder / name / f"{name}.xml").is_file()
     except (OSError, ValueError):  # a name that no folder can have
-        raise InputError(file, "flight.model_folder", "is no name of a folder") from None
+        problem = "is no name of a folder; give the folder that the model's lies in"
+        raise InputError(file, "flight.model_folder", problem) from None
     if not there:
         problem = f"{given!r} holds no {name}/{name}.xml; give the folder that the model's lies in"
         raise InputError(file, "flight.model_folder", problem)

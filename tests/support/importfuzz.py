@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 from scipy import io as scipy_io
 
 from coupled.errors import InputError
+from coupled.parallel import limit_memory
 from coupled.record.importing import reading, separate
 from coupled.record.importing.convert import import_log
 from coupled.record.importing.formats.columns import Found, unpack
@@ -763,7 +764,7 @@ def _block(reader: str, seed: int, first: int, count: int) -> tuple[list[tuple[s
 
 
 def _work(reader: str, seed: int, first: int, count: int, pipe: int) -> None:
-    separate._limit_memory()
+    limit_memory()
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     os.dup2(silent, 2)
