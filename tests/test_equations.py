@@ -1,7 +1,7 @@
-"""docs/equations.md is an index of the report's equations, made from the code and its tests.
+"""docs/equations.md is an index of the report's equations, generated from the code and its tests.
 
-A function holds an equation where its docstring names it, as `eq. (12)` or `appendix A`; a test
-likewise, or by its name. `python tests/test_equations.py` writes the index anew.
+A function implements an equation if its docstring names it, as `eq. (12)` or `appendix A`; a test
+likewise, or by its name. `python tests/test_equations.py` writes the index.
 """
 
 from __future__ import annotations
@@ -18,58 +18,57 @@ import pytest
 ROOT = Path(__file__).parents[1]
 INDEX = ROOT / "docs" / "equations.md"
 
-# What each says in today's symbols.
+# Each equation in this package's symbols, and its meaning.
 EQUATIONS = {
     "1": ("δc = δ − K·F", "the structure bends by K·F between servo and grip"),
     "2": ("v₁ = S₁·δc", "the computed deflection in volts"),
-    "3": ("v₁ = S₁·δ − S₁·K·F", "(1) in volts: what a bench can read"),
-    "4": ("v₁ = a·δ + b·F", "the polynomial that is fitted"),
+    "3": ("v₁ = S₁·δ − S₁·K·F", "(1) in volts, as read on a bench"),
+    "4": ("v₁ = a·δ + b·F", "the polynomial fitted to readings"),
     "5a": ("S₁ = a", "the scale from the fit"),
     "5b": ("K = −b/S₁", "the bend coefficient from the fit"),
     "6": ("F = G_T·δ", "the force specified"),
-    "7": ("δc = δ·(1 − K·G_T)", "what the host sees of δ when the gradient felt is right"),
-    "7a": ("Δδc = −δ·K·G_T", "the deflection lost, beside a rigid control"),
-    "8": ("F_L = G_B·δc", "the force that the loader gives of itself"),
+    "7": ("δc = δ·(1 − K·G_T)", "the computed deflection at the correct felt gradient"),
+    "7a": ("Δδc = −δ·K·G_T", "the deflection lost relative to a rigid control"),
+    "8": ("F_L = G_B·δc", "the loader's own spring force"),
     "9": ("F_mod = F − F_L", "the modifying force needed"),
     "10": ("F_mod = G_T·δ − G_B·δc", "the same, with (6) and (8)"),
     "11": ("F_mod = (G_T/(1 − K·G_T) − G_B)·δc", "the same as a function of δc, with (7)"),
     "12": ("ΔG = G_T/(1 − K·G_T) − G_B", "the modifying gradient, compensated for the bend"),
-    "13": ("S₃ = (1/n)·Σ v₃/F", "the force's scale, a mean of ratios"),
-    "14": ("S₂ = v₂·S₃/v₃", "the modifying force's scale, by a null"),
-    "15": ("δ = L·sin θ", "what a level ruler reads"),
+    "13": ("S₃ = (1/n)·Σ v₃/F", "the scale of the force, a mean of ratios"),
+    "14": ("S₂ = v₂·S₃/v₃", "the scale of the modifying force, by nulling v₁"),
+    "15": ("δ = L·sin θ", "the reading of a level ruler"),
     "16": ("δ = L·θ", "the deflection along the arc"),
-    "17": ("sin θ ≈ θ − θ³/6", "by how much the two differ"),
+    "17": ("sin θ ≈ θ − θ³/6", "the difference between (15) and (16)"),
     "A": ("(a, b) by Cramer's rule", "the normal equations of (4)"),
-    "B": ("S₁·v₃/S₃ = S₁·v₂/S₂", "why the null of (14) gives S₂"),
+    "B": ("S₁·v₃/S₃ = S₁·v₂/S₂", "the derivation of (14)"),
     "C": ("F = F_BO + G₁·δ, slope G₂ beyond δ₁", "two segments, with the bend compensated"),
 }
 
 HEAD = """\
 W. B. Cleveland, *Force modification and deflection loss compensation to the pilot's controls in
-an aircraft simulator*, NASA Ames, 1974. Each equation in today's symbols, the code that implements
-it and the tests that hold it. δ and δc are in m (rad for a wheel), F in N, G in N/m, K in m/N.
+an aircraft simulator*, NASA Ames, 1974. Each equation in this package's symbols, its code and its
+tests. δ and δc are in m (rad on a wheel), F in N, G in N/m, K in m/N.
 
-This file is made from the docstrings by `python tests/test_equations.py`; a test fails where it is
-stale, and where an equation has no code or no test.
+`python tests/test_equations.py` writes this file from the docstrings.
 
-| | equation | what it says | code | tests |
+| | equation | meaning | code | tests |
 | --- | --- | --- | --- | --- |
 """
 
 MISPRINTS = """
-## Misprints, and what the text leaves open
+## Misprints and omissions of the report
 
-| where | printed | what it must be |
+| where | printed | correct |
 | --- | --- | --- |
 | bend coefficient | 0.928 m/N (0.016 in./lb) | 0.016 in/lb is 9.14e-5 m/N |
 | worst case | 2155.2 N/m (12.5 lb/in.) | 12.5 lb/in is 2189 N/m |
 | full column | 0.788 m (7 in.) | 7 in is 0.1778 m |
-| (7a) | "differentiating" (7) | the loss beside a rigid control; beside a calibration at G₀ it is \
-δ·K·(G_T − G₀)/(1 − K·G₀) |
+| (7a) | "differentiating" (7) | the loss relative to a rigid control; \
+relative to a calibration at G₀ it is δ·K·(G_T − G₀)/(1 − K·G₀) |
 | (11), appendix C | δ = δc/(1 − K·G_T) | with a breakout (δc + K·F_BO)/(1 − K·G_T): as printed, \
 the force lacks G_T·K·F_BO/(1 − K·G_T) at a δc |
-| (12) | | singular at K·G_T = 1: no gradient stiffer than the structure can be given |
-| appendix C | the flow chart itself lacks | the break lies at δc₁ = δ₁ − K·F(δ₁): this project's \
+| (12) | | singular at K·G_T = 1: no gradient can exceed the stiffness of the structure |
+| appendix C | the flow chart is missing | the break lies at δc₁ = δ₁ − K·F(δ₁): this project's \
 reading, see `rig/modification.py` |
 """
 
@@ -101,7 +100,7 @@ def functions(folder: str) -> tuple[tuple[Path, ast.FunctionDef], ...]:
 
 @cache
 def implemented() -> dict[str, list[str]]:
-    """Return links to the functions that hold each equation, the closed forms first."""
+    """Return links to the functions that implement each equation, the closed forms first."""
     found = defaultdict(list)
     for path, node in functions("coupled"):
         for key in dict.fromkeys(cited(ast.get_docstring(node) or "")):
@@ -113,7 +112,7 @@ def implemented() -> dict[str, list[str]]:
 
 @cache
 def held_by() -> dict[str, list[str]]:
-    """Return links to the tests that hold each equation."""
+    """Return links to the tests of each equation."""
     found = defaultdict(list)
     for path, node in functions("tests"):
         if not node.name.startswith("test_"):
@@ -146,7 +145,7 @@ def test_an_equation_has_code_and_a_test(key: str) -> None:
     assert held_by().get(key), "no test names it"
 
 
-def test_no_equation_is_named_that_the_report_lacks() -> None:
+def test_only_equations_of_the_report_are_named() -> None:
     assert set(implemented()) | set(held_by()) <= set(EQUATIONS)
 
 
