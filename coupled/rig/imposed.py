@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry, stage
@@ -114,8 +114,11 @@ def behind_linkage(
         lag = 2.0 * ratio * loader.servo_rate_share / omega * rate_Hz  # in substeps
         if lag > 0.0:
             kept = np.exp(-1.0 / lag)
-            start = kept * nodes[:1]
-            nodes = lfilter([1.0 - kept], [1.0, -kept], nodes, zi=start)[0]
+            # y[k] − kept·y[k−1] = (1 − kept)·x[k], at rest at the first node.
+            bands = np.stack((np.ones(len(nodes)), np.full(len(nodes), -kept)))
+            driven = (1.0 - kept) * nodes
+            driven[0] = nodes[0]
+            nodes = solve_banded((1, 0), bands, driven)
     return stamped(nodes, -loader.servo_delay * rate_Hz)
 
 

@@ -8,9 +8,8 @@ forward are positive.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from coupled.errors import InputError
 from coupled.schema import Section, named, quantity, text_like
 
 # A name that may become a file's: letters, digits, dot, dash, underscore.
@@ -77,18 +76,6 @@ class Loader(Section):
     play: float = quantity("{d}", 0.0, ge=0)
     play_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     arc_geometry: bool = False
-
-    def __init__(self, **values: Any) -> None:
-        """Refuse half of a servo: a frequency without a damping ratio, or the other way."""
-        super().__init__(**values)
-        given = self.model_fields_set
-        lone = "leave out both for a machine without a servo"
-        if "servo_frequency" not in given and "servo_damping_ratio" in given:
-            problem = f"is missing beside servo_damping_ratio; give it, or {lone}"
-            raise InputError("coupled.Loader", "servo_frequency_Hz", problem)
-        if self.servo_frequency > 0.0 and "servo_damping_ratio" not in given:
-            problem = f"is missing beside servo_frequency_Hz; give it, or {lone}"
-            raise InputError("coupled.Loader", "servo_damping_ratio", problem)
 
 
 class Schedule(Section):

@@ -178,6 +178,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
         raise InputError(
             file, f"{path}.length_m", "the arc's length must exceed 2/π of the travel on it"
         )
+    _check_servo(control, file, path)
     if loader.servo_frequency == 0.0:
         _check_without_servo(control, file, path, d)
     _check_dynamics(rig, control, file, path)
@@ -210,6 +211,18 @@ def _check_dynamics(rig: Rig, control: Control, file: object, path: str) -> None
         if getattr(sensing, key) > frame_s:
             problem = f"must lie within the frame of {frame_s:g} s"
             raise InputError(file, f"{path}.sensing.{key}_s", problem)
+
+
+def _check_servo(control: Control, file: object, path: str) -> None:
+    """Refuse half of a servo: a frequency without a damping ratio, or the reverse."""
+    given = control.loader.model_fields_set
+    half = "leave out both for a machine without a servo"
+    if "servo_frequency" not in given and "servo_damping_ratio" in given:
+        problem = f"is missing beside servo_damping_ratio; give it, or {half}"
+        raise InputError(file, f"{path}.loader.servo_frequency_Hz", problem)
+    if control.loader.servo_frequency > 0.0 and "servo_damping_ratio" not in given:
+        problem = f"is missing beside servo_frequency_Hz; give it, or {half}"
+        raise InputError(file, f"{path}.loader.servo_damping_ratio", problem)
 
 
 def _check_without_servo(control: Control, file: object, path: str, d: str) -> None:

@@ -160,7 +160,10 @@ def test_a_healthy_record_that_misses_its_rig_hides_no_change() -> None:
         assert found.stage("linkage").as_dict()["judged"] is False
         assert found.next_test.startswith("Fit the rig to the healthy record first")
     else:
-        assert [effect.name for effect in found.effects] == ["bend"]
+        # What the healthy record leaves may pass for a law that contains the bend, at the same K.
+        (effect,) = found.effects
+        assert effect.name in ("bend", "bend_hysteresis")
+        assert effect.value == pytest.approx(CHANGED, rel=0.02)
     assert found.baseline is not None
     assert found.as_dict()["healthy"]["errors"]["column_deflection_m"]["misses"] > 2.0
 

@@ -12,6 +12,7 @@ from coupled.flight.gusts import dryden
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.signals.air import vertical_air
+from coupled.gap.thresholds import STATED_MOST
 from coupled.record.record import Record, read_record, write_record
 from coupled.rig.rigfile import read_rig
 from coupled.rig.rigwrite import rig_text
@@ -134,7 +135,7 @@ def test_the_summary_names_size_certainty_and_share(tmp_path: Path) -> None:
     found = diagnose(nominal, {"a": record}, "column")
     said = found.summary
     assert "Coulomb friction, 0 → 2.0" in said
-    assert "Probability 0.97." in said
+    assert f"Probability {STATED_MOST:.2f}." in said
     assert "% of the gap on held-out data" in said
 
 

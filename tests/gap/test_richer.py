@@ -308,7 +308,7 @@ def test_the_floors_of_a_rig_asked_again_are_kept(
         return search(case, library)
 
     monkeypatch.setattr(diagnosis, "_outputs", counted)
-    monkeypatch.setattr(diagnosis, "search", asked)
+    monkeypatch.setattr(diagnosis, "search_unrefuted", asked)
     assert diagnosis.diagnose(rig, {"r": record}).verdict == "no_gap"
 
 
