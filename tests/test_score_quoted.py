@@ -1,8 +1,8 @@
-"""The blind score that README and docs/diagnosis.md quote is the one in docs/blind-score.json.
+"""The blind score that README and docs/scores.md quote is the one in docs/blind-score.json.
 
 After a new score, `coupled blind score … --json docs/blind-score.json`, set `SCORED` and `SINCE`
 here and give `python -m tests.test_score_quoted`: it draws docs/blind-score.png from that file and
-writes the README's sentence and the table of docs/diagnosis.md anew.
+writes the README's sentence and the table of docs/scores.md anew.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from tests.support.commands import ROOT
 SCORED = "the version of 25 November 2026"  # whose diagnoses the file scores
 SINCE = "No threshold was tuned on these records, and they were scored once."
 JSON, FIGURE = ROOT / "docs" / "blind-score.json", ROOT / "docs" / "blind-score.png"
-README, TABLE = ROOT / "README.md", ROOT / "docs" / "diagnosis.md"
+README, TABLE = ROOT / "README.md", ROOT / "docs" / "scores.md"
 NOT_SCORED = Share(0, 0, None, None, None)  # by an older version
 COUNTS = {0: "none", 1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
@@ -103,7 +103,7 @@ def sentence(score: Score) -> str:
         f" {count(score.false_alarms)} records without an effect. {percent(outside)} of"
         f" {outside.of} faults outside the library were reported as unexplained, and"
         f" {percent(score.intervals.covered)} of the 95 % intervals included the true value."
-        f" {SINCE} [Method, table and misses](docs/diagnosis.md)."
+        f" {SINCE} [Table and misses](docs/scores.md)."
     )
 
 

@@ -302,7 +302,7 @@ HOST_DRIFT = 0.04  # in the schedule, which is exact: of 15 right effects of see
 # And on three made ones: Coulomb friction for one that yields by 0.2, 0.5 mm takes 0.99 and 0.89,
 # viscous damping for one by the square of the speed 0.65; of 13 wrong ones eleven take under 0.5.
 FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must take beside it,
-# or else leave no more than that model does alone: docs/diagnosis.md says of what it was tried on.
+# or else leave no more than that model does alone
 UNPROVEN = 0.25  # chosen: error of a size in its best halves, from which none is shown the same
 LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size
 LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its size has no error

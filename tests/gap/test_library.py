@@ -41,7 +41,7 @@ def test_what_an_effect_needs_elsewhere_is_there(effect: Effect, flown: Rig) -> 
     assert drawn <= set(SIGNALS)
     files = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
     diagnosis = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
-    assert f"| `{effect.name}` |" in diagnosis
+    assert f"\n`{effect.name}`| " in diagnosis
     for p in effect.parameters:
         assert f"`{p.key.split('.')[-1]}`" in files, p.key
         if p.name:
