@@ -45,31 +45,28 @@ EQUATIONS = {
 }
 
 HEAD = """\
-W. B. Cleveland, *Force modification and deflection loss compensation to the pilot's controls in
-an aircraft simulator*, NASA Ames, 1974. Each equation in this package's symbols, its code and its
-tests. δ and δc are in m (rad on a wheel), F in N, G in N/m, K in m/N.
-
+Each equation of [the report](report.md) in this package's symbols, its code and its tests.
 `python tests/test_equations.py` writes this file from the docstrings.
 
-| | equation | meaning | code | tests |
-| --- | --- | --- | --- | --- |
+number| equation| meaning| code| tests
+---| ---| ---| ---| ---
 """
 
 MISPRINTS = """
 ## Misprints and omissions of the report
 
-| where | printed | correct |
-| --- | --- | --- |
-| bend coefficient | 0.928 m/N (0.016 in./lb) | 0.016 in/lb is 9.14e-5 m/N |
-| worst case | 2155.2 N/m (12.5 lb/in.) | 12.5 lb/in is 2189 N/m |
-| full column | 0.788 m (7 in.) | 7 in is 0.1778 m |
-| (7a) | "differentiating" (7) | the loss relative to a rigid control; \
-relative to a calibration at G₀ it is δ·K·(G_T − G₀)/(1 − K·G₀) |
-| (11), appendix C | δ = δc/(1 − K·G_T) | with a breakout (δc + K·F_BO)/(1 − K·G_T): as printed, \
-the force lacks G_T·K·F_BO/(1 − K·G_T) at a δc |
-| (12) | | singular at K·G_T = 1: no gradient can exceed the stiffness of the structure |
-| appendix C | the flow chart is missing | the break lies at δc₁ = δ₁ − K·F(δ₁): this project's \
-reading, see `rig/modification.py` |
+where| printed| correct
+---| ---| ---
+bend coefficient| 0.928 m/N (0.016 in./lb)| 0.016 in/lb is 9.14e-5 m/N
+worst case| 2155.2 N/m (12.5 lb/in.)| 12.5 lb/in is 2189 N/m
+full column| 0.788 m (7 in.)| 7 in is 0.1778 m
+(7a)| "differentiating" (7)| the loss relative to a rigid control; \
+relative to a calibration at G₀ it is δ·K·(G_T − G₀)/(1 − K·G₀)
+(11), appendix C| δ = δc/(1 − K·G_T)| with a breakout (δc + K·F_BO)/(1 − K·G_T): as printed, \
+the force lacks G_T·K·F_BO/(1 − K·G_T) at a δc
+(12)| no limit| singular at K·G_T = 1: no gradient can exceed the stiffness of the structure
+appendix C| no flow chart| the break lies at δc₁ = δ₁ − K·F(δ₁): this project's \
+reading, see `rig/modification.py`
 """
 
 CITED = re.compile(r"\b[Ee]qs?\. (\(\w+\)(?:(?:, | and | to )\(\w+\))*)")
@@ -134,7 +131,7 @@ def index() -> str:
         name = f"appendix {key}" if key in "ABC" else f"({key})"
         where = "<br>".join(code.get(key, ["none"]))
         held = "<br>".join(tests.get(key, ["none"]))
-        lines.append(f"| {name} | {says} | {means} | {where} | {held} |")
+        lines.append(f"{name}| {says}| {means}| {where}| {held}")
     lines += MISPRINTS.splitlines()
     return "\n".join(lines) + "\n"
 

@@ -106,7 +106,7 @@ def failing(effect: str, values: dict[str, float]) -> list[str]:
 
 def documented() -> dict[str, str]:
     """Return the first cell of the table's row that names an effect, by effect."""
-    rows = re.findall(r"^\| (.+) \| (`.+`) \|$", TABLE.read_text("utf-8"), re.MULTILINE)
+    rows = re.findall(r"^([^|`]+)\| (`[^|]+`)$", TABLE.read_text("utf-8"), re.MULTILINE)
     return {effect: first for first, named in rows for effect in re.findall(r"`(\w+)`", named)}
 
 
