@@ -61,6 +61,7 @@ ORDER += [
     "gap/effects",
     "gap/stages",
     "gap/search",
+    "gap/beam",
     "gap/findings",
     "gap",
     "blind/twin",

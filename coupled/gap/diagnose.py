@@ -14,6 +14,7 @@ from functools import partial
 
 from coupled.errors import InputError
 from coupled.gap.checks import check_record, check_trim
+from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import library_of
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
@@ -23,6 +24,7 @@ from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.refuted import search_unrefuted
 from coupled.gap.search.case import Case, Tell
+from coupled.gap.search.choose import Choice
 from coupled.gap.search.contact import allowing_for_contact
 from coupled.gap.search.descent import Descent
 from coupled.gap.signals.counts import as_counted
@@ -44,6 +46,8 @@ from coupled.rig.rig import Rig
 
 __all__ = ["Diagnosis", "diagnose"]
 
+Search = Callable[[Case, Sequence[Effect]], tuple[Case, Choice]]
+
 
 def diagnose(
     rig: Rig,
@@ -52,16 +56,18 @@ def diagnose(
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
     workers: int = 0,
+    search: Search = search_unrefuted,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
     `tell` is called with what is being done, and how much of how much is done. With records of the
     machine when it was well (`healthy`), the difference from those is judged (`healthy`). So many
-    threads work as `workers`, 0 being one a core; the answer is that of one. Raises InputError
-    where a record cannot be of this rig, or lets no stage be judged.
+    threads work as `workers`, 0 being one a core; the answer is that of one. `search` finds the
+    effects: `beam.beam.search_sets` is the one that is being built. Raises InputError where a
+    record cannot be of this rig, or lets no stage be judged.
     """
     with threads(workers):
-        return _diagnose(rig, records, control, tell, healthy or {})
+        return _diagnose(rig, records, control, tell, healthy or {}, search)
 
 
 def _diagnose(
@@ -70,10 +76,11 @@ def _diagnose(
     control: ControlName,
     tell: Tell | None,
     healthy: Mapping[str, Record],
+    search: Search,
 ) -> Diagnosis:
     baseline = None
     if healthy:
-        well = _diagnose(rig, healthy, control, tell, {})
+        well = _diagnose(rig, healthy, control, tell, {}, search)
         case = Case(rig, control, well.outputs)
         baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
         rig = baseline.rig
@@ -123,7 +130,7 @@ def _diagnose(
         return held
 
     case = Case(rig, control, outputs, tell, refloored, only_wide=baseline is not None)
-    case, choice = search_unrefuted(case, library)
+    case, choice = search(case, library)
     outputs = list(case.outputs)
     judge = Judge(readers, outputs, choice, case.gaps(choice.fit.rig))
     stages = judge.stages()

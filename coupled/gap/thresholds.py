@@ -306,3 +306,14 @@ FLEXIBLE_LEFT = 0.75  # share of what a free model leaves, which an effect must 
 UNPROVEN = 0.25  # chosen: error of a size in its best halves, from which none is shown the same
 LEAST_OF_A_HALF = 0.1  # chosen: of an effect's action, that a half must hold to have a size
 LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its size has no error
+
+# The search over sets of effects (`beam`).
+BEAM_WIDTH, BEAM_DEPTH = 6, 4  # sets that are followed, and effects of a set
+GIVEN_UP = 30.0  # log evidence behind the best, from which a start or a set is given up
+BEAM_CANDIDATES, BEAM_BESIDE = 8, 4  # chosen: fitted beside the best set, and beside any other
+BEAM_FIRST = 4  # chosen: evaluations of each start, after which they are compared
+BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # chosen: times where a parameter starts, for signatures
+BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # chosen: the same for how far a factor is from 1
+PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 56, about equally likely
+PRIOR_NUMBER = 1.0  # chosen: −ln of the prior of a law by each parameter beyond the first
+PRIOR_SPAN = 9.2  # ln 10⁴: over four decades a size is equally likely in each

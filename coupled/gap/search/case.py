@@ -241,7 +241,7 @@ class Case:
         fit of this case that ended at the start.
         """
         free = self.nuisances(effects)
-        start = self._with_contact(effects, free, start or {})
+        start = self.with_contact(effects, free, start or {})
         given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
         known = {} if near is None else near.slopes
         return fit(*given, replace(descent, known=self._known, slopes=known))
@@ -251,7 +251,7 @@ class Case:
         contact = {one.value_key(p) for one in self.contact for p in one.free}
         return {key: value for key, value in values.items() if key not in contact}
 
-    def _with_contact(
+    def with_contact(
         self, effects: Sequence[Effect], free: Sequence[Effect], start: Mapping[str, float]
     ) -> dict[str, float]:
         """Return where a fit starts, with the contact that leaves least where none is known."""

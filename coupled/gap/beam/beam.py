@@ -1,0 +1,423 @@
+"""The search for the set of effects that explains a record: a beam over sets, by their evidence.
+
+A set of effects is fitted together with the nuisance parameters, always on the whole record, and
+has a log evidence (`evidence`). From each of the best sets the search goes to its neighbours:
+
+    add       one effect more, of those whose signature takes most of the residual (`screen`)
+    replace   a law by one that contains it, or that it contains (`laws`)
+    swap      an effect for another that shows in the same output
+    drop      one effect less
+
+and goes on with the best, until every stage is explained, or no set is new. Each neighbour is
+fitted from the same starts: its parent's optimum with the new parameters at a few sizes, with the
+contact of dry friction sought on a grid, and, for a law of friction, where a fit to short replays
+ends (multiple shooting). A few steps come first; starts that are far behind are given up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupled.gap.beam.evidence import Evidence, evidence, fewest_unexplained
+from coupled.gap.beam.fit import SetFit
+from coupled.gap.beam.laws import contains, distinct, keys_of
+from coupled.gap.beam.problem import Problem
+from coupled.gap.beam.screen import Screen, Screened
+from coupled.gap.effects.effect import Effect
+from coupled.gap.search.case import Case
+from coupled.gap.search.choose import Choice
+from coupled.gap.search.descent import Descent
+from coupled.gap.search.gain import Candidate
+from coupled.gap.search.rivals import Found
+from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
+from coupled.gap.thresholds import (
+    BEAM_BESIDE,
+    BEAM_CANDIDATES,
+    BEAM_DEPTH,
+    BEAM_FIRST,
+    BEAM_WIDTH,
+    GIVEN_UP,
+    RIVAL_GAIN,
+    SHOOTINGS,
+)
+from coupled.parallel import in_threads
+
+Floats = NDArray[np.float64]
+Names = frozenset[str]
+Start = dict[str, float]
+Try = tuple[tuple[Effect, ...], Start, SetFit]  # effects, where their fit starts, its parent
+WIDE, OWN = Descent("wide"), Descent("own")
+FIRST, SHORT = Descent("wide", BEAM_FIRST), Descent("wide", SHOOTINGS)
+ABOVE = (1.05, 1.5)  # times the running friction, where the fit of a breakaway starts
+
+
+def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
+    """Return the effects that explain a record's gap, and the case with its noise as known then.
+
+    Noise is estimated with the rig file's parameters, where a gap may pass for coloured noise. It
+    is estimated once more with the best set, and the search repeated where it is lower.
+    """
+    case = case.surely_open()
+    found = _searched(case, library)
+    anew = case.heard_anew(found.fit.rig) if found.steps else None
+    return (case, found) if anew is None else (anew, _searched(anew, library))
+
+
+@dataclass
+class Beam:
+    """The sets fitted so far, by their effects' names, and what their evidence consists of.
+
+    `counts` are the effective samples of each output, `contact` how dry friction yields by the fit
+    that sought it last.
+    """
+
+    problem: Problem
+    settled: SetFit
+    variance: Floats
+    counts: Floats = field(default_factory=lambda: np.zeros(0))
+    fits: dict[Names, SetFit] = field(default_factory=dict)
+    known: dict[Names, Evidence] = field(default_factory=dict)
+    finished: set[Names] = field(default_factory=set)
+    best: Names = frozenset()
+    contact: Start = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Screen candidates by signatures that are taken once."""
+        self.screen = Screen(self.problem)
+
+    def add(self, fitted: SetFit) -> None:
+        """Add a fit; of two of one set the more likely stays."""
+        names = names_of(fitted.effects)
+        new = evidence(self.problem, fitted, self.variance)
+        old = self.known.get(names)
+        if old is None or new.log(self.counts) > old.log(self.counts):
+            self.fits[names], self.known[names] = fitted, new
+
+    def log(self, names: Names) -> float:
+        """Return the log evidence of a set."""
+        return self.known[names].log(self.counts)
+
+    def valid(self) -> list[Names]:
+        """Return the sets that may be true."""
+        return [n for n, fitted in self.fits.items() if not n or may_be_true(self.problem, fitted)]
+
+    def ranked(self) -> list[Names]:
+        """Return the sets that may be true, the most likely first."""
+        return sorted(self.valid(), key=self.log, reverse=True)
+
+    def leading(self) -> list[Names]:
+        """Return the most likely sets that are not far behind the best."""
+        ranked = self.ranked()[:BEAM_WIDTH]
+        return [names for names in ranked if self.log(names) > self.log(ranked[0]) - GIVEN_UP]
+
+    def recount(self) -> None:
+        """Count effective samples by what the sets leave, and find the best set by them."""
+        self.counts = fewest_unexplained([self.known[names] for names in self.valid()])
+        self.best = self.ranked()[0]
+
+    def open_outputs(self, names: Names) -> set[str]:
+        """Return the outputs that a set leaves wider than noise and the physics' own error."""
+        case = self.problem.case
+        first, limits = stage_gaps(case.outputs, self.settled.rig), stage_limits(case.outputs)
+        rig = self.fits[names].rig if names else self.settled.rig
+        left = case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
+        return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
+
+
+def names_of(effects: Iterable[Effect]) -> Names:
+    """Return the names of a set's effects."""
+    return frozenset(effect.name for effect in effects)
+
+
+def may_be_true(problem: Problem, fitted: SetFit) -> bool:
+    """Tell whether no effect is at a bound of a parameter, nor swings faster than frames show."""
+    fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
+    for effect in fitted.effects:
+        for p in effect.free:
+            key = effect.value_key(p)
+            if key in fitted.at_bound:
+                return False
+            if p.name == "frequency_Hz" and not p.folds and fitted.values[key] >= fastest:
+                return False
+    return True
+
+
+def _searched(case: Case, library: Sequence[Effect]) -> Choice:
+    """Return the set of effects of a library that explains a case best."""
+    problem = Problem(case)
+    root = problem.fit(())
+    settled = replace(root, rig=problem.within_tolerance(root))
+    beam = Beam(problem, settled, problem.variances(settled.rig))
+    beam.add(root)
+    beam.recount()
+    rounds = _grow(beam, distinct(library, case.contact) if case.contact else list(library))
+    return _choice(beam, rounds)
+
+
+def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
+    """Fit the neighbours of the best sets, depth by depth.
+
+    Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
+    tried always: they have no size that could be too small.
+    """
+    front: list[Names] = [frozenset()]
+    rounds = list[dict[str, float]]()
+    _fit_sets(beam, [((e,), {}, beam.fits[front[0]]) for e in library if not e.free])
+    for _ in range(BEAM_DEPTH):
+        base, known = beam.log(front[0]), set(beam.fits)
+        for names in front:
+            if wide := beam.open_outputs(names):
+                _expand(beam, beam.fits[names], library, wide)
+        new = set(beam.fits) - known
+        if not new:
+            break
+        _shoot(beam)
+        rounds.append({beam.fits[one].effects[-1].name: beam.log(one) - base for one in new})
+        if beam.best and not beam.open_outputs(beam.best):
+            break
+        front = [names for names in beam.leading() if names and names not in front]
+    _look_around(beam, library)
+    return tuple(rounds)
+
+
+def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
+    """Fit what the best set is without each effect, and with each law next to one of its own."""
+    while beam.best:
+        best, fitted = beam.best, beam.fits[beam.best]
+        tries = [*_without(fitted), *_laws(beam, fitted, library)]
+        _fit_sets(beam, [one for one in tries if names_of(one[0]) not in beam.fits])
+        if beam.best == best:
+            return
+
+
+def _expand(beam: Beam, fitted: SetFit, library: Sequence[Effect], wide: set[str]) -> None:
+    """Fit the sets next to a fitted one.
+
+    A law that contains another is fitted after it, from where that one ended, and a law of dry
+    friction with the contact of one that was fitted before.
+    """
+    is_best = names_of(fitted.effects) == beam.best
+    many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
+    screened = beam.screen.best(fitted, _beside(fitted.effects, library, wide), many, anew=is_best)
+    effects = [one.effect for one in screened]
+    plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
+    dry = next((one for one in plain if one.effect.dry), None)
+    if dry is not None and not beam.contact:
+        ends = _fit_sets(beam, _tries(fitted, dry, {}))
+        beam.contact = _contact(beam, ends[0]) if ends else {}
+    ends = _fit_sets(beam, [t for one in plain for t in _tries(fitted, one, beam.contact)])
+    wider = [one for one in screened if one not in plain]
+    others = [t for one in wider for t in _tries(fitted, one, beam.contact)]
+    for end in ends:
+        others += [t for one in wider for t in _in_place(beam, end, end.effects[-1], one.effect)]
+    others += _laws(beam, fitted, library)
+    if len(fitted.effects) > 1:
+        others += [*_swaps(beam, fitted, library), *_without(fitted)]
+    _fit_sets(beam, others)
+
+
+def _shoot(beam: Beam) -> None:
+    """Fit the sets with dry friction from where fits to short replays end, if the best is open."""
+    short, best = beam.problem.by_shots, beam.fits[beam.best]
+    if short is None or "loader" not in beam.problem.case.over_limit(best.rig):
+        return
+    most = beam.log(beam.best)
+    dry = [
+        fit
+        for names, fit in beam.fits.items()
+        if any(e.dry for e in fit.effects)
+        and len(names) == len(beam.best)
+        and beam.log(names) > most - GIVEN_UP
+    ]
+
+    def shot(fitted: SetFit) -> Start:
+        ours = {effect.value_key(p) for effect in fitted.effects for p in effect.free}
+        begun = {key: value for key, value in fitted.values.items() if key in ours}
+        return dict(short.fit(fitted.effects, begun, None, SHORT).values)
+
+    starts = in_threads(shot, dry)
+    _fit_sets(beam, [(f.effects, start, f) for f, start in zip(dry, starts, strict=True)])
+
+
+def _beside(
+    effects: Sequence[Effect], library: Sequence[Effect], outputs: set[str]
+) -> list[Effect]:
+    """Return the effects that show in some outputs, and share no number with those of a set."""
+    taken = keys_of(effects)
+    return [
+        one for one in library if outputs & {*one.shows_in} and taken.isdisjoint(keys_of([one]))
+    ]
+
+
+def _tries(fitted: SetFit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
+    """Return the starts of a set with one effect more; `contact` is that of its dry friction."""
+    effects = (*fitted.effects, one.effect)
+    beside = contact if one.effect.dry else {}
+    return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
+
+
+def _contact(beam: Beam, fitted: SetFit) -> Start:
+    """Return the contact of dry friction in a fit, as far as it is a nuisance parameter."""
+    keys = {one.value_key(p) for one in beam.problem.case.contact for p in one.free}
+    return {key: value for key, value in fitted.values.items() if key in keys}
+
+
+def _swaps(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
+    """Return the sets with another effect, that shows in the same output, in place of one."""
+    tries: list[Try] = []
+    for old in fitted.effects:
+        rest = tuple(effect for effect in fitted.effects if effect is not old)
+        rig = beam.problem.rig_of(rest, fitted.values)
+        same = [e for e in _beside(rest, library, {*old.shows_in}) if e is not old]
+        if rig is not None:
+            base = replace(fitted, effects=rest, rig=rig)
+            found = beam.screen.best(base, same, BEAM_BESIDE)
+            tries += [t for one in found for t in _tries(base, one, beam.contact)[:1]]
+    return tries
+
+
+def _without(fitted: SetFit) -> list[Try]:
+    """Return the sets with one effect less."""
+    return [
+        (tuple(e for e in fitted.effects if e is not old), dict(fitted.values), fitted)
+        for old in fitted.effects
+    ]
+
+
+def _laws(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
+    """Return the sets with a law in place of one that it contains, or that contains it."""
+    pairs = [(old, law) for old in fitted.effects for law in library]
+    return [one for old, law in pairs for one in _in_place(beam, fitted, old, law)]
+
+
+def _in_place(beam: Beam, fitted: SetFit, old: Effect, law: Effect) -> list[Try]:
+    """Return where fits of a law in place of a fitted one start.
+
+    Their common numbers start as fitted. None where neither law contains the other.
+    """
+    rest = tuple(effect for effect in fitted.effects if effect is not old)
+    wider = contains(law, old)
+    if not (wider or contains(old, law)) or keys_of(rest) & keys_of([law]):
+        return []
+    case, start = beam.problem.case, dict(fitted.values)
+    higher = Start()
+    for p in law.free:
+        same = next((q for q in old.free if q.key == p.key and q.mode == p.mode), None)
+        level = next((q for q in old.free if q.key == p.above), None)
+        if same is not None:
+            start[law.value_key(p)] = fitted.values[old.value_key(same)]
+        elif level is not None:
+            filed = level.nominal(case.nominal, case.control)
+            running = float(level.entered(filed, fitted.values[old.value_key(level)]))
+            start[law.value_key(p)] = ABOVE[0] * running
+            higher[law.value_key(p)] = ABOVE[1] * running
+    effects = (*rest, law)
+    return [(effects, start, fitted), *([(effects, start | higher, fitted)] if higher else [])]
+
+
+def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[SetFit]:
+    """Fit sets from their starts, a few steps first, and on where that may matter; add them.
+
+    Return the best fit of each set. The second best start of a set goes on only where the best one
+    leaves an output over its limit.
+    """
+    problem = beam.problem
+    unique: dict[tuple[Names, tuple[tuple[str, float], ...]], Try] = {}
+    for effects, start, parent in tries:
+        near = tuple(sorted((key, float(f"{value:.6g}")) for key, value in start.items()))
+        unique.setdefault((names_of(effects), near), (effects, start, parent))
+    if not unique:
+        return []
+
+    def begin(one: Try) -> tuple[float, SetFit, SetFit]:
+        effects, start, parent = one
+        fit = problem.fit(effects, start, parent, FIRST)
+        return evidence(problem, fit, beam.variance).log(beam.counts), fit, parent
+
+    begun = sorted(in_threads(begin, list(unique.values())), key=lambda one: -one[0])
+    most = max(begun[0][0], beam.log(beam.best))
+    going = [one for one in begun if one[0] > most - 4.0 * GIVEN_UP]
+    first: dict[Names, tuple[float, SetFit, SetFit]] = {}
+    for one in going:
+        first.setdefault(names_of(one[1].effects), one)
+    _go_on(beam, list(first.values()))
+
+    def may_be_better(one: tuple[float, SetFit, SetFit]) -> bool:
+        names = names_of(one[1].effects)
+        if one is first[names] or one[0] < first[names][0] - GIVEN_UP:
+            return False
+        shown = {stage for effect in one[1].effects[-1:] for stage in effect.shows_in}
+        return bool(problem.case.over_limit(beam.fits[names].rig) & shown)
+
+    _go_on(beam, [one for one in going if may_be_better(one)])
+    return [beam.fits[names] for names in first]
+
+
+def _go_on(beam: Beam, begun: Sequence[tuple[float, SetFit, SetFit]]) -> None:
+    """Fit begun sets to the end, add them, and fit the leading ones by the loader's own steps."""
+    problem = beam.problem
+    if problem.case.tell is not None and begun:
+        problem.case.tell(f"fitting {len(begun)} sets of effects", 0, 1)
+
+    def go_on(one: tuple[float, SetFit, SetFit]) -> SetFit:
+        _, fit, parent = one
+        return problem.fit(fit.effects, fit.values, parent, WIDE, fit)
+
+    for fit in in_threads(go_on, begun):
+        beam.add(fit)
+    beam.recount()
+    ranked = [names for names in beam.leading() if names and names not in beam.finished]
+
+    def finish(names: Names) -> list[SetFit]:
+        fitted = beam.fits[names]
+        done = problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
+        anew = problem.case.but_for_contact(done.values)
+        if anew == dict(done.values) or "loader" not in problem.case.over_limit(done.rig):
+            return [done]
+        return [done, problem.fit(fitted.effects, anew)]
+
+    for names, fits in zip(ranked, in_threads(finish, ranked), strict=True):
+        beam.finished.add(names)
+        # A fit by wide steps is to another residual: it does not compete.
+        del beam.fits[names], beam.known[names]
+        for fit in fits:
+            beam.add(fit)
+    beam.recount()
+
+
+def _choice(beam: Beam, rounds: tuple[dict[str, float], ...]) -> Choice:
+    """Return the best set with each effect's posterior probability, and what may take its place.
+
+    The probability of an effect is that of the sets that contain it, or a law that contains it.
+    """
+    ranked, best = beam.ranked(), beam.best
+    fitted = beam.fits[best]
+    logs = np.array([beam.log(names) for names in ranked])
+    weights = np.exp(logs - logs[0])
+    weights /= weights.sum()
+    steps = []
+    for effect in fitted.effects:
+        held = [
+            any(one is effect or contains(one, effect) for one in beam.fits[names].effects)
+            for names in ranked
+        ]
+        rest = best - {effect.name}
+        gain = float(logs[0]) - beam.log(rest if rest in beam.known else frozenset())
+        rivals = tuple(
+            Candidate(gain - (float(logs[0]) - beam.log(names)), other, beam.fits[names])
+            for names in ranked
+            if beam.log(names) > logs[0] - RIVAL_GAIN
+            and best - names == {effect.name}
+            and len(names) == len(best)
+            for other in beam.fits[names].effects
+            if other.name in names - best and not contains(other, effect)
+        )
+        steps.append(Found(effect, gain, float(weights[held].sum()), rivals))
+    base = beam.log(frozenset())
+    tried = {next(iter(names)): beam.log(names) - base for names in beam.fits if len(names) == 1}
+    steps.sort(key=lambda step: -step.gain)
+    return Choice(tuple(steps), fitted, beam.settled, tried, rounds)
