@@ -171,6 +171,8 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
             f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
         )
         place = f"{force}{_where(cases, case, some)}"
+        if pull > loader.breakout + rubs and any(_raises_breakout(flight) for flight in some):
+            place += ", where the correction of the gradient raises the breakout"
         found.setdefault((breakout, friction), []).append(place)
     control = cases[0][0].manoeuvre.control
     for (breakout, friction), places in found.items():
@@ -179,6 +181,13 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
             f" ({friction}): {_some(places)}. The loader does not move, so there is no share lost"
             " or felt."
         )
+
+
+def _raises_breakout(flight: Flight) -> bool:
+    """Tell whether a host adds K̂·G·F_BO to the breakout that it assumes, eq. (11)."""
+    control = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
+    host = control.compensation
+    return host.gradient and host.bend > 0.0 and control.assumed_breakout > 0.0
 
 
 def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:

@@ -9,7 +9,7 @@ which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a play
 host reads it with a digital one. The schedule has the q̄ that it gets, drifts stand as at `time_s`.
 
 The law is set-valued where something holds the loader still. At neutral it rests in its breakout
-under any F between F(0−) and F(0+); at its stop under any F beyond F(travel).
+under any F between F(0−) and F(0+); at its stop under any F beyond that at the stop.
 
 Left out is what is a band about this line: friction, the bend's hysteresis, whose middle is here,
 and a play that the servo takes along, half of its width to either side. `equations` has the linear
@@ -262,7 +262,7 @@ def _point_at(
         if deflection >= _yields(p.linkage, down):
             return 0.0, _force_for(p.linkage, deflection, down, up)
         side = -1.0
-    near, far = 0.0, p.loader.travel
+    near, far = 0.0, p.loader.aft if side > 0.0 else p.loader.forward
     stopped = _force(p, s, side * far, read, side) - leaked
     over = side * (deflection - side * far - _yields(p.linkage, stopped))
     if over > 0.0:
