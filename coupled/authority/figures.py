@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NONE = "–"  # in place of a figure that a flight does not have
 _NOTICED = 0.005  # of the hand's travel: what it moves further is said
 _ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+_MOST_DIGITS = 4  # of a travel in mm, ° or in
 _LISTED = 3  # cases that a sentence names
 _FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
@@ -229,13 +230,14 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         return ""
     bent, alike = moved[0], goes_as_far(moved[0], rigid)
     size, unit = _travel(manoeuvre, system)
-    digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
-    places = [f"{size * abs(each.hand_travel_norm):.{digits}f} {unit}" for each in (bent, rigid)]
+    travels = [size * abs(each.hand_travel_norm) for each in (*moved, rigid)]
+    digits = _digits_between(travels[:-1], travels[-1], 1 if unit == "in" else 0)
+    written = [f"{travel:.{digits}f} {unit}" for travel in travels]
+    places = (written[0], written[-1])
     others = [
-        f"{each.configuration} {size * abs(each.hand_travel_norm):.{digits}f} {unit}"
-        f" and {100 * each.loss:.0f} %"
-        for each in moved[1:]
+        f"{each.configuration} {written[number]} and {100 * each.loss:.0f} %"
+        for number, each in enumerate(moved[1:], start=1)
         if goes_as_far(each, rigid) is alike
     ]
     surface = "the surface goes about as far, while" if alike else "and"
@@ -245,6 +247,14 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
         f" what the hand asks for is lost.{more}"
     )
+
+
+def _digits_between(values: Sequence[float], other: float, least: int) -> int:
+    """Return the decimals, `least` or more, with which no value is written as the other one."""
+    digits = least
+    while digits < _MOST_DIGITS and any(f"{x:.{digits}f}" == f"{other:.{digits}f}" for x in values):
+        digits += 1
+    return digits
 
 
 def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration]) -> list[str]:

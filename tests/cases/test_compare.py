@@ -495,6 +495,19 @@ def test_a_sweep_says_what_its_losses_are_shares_of(kind: str, tmp_path: Path) -
     ) is (kind == "force")
 
 
+@pytest.mark.parametrize("system", ["si", "us"])
+def test_travels_that_differ_are_written_apart(system: Any) -> None:
+    """8 N on a T-37's stick move it by 4.8 mm, and by 0.7 mm more on the bent structure."""
+    found = coupled.compare(
+        coupled.load_rig("t37"), column=coupled.Step(force_N=8.0, duration_s=3.0), duration_s=4.0
+    )
+    [said] = found.remarks(system)
+    words = said.split()
+    unit = {"si": "mm", "us": "in"}[system]
+    bent, rigid = (float(words[i - 1]) for i, word in enumerate(words) if word.strip(",") == unit)
+    assert bent > rigid
+
+
 def test_a_sweep_says_that_a_correction_corrects_nothing() -> None:
     bends = {"key": f"rig.{LOADER}bend_m_per_N", "values": [1e-5, 9e-5]}
     flown: dict[str, Any] = {"name": "s", "run": "appendix-c", "configurations": ["compensated"]}
