@@ -149,7 +149,8 @@ def _without_correction(flights: Sequence[Flight]) -> str:
 
 def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
     control, d = manoeuvre.control, unit_of(manoeuvre.control)
-    bend = manoeuvre.rig.controls[control].loader.bend
+    loader = manoeuvre.rig.controls[control].loader
+    bend = loader.bend or loader.bend_push or 0.0  # of a pull, or of a push where only that bends
     return (
         f"In {listed(names)} nothing is corrected, since the host's K̂ is 0 while the structure's K"
         f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"

@@ -294,6 +294,24 @@ def test_a_point_has_the_deflection_that_is_asked_for(share: float) -> None:
                 assert line.force[0] == pytest.approx(point.force[0], rel=1e-12)
 
 
+@pytest.mark.parametrize("offset_N", [0.0, 12.0])
+@pytest.mark.parametrize("share", [-0.9, -0.2, 0.0, 0.5])
+def test_between_the_contacts_of_a_play_the_grip_stands_where_it_is(
+    offset_N: float, share: float
+) -> None:
+    """F = 0 where G·δc = F_offset, and any δ of δc ± play/2."""
+    soft = {LOADER + "play_m": 0.004, LOADER + "play_stiffness_N_per_m": 1e4}
+    rig = bench({**soft, LOADER + "offset_N": offset_N, LOADER + "bend_m_per_N": 0.0})
+    rig = configure(rig, "uncompensated")
+    computed = offset_N / G_STIFF
+    deflection = computed + share * 0.002
+    point = static_point(rig, "column", 3000.0, deflection)
+    assert point.deflection[0] == pytest.approx(deflection, abs=1e-15)
+    assert point.force[0] == pytest.approx(0.0, abs=1e-9)
+    assert point.estimate[0] == pytest.approx(computed, abs=1e-12)
+    assert point.specified[0] == pytest.approx(G_STIFF * deflection, abs=1e-12)
+
+
 def test_at_its_stop_the_structure_takes_what_the_hand_adds() -> None:
     """Beyond travel + K·F the loader stands at its stop, and F = (δ − travel)/K."""
     rig = bench()
@@ -440,6 +458,14 @@ def test_a_correction_by_nothing_is_named_so(useless: Comparison) -> None:
     figure = draw_comparison(useless)
     ticks = [text.get_text() for text in figure.axes[2].get_xticklabels()]
     assert [tick.endswith("K̂ = 0") for tick in ticks] == [False, False, True, True, True]
+
+
+def test_a_structure_that_bends_under_a_push_alone_is_named_by_that() -> None:
+    bends = {LOADER + "bend_m_per_N": 0.0, LOADER + "bend_push_m_per_N": 2e-4}
+    rig = bench({**bends, HOST + "bend_m_per_N": 0.0})
+    push = Manoeuvre(rig, {"column": coupled.Clamp(deflection_m=-PULL_m)}, 2.0, bench=STATIC)
+    found = compare([replace(push, configurations=("compensated",))])
+    assert "the structure's K is 0.0002 m/N" in " ".join(found.remarks())
 
 
 def test_a_rigid_structure_and_a_known_bend_need_no_such_word() -> None:
