@@ -179,7 +179,9 @@ def judge(
         known = closed_forms and not manoeuvre.served
         loss, ratio = by_the_statics(rig, control, record, held, stop) if known else (nan, nan)
         asked, reached = commands.asked, commands.reached
-        ratios = (felt / specified, ratio) if specified else (nan, nan)
+        # Where a service holds the control in place of the hand, no gradient is felt.
+        holds = felt * specified > 0.0 if manoeuvre.served else specified != 0.0
+        ratios = (felt / specified, ratio) if holds else (nan, nan)
         shares = (asked, reached, 1.0 - reached / asked, loss, *ratios)
     return Outcome(
         manoeuvre.label,

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NONE = "–"  # in place of a figure that a flight does not have
 _NOTICED = 0.005  # of the hand's travel: what it moves further is said
 _ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+_MOST_DIGITS = 4  # of a travel in mm, ° or in
 _LISTED = 3  # cases that a sentence names
 _FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
@@ -148,7 +149,8 @@ def _without_correction(flights: Sequence[Flight]) -> str:
 
 def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
     control, d = manoeuvre.control, unit_of(manoeuvre.control)
-    bend = manoeuvre.rig.controls[control].loader.bend
+    loader = manoeuvre.rig.controls[control].loader
+    bend = loader.bend or loader.bend_push or 0.0  # of a pull, or of a push where only that bends
     return (
         f"In {listed(names)} nothing is corrected, since the host's K̂ is 0 while the structure's K"
         f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
@@ -171,6 +173,8 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
             f"{unit.factor * each:.3g} {unit.unit}" for each in (pull, loader.breakout, rubs)
         )
         place = f"{force}{_where(cases, case, some)}"
+        if pull > loader.breakout + rubs and any(_raises_breakout(flight) for flight in some):
+            place += ", where the correction of the gradient raises the breakout"
         found.setdefault((breakout, friction), []).append(place)
     control = cases[0][0].manoeuvre.control
     for (breakout, friction), places in found.items():
@@ -179,6 +183,13 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
             f" ({friction}): {_some(places)}. The loader does not move, so there is no share lost"
             " or felt."
         )
+
+
+def _raises_breakout(flight: Flight) -> bool:
+    """Tell whether a host adds K̂·G·F_BO to the breakout that it assumes, eq. (11)."""
+    control = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
+    host = control.compensation
+    return host.gradient and host.bend > 0.0 and control.assumed_breakout > 0.0
 
 
 def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
@@ -220,13 +231,14 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         return ""
     bent, alike = moved[0], goes_as_far(moved[0], rigid)
     size, unit = _travel(manoeuvre, system)
-    digits = 1 if unit == "in" else 0
     where = f" ({bent.case})" if manoeuvre.label != manoeuvre.name else ""
-    places = [f"{size * abs(each.hand_travel_norm):.{digits}f} {unit}" for each in (bent, rigid)]
+    travels = [size * abs(each.hand_travel_norm) for each in (*moved, rigid)]
+    digits = _digits_between(travels[:-1], travels[-1], 1 if unit == "in" else 0)
+    written = [f"{travel:.{digits}f} {unit}" for travel in travels]
+    places = (written[0], written[-1])
     others = [
-        f"{each.configuration} {size * abs(each.hand_travel_norm):.{digits}f} {unit}"
-        f" and {100 * each.loss:.0f} %"
-        for each in moved[1:]
+        f"{each.configuration} {written[number]} and {100 * each.loss:.0f} %"
+        for number, each in enumerate(moved[1:], start=1)
         if goes_as_far(each, rigid) is alike
     ]
     surface = "the surface goes about as far, while" if alike else "and"
@@ -236,6 +248,14 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
         f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
         f" what the hand asks for is lost.{more}"
     )
+
+
+def _digits_between(values: Sequence[float], other: float, least: int) -> int:
+    """Return the decimals, `least` or more, with which no value is written as the other one."""
+    digits = least
+    while digits < _MOST_DIGITS and any(f"{x:.{digits}f}" == f"{other:.{digits}f}" for x in values):
+        digits += 1
+    return digits
 
 
 def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration]) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.record.channels import SURFACES, ControlName, channel
+from coupled.record.channels import SURFACES, ControlName, channel, unit_of
 from coupled.record.record import Record
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
@@ -181,13 +181,17 @@ def _surface_stop(
     if known is None or not len(rows):
         return None
     stop, name = float(known["command_norm"]), f"{surface}_rad"
-    reached = record[channel(control, "surface_norm")][rows]
-    within = _AT_STOP_rad + _SIGMAS * rig.noise.get(name, 0.0) / math.sqrt(len(rows))
-    stands = abs(float(np.mean(record[name][rows + 1])) - known["position_rad"]) <= within
+    reached = np.abs(record[channel(control, "surface_norm")][rows])
     slack = data.rigging.play + 1e-4
-    if stands and np.mean(np.abs(reached)) < abs(stop) - slack:
-        return math.copysign(float(np.min(np.abs(reached))), asked)
-    if not stands and np.mean(np.abs(reached)) > abs(stop) + slack:
+
+    def stands(of: NDArray[np.int64]) -> bool:
+        within = _AT_STOP_rad + _SIGMAS * rig.noise.get(name, 0.0) / math.sqrt(len(of))
+        return bool(abs(np.mean(record[name][of + 1]) - known["position_rad"]) <= within)
+
+    if np.mean(reached) < abs(stop) - slack and stands(rows):
+        return math.copysign(float(np.min(reached)), asked)
+    beyond = rows[reached > abs(stop) + slack]
+    if len(beyond) and not stands(beyond):
         return None
     return stop
 
@@ -195,8 +199,14 @@ def _surface_stop(
 def felt_and_specified(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> tuple[float, float]:
-    """Return the mean force felt and specified, breakout and bob weight taken off, N."""
+    """Return the mean force felt and specified, breakout and bob weight taken off, N.
+
+    The specified force acts about the neutral, where a force trim has moved it.
+    """
     deflection = true_deflection(rig, control, record)[held]
+    neutral = f"{control}_trim_{unit_of(control)}"
+    if neutral in record:
+        deflection = deflection - record[neutral][held]
     pressure = record["dynamic_pressure_Pa"][held]
     loader = rig.controls[control].loader
     preload = np.sign(deflection) * loader.breakout

@@ -25,10 +25,10 @@ from coupled.record.channels import ELEVATOR, LOAD, PRESSURE, ControlName, chann
 from coupled.record.record import Record
 from coupled.resources import aircraft_folder, shipped_runs
 from coupled.rig.equations import bend_loss, specified_gradient
+from coupled.rig.loader import stop_of
 from coupled.rig.packing import COMMAND_SIGN
-from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
-from coupled.rig.statics import static_line
+from coupled.rig.statics import static_line, static_point
 from coupled.schema import changed, load_toml
 from coupled.units import KNOT_m_per_s
 
@@ -39,6 +39,7 @@ FELT: tuple[Configuration, ...] = ("rigid", "uncompensated", "compensated")
 _SEA_LEVEL_kg_per_m3 = 1.225
 _LEAST_PRESSURE_Pa = 200.0
 _PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
+_STEPS, _BEYOND_STOP = 401, 17  # along δc, and along δ beyond the loader's stop
 _STEP, _PULL_s = 0.01, 3.0  # of the elevator command, and for how long: linear
 _TRIMS_kt = 8.0  # between the two trims whose force is compared
 
@@ -84,16 +85,33 @@ def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
     return made
 
 
-def _computed(control: Control) -> Floats:
-    """Return δc finely enough that straight lines between do not show."""
-    return control.travel * np.linspace(1e-6, 1.0, 401)
+def _pulled(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[Floats, Floats, Floats]:
+    """Return δ and δ̂ in d and F in N of a pull up to the travel, finely enough to draw.
+
+    Where the loader stops before the grip has gone so far, the structure bends on from there.
+    """
+    data = rig.controls[control]
+    stop = stop_of(data.travel, data.loader.stop_aft)
+    line = static_line(rig, control, pressure_Pa, stop * np.linspace(1e-6, 1.0, _STEPS))
+    parts = [line]
+    if line.deflection[-1] < data.travel:
+        full = data.travel * (1.0 + 1e-9)  # not short of it by rounding
+        beyond = np.linspace(line.deflection[-1], full, _BEYOND_STOP)[1:]
+        points = [static_point(rig, control, pressure_Pa, float(each)) for each in beyond]
+        # A rigid structure does not let the grip go on.
+        parts += [each for each in points if each.deflection[0] > line.deflection[-1]]
+    deflection, estimate, force = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("deflection", "estimate", "force")
+    )
+    return deflection, estimate, force
 
 
 def _loss(rig: Rig, control: ControlName, pressure_Pa: float, deflections: Floats) -> Floats:
-    line = static_line(rig, control, pressure_Pa, _computed(rig.controls[control]))
-    # Beneath the first point the loader rests in its breakout and the surface does not move.
-    estimate = np.interp(deflections, line.deflection, line.estimate, left=np.nan)
-    return np.asarray(1.0 - estimate / deflections)
+    deflection, estimate, _ = _pulled(rig, control, pressure_Pa)
+    # Below the first point the loader rests in its breakout, and beyond the last the grip is held.
+    reached = np.interp(deflections, deflection, estimate, left=np.nan, right=np.nan)
+    return np.asarray(1.0 - reached / deflections)
 
 
 def envelope(records: Sequence[Record], control: ControlName) -> Floats:
@@ -157,9 +175,9 @@ def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
     control = rig.controls["column"]
     out = []
     for q, command in zip(pressure.tolist(), commands.tolist(), strict=True):
-        line = static_line(rig, "column", q, _computed(control))
-        wanted = min(abs(command) * control.travel, line.estimate[-1])
-        force = np.interp(wanted, line.estimate, line.force, left=np.nan)
+        _, estimate, forces = _pulled(rig, "column", q)
+        wanted = min(abs(command) * control.travel, estimate[-1])
+        force = np.interp(wanted, estimate, forces, left=np.nan)
         past = (force - control.loader.breakout + control.loader.offset) * command * control.travel
         out.append(past / wanted if wanted > 0.0 else 0.0)
     return np.array(out)

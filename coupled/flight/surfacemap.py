@@ -63,13 +63,38 @@ def stops_found(
 def flown_through(
     step: Step, motion: Motion, controls: Sequence[str], surface: str
 ) -> tuple[Floats, Floats]:
-    """Return commands about trim, and where a surface stands for each, rad; a frame each."""
-    commands = np.linspace(-1.5, 1.5, 601)
-    positions = np.empty_like(commands)
+    """Return commands about trim, and where a surface stands for each, rad; a frame each.
+
+    601 even commands, and those between at which the surface's slope changes, as at neutral where
+    its travels up and down differ: linear interpolation is then exact for a piecewise linear law.
+    """
     at = motion_channels(controls, flown=True).index(surface)
     moved = [f"{SURFACES[control]}_rad" == surface for control in controls]
     first, second, third = (*map(float, moved), 0.0, 0.0)[:3]
-    for i, command in enumerate(commands.tolist()):
-        step((first * command, second * command, third * command))
-        positions[i] = motion()[at]
-    return commands, positions
+
+    def places(commands: Floats) -> Floats:
+        positions = np.empty_like(commands)
+        for i, command in enumerate(commands.tolist()):
+            step((first * command, second * command, third * command))
+            positions[i] = motion()[at]
+        return positions
+
+    even = np.linspace(-1.5, 1.5, 601)
+    found = places(even)
+    corners = _corners(even, found)
+    commands = np.concatenate((even, corners))
+    order = np.argsort(commands)
+    return commands[order], np.concatenate((found, places(corners)))[order]
+
+
+def _corners(commands: Floats, positions: Floats) -> Floats:
+    """Return the commands inside a step at which the lines through its two neighbours meet."""
+    step = commands[1] - commands[0]
+    rises = np.diff(positions)
+    before, within, after = rises[:-2], rises[1:-1], rises[2:]
+    bends = np.minimum(np.abs(within - before), np.abs(after - within)) > _SAME_rad
+    change = np.where(np.abs(after - before) > _SAME_rad, after - before, np.inf)
+    share = (after - within) / change
+    inside = bends & (share > 0.0) & (share < 1.0)
+    corners: Floats = (commands[1:-2] + share * step)[inside]
+    return corners

@@ -53,7 +53,7 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
     present = [name for name in names if name in record]
     for i, name in enumerate(present):
         if plausible.is_constant(record[name]):
-            raise InputError(file, name, "never changes: a sensor that is stuck")
+            raise InputError(file, name, f"never changes: {_why_constant(rig, record, control)}")
         other = plausible.copy_of(name, {known: record[known] for known in present[: i + 1]})
         if other is not None:
             raise InputError(file, name, f"is a copy of {other}")
@@ -71,6 +71,24 @@ def _check_channels(rig: Rig, record: Record, control: ControlName, file: object
             )
     _check_force_unit(rig, record, control, file)
     _check_schedule(rig, record, control, file)
+
+
+def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:
+    """Return what may keep a channel of a control constant: no push, or a stuck sensor."""
+    force = channel(control, "force")
+    if force not in record:
+        return f"the {control} is at rest, or a sensor is stuck"
+    most = float(np.max(np.abs(record[force])))
+    if most == 0.0:
+        return f"no force moves the {control}, or a sensor is stuck"
+    loader = rig.controls[control].loader
+    holds = loader.breakout + loader.friction
+    if most <= holds:
+        return (
+            f"the force reaches {most:.4g} N, and breakout and friction hold {holds:.4g} N; "
+            "record a larger force"
+        )
+    return "a sensor that is stuck"
 
 
 def _check_schedule(rig: Rig, record: Record, control: ControlName, file: object) -> None:

@@ -39,8 +39,9 @@ def draw_losses(
         if system == "us":
             moved = in_system(unit_of(control), system)
             factor, unit = moved.factor, moved.unit
-        least = min(float(np.nanmin(m.loss)) for m in of_control)
-        most = 100.0 * max(0.01, *(float(np.nanmax(m.loss)) for m in of_control), -least)
+        losses = np.concatenate([m.loss[np.isfinite(m.loss)] for m in of_control])
+        least = float(np.min(losses, initial=0.0))
+        most = 100.0 * max(0.01, float(np.max(losses, initial=0.0)), -least)
         for axes, loss_map in zip(row, of_control, strict=True):
             mesh = axes.pcolormesh(
                 pressure.factor * loss_map.pressure_Pa,
@@ -52,18 +53,30 @@ def draw_losses(
                 shading="gouraud",
             )
             _outline(axes, flown[control], (pressure.factor, factor))
-            axes.set_facecolor(GRAY)  # the loader rests in its breakout, or nothing is pulled
+            axes.set_facecolor(GRAY)  # no loss: the loader rests, or the grip does not go so far
             axes.set_ylim(0.0, factor * loss_map.deflection[-1])
             axes.set_title(f"{control}, {loss_map.configuration}", fontsize=10)
             axes.set_xlabel(f"dynamic pressure q̄, {pressure.unit}")
         row[0].set_ylabel(f"true deflection δ, {unit}")
         figure.colorbar(mesh, ax=list(row), label="loss, % of δ")
     outlined = "; line: what was flown" if any(f.size for f in flown.values()) else ""
-    figure.suptitle(
-        f"{name}: deflection lost on the way to the surface (grey: within the breakout{outlined})",
-        fontsize=12,
-    )
+    within = _grey(maps)
+    note = f" ({(within + outlined).removeprefix('; ')})" if within or outlined else ""
+    figure.suptitle(f"{name}: deflection lost on the way to the surface{note}", fontsize=12)
     return figure
+
+
+def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
+    """Return what is drawn grey: what has no loss near neutral, and what has none far out."""
+    rests = [bool(np.isnan(m.loss[:, 0]).any()) for each in maps.values() for m in each]
+    held = [
+        bool((np.isnan(m.loss[:, -1]) & ~np.isnan(m.loss).all(axis=1)).any())
+        for each in maps.values()
+        for m in each
+    ]
+    where = ["within the breakout"] if any(rests) else []
+    where += ["beyond where the grip can go"] if any(held) else []
+    return f"grey: {' and '.join(where)}" if where else ""
 
 
 def _pressure(system: System) -> Shown:

@@ -9,7 +9,7 @@ which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a play
 host reads it with a digital one. The schedule has the q̄ that it gets, drifts stand as at `time_s`.
 
 The law is set-valued where something holds the loader still. At neutral it rests in its breakout
-under any F between F(0−) and F(0+); at its stop under any F beyond F(travel).
+under any F between F(0−) and F(0+); at its stop under any F beyond that at the stop.
 
 Left out is what is a band about this line: friction, the bend's hysteresis, whose middle is here,
 and a play that the servo takes along, half of its width to either side. `equations` has the linear
@@ -21,7 +21,7 @@ kernel that is kept on disk.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -46,6 +46,7 @@ Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
 
 
+_NO_FORCE_N = 1e-9  # rounding of no force
 _HALVINGS = 200  # from the widest force to the last digit of a double, and more
 
 
@@ -122,7 +123,8 @@ def static_point(
 ) -> Statics:
     """Return the point of the static line at which the grip stands at δ in d.
 
-    Where the loader rests in its breakout, or at its stop, it is moved by the structure alone.
+    Where the loader rests in its breakout, or at its stop, it is moved by the structure alone, and
+    between the contacts of a play without a force.
     On a rigid structure δ is not to be zero. `time_s` since the start is the time at which drifts
     of scale and multiplier stand; `load_factor` in g, +1 in level flight, acts on a bob weight.
     """
@@ -133,7 +135,14 @@ def static_point(
     weight = rig.controls[cast(ControlName, control)].loader.bob_weight * (load_factor - 1.0)
     found = _point_at(packed, float(pressure_Pa), others.leaked - weight, wanted)
     computed, force = (np.array([value]) for value in found)
-    return _line(rig, control, pressure_Pa, packed, frame, computed, force, others)
+    point = _line(rig, control, pressure_Pa, packed, frame, computed, force, others)
+    loader = rig.controls[cast(ControlName, control)].loader
+    if loader.play * loader.play_stiffness > 0.0 and abs(found[1]) < _NO_FORCE_N:
+        at = np.array([float(deflection)])  # between the contacts of the play
+        return replace(
+            point, deflection=at, specified=specified_force(rig, control, pressure_Pa, at)
+        )
+    return point
 
 
 def _line(
@@ -262,7 +271,7 @@ def _point_at(
         if deflection >= _yields(p.linkage, down):
             return 0.0, _force_for(p.linkage, deflection, down, up)
         side = -1.0
-    near, far = 0.0, p.loader.travel
+    near, far = 0.0, p.loader.aft if side > 0.0 else p.loader.forward
     stopped = _force(p, s, side * far, read, side) - leaked
     over = side * (deflection - side * far - _yields(p.linkage, stopped))
     if over > 0.0:

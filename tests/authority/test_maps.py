@@ -13,6 +13,7 @@ from coupled.cli import app
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, configure
 from coupled.flight.pilot import Step
+from coupled.plots.maps import draw_losses
 from coupled.record.csvfile import read_columns
 from coupled.resources import find, shipped_rigs
 from coupled.rig.equations import specified_gradient
@@ -53,6 +54,22 @@ def test_stick_force_is_as_specified_with_and_without_compensation(rig: str) -> 
         # Stable in speed. The 737's knot is less than the bend moves within the breakout.
         rests = rig == "737" and name == "compensated"
         assert np.all(np.isnan(found.per_knot_N[name]) if rests else found.per_knot_N[name] > 0.0)
+
+
+def test_the_figure_says_what_its_grey_is() -> None:
+    """With no number at all, too: numpy's warnings are errors in these tests."""
+    place = "controls.column.loader."
+
+    def said(changes: dict[str, float]) -> str:
+        rig = bench({place + key: value for key, value in changes.items()})
+        drawn = draw_losses("r", {"column": loss_maps(rig, "column")}, {"column": np.empty((2, 0))})
+        return drawn.get_suptitle().removeprefix("r: deflection lost on the way to the surface")
+
+    assert said({}) == ""
+    assert said({"breakout_N": 9.0}) == " (grey: within the breakout)"
+    assert said({"breakout_N": 3e4}) == " (grey: within the breakout)"
+    rigid_stop = {"bend_m_per_N": 0.0, "stop_aft_m": 0.03}
+    assert said(rigid_stop) == " (grey: beyond where the grip can go)"
 
 
 def felt(rig: Rig) -> Feel:

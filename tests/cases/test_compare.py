@@ -125,6 +125,23 @@ def test_the_stop_is_that_of_the_trim_while_the_control_is_held(
     assert (stop is None) is lost
 
 
+def test_a_surface_that_comes_to_its_stop_while_the_control_is_held_loses_nothing() -> None:
+    """The c172p's wheel at 1.39 of 1.40 rad: its friction lets it settle over the first frames."""
+    found = coupled.compare(
+        coupled.load_rig("c172p"),
+        wheel=coupled.Clamp(deflection_rad=1.39, duration_s=3.0),
+        duration_s=5.0,
+        configurations=["rigid", "uncompensated"],
+    )
+    rigid, bent = (found.flight(name) for name in ("rigid", "uncompensated"))
+    late = bent.record.time_s > 3.0
+    assert np.ptp(bent.record["aileron_rad"][late & (bent.record.time_s < 3.9)]) == 0.0
+    assert bent.record["aileron_rad"].max() == rigid.record["aileron_rad"].max()
+    assert bent.outcome.surface_stop_norm == rigid.outcome.surface_stop_norm
+    assert bent.outcome.loss == pytest.approx(0.0, abs=1e-4)
+    assert bent.outcome.loss_closed_form == pytest.approx(0.0, abs=1e-9)
+
+
 def test_an_aircraft_with_laws_of_its_own_has_no_known_stop() -> None:
     rig = coupled.load_rig("c172p").changed({"flight.direct_controls": False})
     flight = coupled.fly(rig, column=coupled.Clamp(deflection_m=0.09), duration_s=2.0)
@@ -160,6 +177,7 @@ STATICS: dict[str, dict[str, Any]] = {
     "slope": {"controls.column.schedule.slope": 0.9},
     "stretch": {"controls.column.rigging.stretch_loss_per_Pa": 3e-5},
     "rigging": {"controls.column.rigging.offset_norm": 0.02},
+    "stops": {LOADER + "stop_aft_m": 0.041, LOADER + "stop_forward_m": 0.0405},
     "gradient's converter": {
         **{SENSING + "word_length_bits": 12, SENSING + "full_scale_V": 100.0},
         **{SENSING + "s1_V_per_m": 500.0, SENSING + "s2_V_per_N": 0.4, SENSING + "s3_V_per_N": 0.2},
@@ -177,12 +195,14 @@ def test_the_closed_form_is_what_is_flown(name: str, side: float, multiplier: st
     manoeuvre = Manoeuvre(rig, {"column": clamp}, 5.0, bench=STATIC)
     for configuration in ("uncompensated", "compensated"):
         flown = fly_and_judge(manoeuvre.configured(configuration), configuration)
-        # A drift goes on, a limited force settles slowly, and readings have steps.
-        loose = {"drift of S1": 1e-3, "drift of the multiplier": 1e-3, "limit": 5e-4}
+        # A drift goes on, a hand presses slowly into a limit or a stop, and readings have steps.
+        slow = {"limit": 5e-4, "stops": 1e-3}
+        loose = {"drift of S1": 1e-3, "drift of the multiplier": 1e-3, **slow}
         figures, within = flown.outcome, {**loose, "gradient's converter": 2e-3}.get(name, 2e-4)
         assert figures.loss == pytest.approx(figures.loss_closed_form, abs=within)
         assert figures.felt_ratio == pytest.approx(figures.felt_ratio_closed_form, abs=within)
-        assert figures.hand_travel_norm == pytest.approx(side * PULL_m / 0.1778, rel=3e-3)
+        short = 1e-2 if name == "stops" else 3e-3
+        assert figures.hand_travel_norm == pytest.approx(side * PULL_m / 0.1778, rel=short)
 
 
 @pytest.mark.parametrize("key", ["deflection_zero_m", "arc"])
@@ -274,6 +294,24 @@ def test_a_point_has_the_deflection_that_is_asked_for(share: float) -> None:
                 assert line.force[0] == pytest.approx(point.force[0], rel=1e-12)
 
 
+@pytest.mark.parametrize("offset_N", [0.0, 12.0])
+@pytest.mark.parametrize("share", [-0.9, -0.2, 0.0, 0.5])
+def test_between_the_contacts_of_a_play_the_grip_stands_where_it_is(
+    offset_N: float, share: float
+) -> None:
+    """F = 0 where G·δc = F_offset, and any δ of δc ± play/2."""
+    soft = {LOADER + "play_m": 0.004, LOADER + "play_stiffness_N_per_m": 1e4}
+    rig = bench({**soft, LOADER + "offset_N": offset_N, LOADER + "bend_m_per_N": 0.0})
+    rig = configure(rig, "uncompensated")
+    computed = offset_N / G_STIFF
+    deflection = computed + share * 0.002
+    point = static_point(rig, "column", 3000.0, deflection)
+    assert point.deflection[0] == pytest.approx(deflection, abs=1e-15)
+    assert point.force[0] == pytest.approx(0.0, abs=1e-9)
+    assert point.estimate[0] == pytest.approx(computed, abs=1e-12)
+    assert point.specified[0] == pytest.approx(G_STIFF * deflection, abs=1e-12)
+
+
 def test_at_its_stop_the_structure_takes_what_the_hand_adds() -> None:
     """Beyond travel + K·F the loader stands at its stop, and F = (δ − travel)/K."""
     rig = bench()
@@ -282,6 +320,32 @@ def test_at_its_stop_the_structure_takes_what_the_hand_adds() -> None:
     assert point.force[0] == pytest.approx((0.25 - 0.1778) / K_REPORT, rel=1e-9)
     rigid = static_point(configure(rig, "rigid"), "column", 3000.0, 0.1778 * (1.0 + 1e-12))
     assert rigid.force[0] == pytest.approx(G_STIFF * 0.1778, rel=1e-9)
+
+
+@pytest.mark.parametrize(("side", "stop_m"), [(1.0, 0.03), (-1.0, 0.025)])
+def test_at_a_stop_within_the_travel_the_structure_takes_the_rest(
+    side: float, stop_m: float
+) -> None:
+    """F = (δ − stop)/K on either side; uncompensated, 1 − stop/δ of the command is lost."""
+    stops = {LOADER + "stop_aft_m": 0.03, LOADER + "stop_forward_m": 0.025}
+    rig = configure(bench(stops), "uncompensated")
+    point = static_point(rig, "column", 3000.0, side * PULL_m)
+    assert point.computed[0] == side * stop_m
+    assert point.force[0] == pytest.approx(side * (PULL_m - stop_m) / K_REPORT, rel=1e-9)
+    assert point.estimate[0] == side * stop_m
+
+
+def test_a_map_has_the_stop_within_the_travel() -> None:
+    rig = bench({LOADER + "stop_aft_m": 0.03})
+    maps = {each.configuration: each for each in loss_maps(rig, "column")}
+    bent = maps["uncompensated"]
+    beyond = bent.deflection > 0.04
+    assert bent.loss[-1, beyond] == pytest.approx(1.0 - 0.03 / bent.deflection[beyond], abs=1e-9)
+    assert maps["compensated"].loss[-1] == pytest.approx(0.0, abs=1e-9)
+    rigid = bench({LOADER + "stop_aft_m": 0.03, LOADER + "bend_m_per_N": 0.0})
+    [held] = [each for each in loss_maps(rigid, "column") if each.configuration == "uncompensated"]
+    assert np.isnan(held.loss[-1, held.deflection > 0.031]).all()  # the grip does not go so far
+    assert held.loss[-1, held.deflection < 0.029] == pytest.approx(0.0, abs=1e-9)
 
 
 # A pull within breakout and friction
@@ -333,6 +397,38 @@ def test_what_moves_the_loader_has_shares(force_N: float, rests: bool, stiffness
     assert np.isfinite(found.loss) is not rests
 
 
+def test_a_breakout_that_the_host_raises_is_said() -> None:
+    """The host adds K·G·F_BO to 9 N of breakout: 9.2 N move the loader without that correction."""
+    manoeuvre = Manoeuvre(
+        bench({LOADER + "breakout_N": 9.0}),
+        {"column": coupled.Step(force_N=9.2)},
+        3.0,
+        bench=STATIC,
+        configurations=("uncompensated", "compensated"),
+    )
+    [said] = compare([manoeuvre]).remarks()
+    assert "9.2 N (compensated), where the correction of the gradient raises the breakout." in said
+
+
+def test_where_a_service_holds_the_control_nothing_is_felt() -> None:
+    """The shipped run: the hand lets go, and the trim keeps the stick where it was left."""
+    [case] = read_run(str(ROOT / "runs" / "force-trim.toml"))
+    outcome = fly_and_judge(case).outcome
+    assert np.isnan(outcome.felt_ratio)
+    assert outcome.hand_travel_norm > 0.15
+
+
+def test_the_specified_force_acts_about_the_trim() -> None:
+    """A T-37's stick trimmed to 1 cm and held at 3 cm: two thirds of the force about neutral."""
+    rig = coupled.load_rig("t37").changed({LOADER + "friction_N": 0.0})
+    trim = {"service": "trim_m", "control": "column", "to": 0.01, "at_s": 0.0}
+    held = coupled.Clamp(deflection_m=0.03, start_s=0.5, duration_s=2.5)
+    found = coupled.compare(
+        rig, column=held, duration_s=3.0, event={"trim": trim}, configurations=["rigid"]
+    )
+    assert found.felt_ratio("rigid") == pytest.approx(1.0, abs=0.01)
+
+
 def test_a_jam_is_no_breakout() -> None:
     rig = coupled.load_rig("t37")
     jam = {"service": "jammed", "control": "column", "to": 1.0, "at_s": 0.0}
@@ -362,6 +458,14 @@ def test_a_correction_by_nothing_is_named_so(useless: Comparison) -> None:
     figure = draw_comparison(useless)
     ticks = [text.get_text() for text in figure.axes[2].get_xticklabels()]
     assert [tick.endswith("K̂ = 0") for tick in ticks] == [False, False, True, True, True]
+
+
+def test_a_structure_that_bends_under_a_push_alone_is_named_by_that() -> None:
+    bends = {LOADER + "bend_m_per_N": 0.0, LOADER + "bend_push_m_per_N": 2e-4}
+    rig = bench({**bends, HOST + "bend_m_per_N": 0.0})
+    push = Manoeuvre(rig, {"column": coupled.Clamp(deflection_m=-PULL_m)}, 2.0, bench=STATIC)
+    found = compare([replace(push, configurations=("compensated",))])
+    assert "the structure's K is 0.0002 m/N" in " ".join(found.remarks())
 
 
 def test_a_rigid_structure_and_a_known_bend_need_no_such_word() -> None:
@@ -415,6 +519,19 @@ def test_a_sweep_says_what_its_losses_are_shares_of(kind: str, tmp_path: Path) -
     assert (
         "What is lost is a share of what the hand asks for" in " ".join(done.stdout.split())
     ) is (kind == "force")
+
+
+@pytest.mark.parametrize("system", ["si", "us"])
+def test_travels_that_differ_are_written_apart(system: Any) -> None:
+    """8 N on a T-37's stick move it by 4.8 mm, and by 0.7 mm more on the bent structure."""
+    found = coupled.compare(
+        coupled.load_rig("t37"), column=coupled.Step(force_N=8.0, duration_s=3.0), duration_s=4.0
+    )
+    [said] = found.remarks(system)
+    words = said.split()
+    unit = {"si": "mm", "us": "in"}[system]
+    bent, rigid = (float(words[i - 1]) for i, word in enumerate(words) if word.strip(",") == unit)
+    assert bent > rigid
 
 
 def test_a_sweep_says_that_a_correction_corrects_nothing() -> None:

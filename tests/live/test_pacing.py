@@ -83,6 +83,18 @@ def test_of_a_hundred_frames_one_is_later_than_the_99th_percentile() -> None:
         assert said[f"late_{name}_ms"] == pytest.approx(1e3 * steps * step_s, abs=1e-4)
 
 
+def test_of_the_work_of_a_hundred_frames_one_took_longer_than_its_99th_percentile() -> None:
+    clock, step_s = Clock(), 2.0**-15
+    pacer = Pacer(FRAME_s, 102, clock, clock.sleep)
+    pacer.wait()
+    for k in np.random.default_rng(5).permutation(np.arange(101)):
+        clock.now += int(k) * step_s  # within its frame
+        pacer.wait()
+    said = pacer.result().as_dict()
+    for name, steps in (("p50", 50), ("p99", 99)):
+        assert said[f"work_{name}_ms"] == pytest.approx(1e3 * steps * step_s, abs=1e-4)
+
+
 @pytest.mark.parametrize(("late", "passed"), [(0.75, 0), (1.0, 1), (1.75, 1), (2.75, 2)])
 def test_a_deadline_is_missed_once_it_has_passed(late: float, passed: int) -> None:
     """A frame that begins `late` frames after its deadline: so many later ones have passed."""

@@ -18,7 +18,16 @@ from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.packing import pack
 from coupled.rig.rigfile import read_rig
-from coupled.rig.serving import LED, check_led, lead, led, noted, service_channels, services_of
+from coupled.rig.serving import (
+    LED,
+    check_led,
+    held_force,
+    lead,
+    led,
+    noted,
+    service_channels,
+    services_of,
+)
 from coupled.schema import build
 from tests.support.rigs import bench
 
@@ -151,6 +160,16 @@ def test_a_hand_that_lets_go_in_between_has_to_hold_for_the_whole_time_again() -
     times, forces = [0.0, 0.5, 0.51, 1.71, 1.72, 5.0], [0.0, 0.0, 60.0, 60.0, 0.0, 0.0]
     once = ForceTable(time_s=times, force_N=forces)
     assert at(flown(held, events, pilot=once), "autopilot", 3.9) == 0.0
+
+
+def test_an_autopilot_that_is_engaged_again_is_held_against_for_the_whole_time_again() -> None:
+    """60 N from 0.5 s on: it lets go at 1.5 s, and of the second time, from 2 s on, at 3 s."""
+    held = {**DRIVEN, "override_time_s": 1.0}
+    engage = {"service": "autopilot"}
+    events = {"engage": {**engage, "at_s": 0.1}, "again": {**engage, "at_s": 2.0}}
+    record = flown(held, events, 60.0)
+    stands = {time_s: at(record, "autopilot", time_s) for time_s in (1.3, 1.9, 2.1, 2.8, 3.2)}
+    assert stands == {1.3: 1.0, 1.9: 0.0, 2.1: 1.0, 2.8: 1.0, 3.2: 0.0}
 
 
 def test_an_autopilot_engages_where_the_control_is() -> None:
@@ -352,6 +371,9 @@ def test_the_hinge_moment_follows_the_change_of_the_angle_of_attack() -> None:
     assert np.max(np.abs(wanted)) > 5.0
     # A row holds the force over the frame before it.
     assert force[1:] == pytest.approx(wanted[:-1], abs=1e-9)
+    replayed = held_force(rig, record, "column")
+    assert replayed is not None
+    assert replayed == pytest.approx(wanted, abs=1e-12)
 
 
 def test_a_feel_that_fails_leaves_its_share_of_the_gradient() -> None:

@@ -80,7 +80,7 @@ def summary(
             *map(in_time, found.effects),
             _since(found),
             _sure(found),
-            _closes(shrink),
+            closes(shrink),
             in_flight,
         ]
     said += [filtered, next_test]
@@ -134,7 +134,10 @@ def _explained(
         return (
             f"No effect of the library explains the {stage.name}'s gap of {stage.gap:.3g} floors."
         )
-    shares = [f"{_effect(e)}, explains {_per_cent(budget.of(e.name))}" for e in acting]
+    shares = [
+        f"{_effect(e)}{',' if e.parameters else ''} explains {_per_cent(budget.of(e.name))}"
+        for e in acting
+    ]
     said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
     if not stage.unexplained or stage.remains is None:
         return f"{said}; what remains is {floor}."
@@ -282,12 +285,15 @@ def _sure(found: Findings) -> str:
     return f"Probability {min(effect.probability for effect in found.effects):.2f}."
 
 
-def _closes(shrink: Shrink) -> str:
+def closes(shrink: Shrink) -> str:
+    """Return how much of the widest gap closes on held-out data, with its interval."""
     most = shrink.widest
     if most.closed is None or most.low is None or most.high is None:
         return ""
     few = "" if most.reliable else ", from too few stretches to rely on"
-    ends = f"{100 * most.low:.0f} to {100 * most.high:.0f} %{few}"
+    ends = f"{round(100 * most.low)} to {round(100 * most.high)} %{few}"
+    if few and most.low <= 0.0:  # some stretches hold no gap to close
+        ends = "from too few stretches for an interval"
     return f"It closes {100 * most.closed:.0f} % of the gap on held-out data ({ends})."
 
 
