@@ -1,4 +1,4 @@
-"""Which law of the library contains which: it is the other at some value of a further parameter."""
+"""Laws that contain one another, and the numbers that effects free."""
 
 from __future__ import annotations
 
@@ -6,22 +6,10 @@ from collections.abc import Iterable, Sequence
 
 from coupled.gap.effects.effect import Effect
 
-CONTAINS: dict[str, tuple[str, ...]] = {
-    "presliding_friction": ("coulomb_friction",),
-    "stribeck_friction": ("coulomb_friction", "presliding_friction"),
-    "asymmetric_friction": ("coulomb_friction",),
-    "soft_backlash": ("backlash",),
-    "stiffening_bend": ("bend",),
-    "bend_hysteresis": ("bend",),
-    "structural_mode": ("bend",),
-    "servo_delay": ("servo_lag",),
-    "servo_tuning": ("servo_lag", "servo_delay"),
-}
-
 
 def contains(law: Effect, other: Effect) -> bool:
     """Tell whether a law contains another."""
-    return other.name in CONTAINS.get(law.name, ())
+    return other.name in law.contains
 
 
 def keys_of(effects: Iterable[Effect]) -> set[str]:

@@ -157,6 +157,7 @@ class Effect:
     `mark`         the output that shows it by what it repeats, be it within its limit
     `of_sensor`    it is one of the sensor of δc, which a set point has none of
     `reserve`      it passes for others: only tried in a second search (`search`)
+    `contains`     the laws that it is at some value of a further parameter (`beam`)
     """
 
     name: str
@@ -179,6 +180,7 @@ class Effect:
     mark: str = ""
     of_sensor: bool = False
     reserve: bool = False
+    contains: tuple[str, ...] = ()
 
     @property
     def free(self) -> tuple[Parameter, ...]:

@@ -72,6 +72,7 @@ FRICTIONS: tuple[Effect, ...] = (
         _DRAWN,
         dry=True,
         alike=Likeness("coulomb_friction", "loader.friction_N", _breaks_away),
+        contains=("coulomb_friction", "presliding_friction"),
     ),
     Effect(
         "presliding_friction",
@@ -79,6 +80,7 @@ FRICTIONS: tuple[Effect, ...] = (
         (_level(1.5), replace(_CONTACT, scanned=False, shape=True, inverse=True), _ELASTIC),
         _DRAWN,
         dry=True,
+        contains=("coulomb_friction",),
     ),
     # By itself it is the same law as plain friction of the mean with a constant force of half the
     # difference, however the control is moved.
@@ -89,6 +91,7 @@ FRICTIONS: tuple[Effect, ...] = (
         _DRAWN,
         dry=True,
         even=("coulomb_friction", "force_offset"),
+        contains=("coulomb_friction",),
     ),
     Effect(
         "load_friction",

@@ -33,6 +33,7 @@ LINKAGE: tuple[Effect, ...] = (
         "linkage",
         (real_bend(1e-4), limit("limit_{d}", "loader.bend_limit_{d}", 1e-4, 1, 5e-3, 2e-2)),
         Signature("force", "bent"),
+        contains=("bend",),
     ),
     one(
         "linkage",
@@ -55,6 +56,7 @@ LINKAGE: tuple[Effect, ...] = (
             ),
         ),
         Signature("force", "deflection_left", "loop"),
+        contains=("backlash",),
     ),
     Effect(
         "bend_hysteresis",
@@ -72,6 +74,7 @@ LINKAGE: tuple[Effect, ...] = (
             ),
         ),
         Signature("force", "bent", "loop", 6.0),
+        contains=("bend",),
     ),
     Effect(
         "structural_mode",
@@ -86,6 +89,7 @@ LINKAGE: tuple[Effect, ...] = (
             ),
         ),
         Signature("force", "bent", "loop", 1.5),
+        contains=("bend",),
     ),
     replace(
         one(
@@ -140,8 +144,12 @@ LINKAGE: tuple[Effect, ...] = (
             ),
             Signature("speed", "deflection_left", "law", 0.8),
             reserve=True,
+            contains=contains,
         )
-        for name, more in (("servo_delay", ()), ("servo_tuning", (DAMPING_RATIO,)))
+        for name, more, contains in (
+            ("servo_delay", (), ("servo_lag",)),
+            ("servo_tuning", (DAMPING_RATIO,), ("servo_lag", "servo_delay")),
+        )
     ),
     one(
         "linkage",
