@@ -81,12 +81,12 @@ def _why_constant(rig: Rig, record: Record, control: ControlName) -> str:
     most = float(np.max(np.abs(record[force])))
     if most == 0.0:
         return f"no force moves the {control}, or a sensor is stuck"
-    loader = rig.controls[control].loader
-    holds = loader.breakout + loader.friction
-    if most <= holds:
+    loader, computed = rig.controls[control].loader, channel(control, "computed")
+    if computed not in record or plausible.is_constant(record[computed]):
+        holds = loader.breakout + max(loader.friction, loader.breakaway)
         return (
-            f"the force reaches {most:.4g} N, and breakout and friction hold {holds:.4g} N; "
-            "record a larger force"
+            f"{most:.4g} N do not move the {control} (breakout and friction hold {holds:.4g} N in "
+            "the rig file), or a sensor is stuck; record a larger force"
         )
     return "a sensor that is stuck"
 

@@ -67,7 +67,11 @@ def test_a_surface_map_gives_the_position_between_its_commands(name: str) -> Non
     ("force_N", "said"),
     [
         ({"wheel": 20.0}, "no force moves the column, or a sensor is stuck"),
-        ({"column": 30.0}, r"the force reaches 30 N, and breakout and friction hold \d+ N; record"),
+        ({"column": 30.0}, r"30 N do not move the column \(breakout and friction hold 60 N in the"),
+        (
+            {"column": 77.0},
+            r"77 N do not move the column \(.*or a sensor is stuck; record a larger",
+        ),
     ],
 )
 def test_a_control_that_no_force_moves_has_no_stuck_sensor(
@@ -99,3 +103,16 @@ def test_a_sensor_that_is_stuck_while_a_force_moves_the_control_is_named() -> No
 def test_stretches_without_a_gap_give_no_interval(low: float, reliable: bool, said: str) -> None:
     one = ChannelShrink("x", 1.0, 0.0, 0.0, 3, closed=1.0, low=low, high=1.0, reliable=reliable)
     assert closes(Shrink(one, (one,))) == f"It closes 100 % of the gap on held-out data {said}."
+
+
+@pytest.mark.parametrize("lacks", ["computed", "estimate"])
+def test_an_airframe_whose_command_is_unknown_is_not_judged(lacks: str) -> None:
+    """The 737's yaw damper moves the rudder too, so that its position does not give the command."""
+    rig = api.load_rig("737")
+    record = flown(rig, {"pedals": 150.0})
+    dropped = {channel("pedals", quantity) for quantity in ("estimate", lacks)}
+    kept = [i for i, name in enumerate(record.channels) if name not in dropped]
+    record = api.Record(tuple(record.channels[i] for i in kept), record.data[:, kept])
+    found = api.diagnose(rig, record, "pedals")
+    assert (found.verdict, found.guilty) == ("no_gap", ()), found.summary
+    assert found.stage("airframe").missing == ("pedals_estimate_m",)

@@ -116,8 +116,12 @@ def test_a_record_ends_where_its_loader_did() -> None:
     assert len(part) == 720
     assert "in which the loader sent no new sample" in judged_of(record).left_out[0]
     marks[500:] = LOST
-    with pytest.raises(InputError, match=r"r\.csv: validity: .* at 4\.2 s; .* Left out: 16 s"):
+    marks[100:110] = FADED
+    with pytest.raises(
+        InputError, match=r"r\.csv: validity: .* at 4\.2 s; .* Left out: 16 s"
+    ) as said:
         judged_part(made(validity=marks), "r.csv")
+    assert ".." not in str(said.value)
 
 
 def test_spells_of_an_older_record_are_known_by_its_manifest() -> None:

@@ -141,7 +141,8 @@ class Judge:
             shown = ("loader",) if name == "linkage" and with_loader else ()
             return StageResult(name, why=known[name], shown_in=shown)
         if name == "airframe" and flown:
-            lacking = [n for n in needs(self.rig) if n not in self.readers[0].record]
+            record = self.readers[0].record
+            lacking = [n for n in needs(self.rig, record) if n not in record]
             return StageResult(name, missing=tuple(lacking))
         return None
 

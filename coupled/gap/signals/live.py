@@ -144,7 +144,9 @@ def judged_part(record: Record, file: object) -> Record:
             f" {frame_s * whole:.1f} s; {SHORTEST_s:g} s are needed, and {SHORTEST_RECORD_s:g} s of"
             " record"
         )
-        raise InputError(file, VALIDITY, ". ".join((problem, *live.left_out)))
+        raise InputError(
+            file, VALIDITY, " ".join((f"{problem}.", *live.left_out)).removesuffix(".")
+        )
     return record.rows(0, whole)
 
 

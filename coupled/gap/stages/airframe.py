@@ -30,7 +30,7 @@ from coupled.gap.stages.openloop import Flown, Moved, flown_in, fly_open_loop
 from coupled.gap.stages.surfaces import moved, surface_channel, surface_points
 from coupled.gap.stages.trim import Trim, trim_of
 from coupled.gap.thresholds import FLIGHT_KNOWN, UNTRIMMED
-from coupled.record.channels import motion_channels
+from coupled.record.channels import ControlName, channel, motion_channels
 from coupled.record.record import Record
 from coupled.rig.parameters import Flight
 from coupled.rig.recorder import stamped
@@ -130,9 +130,23 @@ def _digest(moved: Sequence[Moved]) -> bytes:
     return found.digest()
 
 
-def needs(rig: Rig) -> tuple[str, ...]:
-    """Return the channels without which the airframe cannot be judged."""
-    return (RATE, surface_channel("column")) if "column" in rig.controls else (RATE,)
+def needs(rig: Rig, record: Record) -> tuple[str, ...]:
+    """Return the channels without which the airframe cannot be judged by this record.
+
+    Among them the command of a control that was moved, where no surface position gives it.
+    """
+    own = (surface_channel("column"),) if "column" in rig.controls else ()
+    found: tuple[str, ...] = (RATE, *own)
+    for control in rig.controls:
+        by_position = surface_channel(control) in record and surface_points(rig, control)
+        if not by_position and _was_moved(record, control):
+            found += (channel(control, "estimate"), "dynamic_pressure_Pa")
+    return found
+
+
+def _was_moved(record: Record, control: ControlName) -> bool:
+    names = (channel(control, quantity) for quantity in ("force", "computed", "deflection"))
+    return any(name in record and np.ptp(record[name]) > 0.0 for name in names)
 
 
 def airframe_outputs(
@@ -142,7 +156,7 @@ def airframe_outputs(
 
     `flights` are those of the same record that are known.
     """
-    if rig.flight is None or any(name not in record for name in needs(rig)):
+    if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
     known = motion_channels(list(rig.controls), flown=True)
     by_laws = [surface_channel(c) for c in rig.controls if surface_points(rig, c) is None]
