@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from coupled.arguments import public
+from coupled.errors import InputError
 from coupled.record import record as files
 from coupled.record.importing import convert
 from coupled.record.importing.account import ImportAccount
@@ -84,5 +85,7 @@ def import_log(
     ('time_s', 'column_force_N')
     '''
     logs = [log] if isinstance(log, (str, PathLike)) else log
+    if not logs:
+        raise InputError("import_log", "log", "is empty; give a log's path, or several")
     map_file = None if log_map is None else Path(log_map)
     return convert.import_log([Path(each) for each in logs], map_file, rig)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tomllib
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupled import InputError, import_log
 from coupled.record.record import read_record
 from tests.support.commands import coupled
 
@@ -173,3 +175,162 @@ def test_lists_of_lists_are_no_numbers(tmp_path: Path) -> None:
     shutil.copyfile(folder / "m-nested.toml", folder / "map.toml")
     remapped(folder, ('element = "?"', "element = 1"))
     assert "force_lbf: holds List(List(Float64))" in refused(folder, "nested.parquet")
+
+
+# Of the same kinds, in other forms
+
+
+COLUMNS = ("F", "DC", "D", "Q")
+RATE_Hz, ROWS = 200.0, 400
+
+
+def pulled() -> dict[str, np.ndarray]:
+    """Return time, force, computed deflection, deflection and dynamic pressure of a slow pull."""
+    time_s = np.arange(ROWS) / RATE_Hz
+    force_N = 25.0 * np.sin(4.0 * time_s)
+    computed_m = force_N / 1500.0
+    return {
+        "t": time_s,
+        "F": force_N,
+        "DC": computed_m,
+        "D": computed_m + 2e-5 * force_N,
+        "Q": np.full(ROWS, 3000.0),
+    }
+
+
+def mapped(folder: Path, clock: str = "", more: str = "", **source: str) -> None:
+    """Write a map; `source` gives a column's name, `<name>_more` further keys of its channel."""
+    names = ("pedals_force_N", "pedals_computed_m", "pedals_deflection_m", "dynamic_pressure_Pa")
+    text = f'{more}[clock]\nfrom = "{source.get("t", "t")}"\n{clock}'
+    for column_, name in zip(COLUMNS, names, strict=True):
+        unit = name.rpartition("_")[2]
+        text += f'\n[channels.{name}]\nfrom = "{source.get(column_, column_)}"\nunit = "{unit}"\n'
+        text += source.get(f"{column_}_more", "")
+    (folder / "map.toml").write_text(text)
+
+
+def csv(folder: Path, columns: dict[str, np.ndarray], units: str = "") -> None:
+    rows = [",".join(f"{x:.9g}" for x in row) for row in zip(*columns.values(), strict=True)]
+    head = [",".join(columns), *([units] if units else [])]
+    (folder / "log.csv").write_text("\n".join([*head, *rows]))
+
+
+def test_times_in_a_unit_that_nobody_gave_are_refused(tmp_path: Path) -> None:
+    """Of a clock in ns, read as s, the rows would come at 2e-7 Hz."""
+    csv(tmp_path, {**pulled(), "t": np.arange(ROWS) * 5e6})
+    mapped(tmp_path)
+    assert "its rows come at 2e-07 Hz" in refused(tmp_path, "log.csv")
+    mapped(tmp_path, clock='unit = "ns"\n')
+    assert len(imported(tmp_path, "log.csv")["time_s"]) == ROWS
+
+
+def test_a_clock_whose_unit_is_none_of_time_is_refused(tmp_path: Path) -> None:
+    csv(tmp_path, pulled(), units="ticks,N,m,m,Pa")
+    mapped(tmp_path, more="[log]\nunits_row = true\n")
+    assert "t: the log states 'ticks', no unit of time; give clock.unit" in refused(
+        tmp_path, "log.csv"
+    )
+
+
+def test_a_point_beside_a_decimal_comma_is_refused(tmp_path: Path) -> None:
+    """3.000 in a German log is three thousand."""
+    lines = ["t;F;DC;D;Q", *(f"{i / 100:.2f};1,5;0,01;0,01;".replace(".", ",") for i in range(50))]
+    (tmp_path / "log.csv").write_text("3.000\n".join(lines).replace("Q3.000", "Q") + "3.000")
+    mapped(tmp_path, more='[log]\ndelimiter = ";"\ndecimal = ","\n')
+    assert "Q: row 2 holds '3.000'; log.decimal is a comma" in refused(tmp_path, "log.csv")
+
+
+def test_an_angle_by_a_wrong_period_is_refused(tmp_path: Path) -> None:
+    columns = pulled()
+    counts = np.round(columns["DC"] * 1e4) % 4000
+    csv(tmp_path, {**columns, "DC": counts})
+    keys = "scale = 1e-4\nunwrap = true\nwraps_at = "
+    mapped(tmp_path, DC_more=f"{keys}4096\n")
+    assert "crosses wraps_at = 4096 by" in refused(tmp_path, "log.csv")
+    mapped(tmp_path, DC_more=f"{keys}4000\n")
+    found = imported(tmp_path, "log.csv")["pedals_computed_m"]
+    np.testing.assert_allclose(found, columns["DC"], atol=0.51e-4)
+
+
+def test_an_angle_that_starts_again_is_in_doubt(tmp_path: Path) -> None:
+    columns = pulled()
+    csv(tmp_path, {**columns, "DC": columns["DC"] % 0.4})
+    mapped(tmp_path)
+    done = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "r.csv")
+    assert "jumps over its whole range" in " ".join(done.stdout.split())
+
+
+def test_packed_numbers_of_hdf5_are_unpacked(tmp_path: Path) -> None:
+    """By the conventions of netCDF: scale, offset, and the number that means none."""
+    h5py = pytest.importorskip("h5py")
+    columns = pulled()
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in columns.items():
+            file[name] = values
+        del file["F"]
+        counts = np.round((columns["F"] + 400.0) / 0.1).astype("u2")
+        counts[7] = 65535
+        file["F"] = counts
+        file["F"].attrs.update({"scale_factor": 0.1, "add_offset": -400.0, "_FillValue": 65535})
+    mapped(tmp_path)
+    found = imported(tmp_path, "log.h5")["pedals_force_N"]
+    np.testing.assert_allclose(found, columns["F"], atol=0.051)
+
+
+def test_samples_that_an_mdf_calls_invalid_are_empty(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    columns = pulled()
+    invalid = np.zeros(ROWS, dtype=bool)
+    invalid[70:72] = True
+    wrong = np.where(invalid, 9999.0, columns["F"])
+    signals = [
+        asammdf.Signal(wrong, columns["t"], name="F", invalidation_bits=invalid),
+        *(asammdf.Signal(columns[name], columns["t"], name=name) for name in COLUMNS[1:]),
+    ]
+    with asammdf.MDF() as file:
+        file.append(signals)
+        file.save(tmp_path / "log.mf4")
+    mapped(tmp_path, t="time")
+    found = imported(tmp_path, "log.mf4")["pedals_force_N"]
+    np.testing.assert_allclose(found, columns["F"], atol=0.01)
+
+
+@pytest.mark.parametrize("form", ["objects", "identifiers"])
+def test_joints_that_change_places_are_read_by_name(tmp_path: Path, form: str) -> None:
+    """Each joint an object with its name, or numbers beside a list of identifiers."""
+    writing = pytest.importorskip("mcap.writer")
+    columns = pulled()
+    with (tmp_path / "log.mcap").open("wb") as file:
+        writer = writing.Writer(file)
+        writer.start()
+        schema = writer.register_schema("joints", "jsonschema", b"{}")
+        channel = writer.register_channel("/j", "json", schema)
+        for row in range(ROWS):
+            motor, grip = columns["DC"][row], columns["D"][row]
+            joints = [(1, columns["F"][row], motor), (2, 0.0, grip)][:: 1 if row % 3 else -1]
+            message: dict[str, object] = {"t": columns["t"][row], "Q": 3000.0}
+            if form == "objects":
+                message["x"] = [{"name": f"j{i}", "f": f, "p": p} for i, f, p in joints]
+            else:
+                ids, forces, places = zip(*joints, strict=True)
+                message["x"] = {"ids": ids, "f": forces, "p": places}
+            writer.add_message(channel, row, json.dumps(message).encode(), row)
+        writer.finish()
+    by_place, by_name = ("x[{0}].{1}", "x[j{0}].{1}")
+    if form == "identifiers":
+        by_place, by_name = ("x.{1}[{0}]", "x.{1}[id {0}]")
+    place = {"DC": by_place.format(0, "p"), "D": by_place.format(1, "p")}
+    mapped(tmp_path, t="/j.t", F=f"/j.{by_place.format(0, 'f')}", Q="/j.Q", **place)
+    said = refused(tmp_path, "log.mcap")
+    assert "in one message and" in said
+    assert f"as /j.{by_name.format(2, 'f')}" in said
+    named = {"DC": f"/j.{by_name.format(1, 'p')}", "D": f"/j.{by_name.format(2, 'p')}"}
+    mapped(tmp_path, t="/j.t", F=f"/j.{by_name.format(1, 'f')}", Q="/j.Q", **named)
+    found = imported(tmp_path, "log.mcap")
+    np.testing.assert_allclose(found["pedals_computed_m"], columns["DC"], atol=1e-12)
+    np.testing.assert_allclose(found["pedals_deflection_m"], columns["D"], atol=1e-12)
+
+
+def test_no_log_at_all_is_named() -> None:
+    with pytest.raises(InputError, match="import_log: log: is empty"):
+        import_log([], "map.toml")

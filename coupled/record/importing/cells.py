@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 Line = Callable[[int], int]
 ISO = "iso"
 _DAY_us = 86_400_000_000
+MOST_STEPS = 2.0  # across a period, in the largest other step, where the period is right
+PERIOD = 0.002  # of it, a tolerance for counts and noise
 FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is unknown
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -207,9 +209,33 @@ def _unwrapped(raw: Floats, channel: Channel, file: object, line: Line) -> Float
         )
         problem += " from the row before: too far to tell which way it turned"
         raise InputError(file, name, problem)
+    _check_period(np.flatnonzero(there), values, turned, channel, file, line)
     result = raw.copy()
     result[there] = turned
     return result
+
+
+def _check_period(
+    rows: NDArray[np.intp],
+    values: Floats,
+    turned: Floats,
+    channel: Channel,
+    file: object,
+    line: Line,
+) -> None:
+    """Refuse a period across which an angle steps farther than it does anywhere else."""
+    steps, period = np.abs(np.diff(turned)), channel.wraps_at or 0.0
+    across = np.abs(np.diff(values) - np.diff(turned)) > 0.5 * period
+    if not across.any() or across.all():
+        return
+    usual = float(steps[~across].max())
+    least = float(steps[across].min())
+    if least <= MOST_STEPS * usual + PERIOD * period:
+        return
+    row = int(rows[1:][across][0])
+    problem = f"row {line(row)} crosses wraps_at = {period:g} by {least:.4g}, where other rows are"
+    problem += f" {usual:.4g} apart at most: it starts again elsewhere, as at {np.ptp(values):.4g}?"
+    raise InputError(file, channel.source, problem)
 
 
 def moments(column: pl.Series, pattern: str, file: object, name: str, line: Line) -> pl.Series:

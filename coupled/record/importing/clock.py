@@ -28,6 +28,7 @@ EVEN_frames = 0.02  # stamps that stray less than this stand on the grid
 MARGIN_rows = 3.0  # kept beyond the cut, for the interpolation
 MOST_UPSAMPLED = 10.0  # more frames a row than this would be invention
 MOST_FRAMES = 20_000_000
+LEAST_RATE_Hz, MOST_RATE_Hz = 1.0, 1e5  # of rows, where the map gives no frame rate
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,8 @@ def lay_grid(
     start_s = float(time_s[first])
     rounding_s = _rounding(time_s)
     rate, median_s = (time_s.size - 1) / float(np.ptp(time_s)), float(np.median(np.diff(time_s)))
+    if not clock.frame_rate:
+        _check_rate(log, clock, 1.0 / median_s)
     wished = clock.frame_rate or frame_rate_Hz
     even = _frames_at(time_s - start_s, wished, rounding_s) if wished else None
     if wished is None:
@@ -186,6 +189,18 @@ def _frames_at(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
     if np.any(np.diff(frame) < 1.0) or stray_s > max(EVEN_frames / rate, 1.01 * rounding_s):
         return None
     return frame.astype(np.int64)
+
+
+def _check_rate(log: Log, clock: Clock, rate: float) -> None:
+    """Refuse rows at a rate that no control loader is logged at: their times have another unit."""
+    if LEAST_RATE_Hz <= rate <= MOST_RATE_Hz:
+        return
+    key = "unit" if clock.source else "rate_Hz"
+    problem = (
+        f"its rows come at {rate:.3g} Hz, outside {LEAST_RATE_Hz:g} to {MOST_RATE_Hz:g} Hz: is"
+    )
+    problem += f" clock.{key} right? If so, give clock.frame_rate_Hz"
+    raise InputError(log.file, clock.source, problem)
 
 
 def _own_rate(

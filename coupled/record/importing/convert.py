@@ -121,7 +121,7 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     if not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log states none")
     factor = factor_of(name, channel.unit or stated, map_file)
-    if channel.unit and stated and parse_unit(stated) not in (None, parse_unit(channel.unit)):
+    if channel.unit and stated and parse_unit(stated) != parse_unit(channel.unit):
         warnings.append(f"{name}: the map says {channel.unit}, the log itself {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)
     huge = np.abs(si) > LARGEST

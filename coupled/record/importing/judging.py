@@ -64,10 +64,18 @@ def _by_itself(name: str, values: Floats) -> list[str]:
     step = None if name.endswith("_stop") else plausible.quantised_step(values)
     if step is not None:
         doubts.append(f"quantised, step {step:.3g}")
+    row = plausible.starts_again(values) if _is_position(name) else None
+    if row is not None:
+        doubts.append(f"jumps over its whole range at row {row + 1}: an angle for wraps_at?")
     single = [] if name.endswith(("_stop", "_force_step_N")) else plausible.spikes(values)
     if single:
         doubts.append(f"{len(single)} spike{'s' if len(single) > 1 else ''}")
     return doubts
+
+
+def _is_position(name: str) -> bool:
+    ends = ("computed", "deflection")
+    return any(name == channel(control, end) for control in CONTROL_NAMES for end in ends)
 
 
 def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dict[str, list[str]]:

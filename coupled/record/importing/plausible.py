@@ -25,6 +25,8 @@ _FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
 _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
 TOGETHER = 0.6  # correlation of a force with a spring's, from which its size says its unit
+WHOLE_RANGE = 0.9  # of the range, over which a position that starts again jumps
+SMALL_STEP = 0.2  # of the range, which a logged position moves at most in a row
 _D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
 # Beyond these no channel of a rig or a transport aircraft in normal flight goes.
@@ -119,6 +121,23 @@ def spikes(values: Floats) -> list[int]:
     least = max(12.0 * noise_level(values), 0.02 * float(np.ptp(values)))
     single = (np.abs(deviation) > least) & (3.0 * spacing < np.abs(deviation))
     return [int(row) + 1 for row in np.flatnonzero(single)]
+
+
+def starts_again(values: Floats) -> int | None:
+    """Return the first row at which a position jumps over nearly all of its range, or None.
+
+    An angle or a counter that starts again does so; between jumps it moves in small steps. A
+    value that is back at the next row is a spike.
+    """
+    steps = np.abs(np.diff(values))
+    span = float(np.ptp(values))
+    jumps = np.flatnonzero(steps > WHOLE_RANGE * span)
+    others = steps[steps <= WHOLE_RANGE * span]
+    single = {row - 1 for row in spikes(values)} | set(spikes(values))
+    jumps = np.array([row for row in jumps if row not in single], dtype=np.int64)
+    if not jumps.size or not others.size or float(others.max()) > SMALL_STEP * span:
+        return None
+    return int(jumps[0]) + 1
 
 
 def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float | None:

@@ -86,7 +86,7 @@ class Log:
     def values(self, channel: Channel, map_file: Path, key: str) -> Floats:
         """Return a channel's column as doubles, signed, NaN where a cell is empty: (rows,)."""
         name = channel.source
-        column = self.point(self.find(name, map_file, f"{key}.from"))
+        column = self._pointed(name, self.find(name, map_file, f"{key}.from"))
         if channel.element is not None:
             names = labels_of(name, column, self.columns)
             where = Place(self.file, name, self.line)
@@ -99,6 +99,20 @@ class Log:
         if self.decimal == "." or column.dtype != pl.String:
             return column
         return column.str.replace_all(",", ".", literal=True)
+
+    def _pointed(self, name: str, column: pl.Series) -> pl.Series:
+        """Return `point` of a column; a point beside a decimal comma is refused.
+
+        It may be a decimal point, or set thousands apart.
+        """
+        if self.decimal == "," and column.dtype == pl.String:
+            points = column.str.contains(".", literal=True).fill_null(value=False).to_numpy()
+            if points.any():
+                row = int(np.argmax(points))
+                problem = f"row {self.line(row)} holds {shown(str(column[row]), 40)!r}; log.decimal"
+                problem += " is a comma: the point may be a decimal one, or set thousands apart"
+                raise InputError(self.file, name, problem)
+        return self.point(column)
 
     def times(self, clock: Stamped, map_file: Path, key: str) -> Stamps:
         """Return when each row was taken.
@@ -116,10 +130,11 @@ class Log:
         if column.dtype.is_temporal():
             unit = getattr(column.dtype, "time_unit", None)
             return _counted(column.to_physical(), {"ms": 10**3, "us": 10**6}.get(str(unit), 10**9))
-        column = self.point(column)
+        column = self._pointed(name, column)
         check_numeric(self.file, name, column)
         values = numbers(self.file, name, column, True, self.line, LATEST_ns)
-        factor = known_unit(clock.unit or self._time_unit(name), map_file, f"{key}.unit").factor
+        unit = clock.unit or self._time_unit(name, f"{key}.unit")
+        factor = known_unit(unit, map_file, f"{key}.unit").factor
         exact = Fraction(factor).limit_denominator(10**12)  # 1/1000, not the double next to it
         if column.dtype.is_integer() and column.len() and column[0] is not None:
             wide = column.cast(pl.Int64, strict=False) - int(column[0])
@@ -142,11 +157,16 @@ class Log:
         count[there] = np.unwrap(count[there], period=clock.wraps_at)
         return count
 
-    def _time_unit(self, name: str) -> str:
-        """Return the unit of time that the log states for a column, or s."""
-        stated, second = parse_unit(self.units.get(name, "")), parse_unit("s")
-        alike = stated is not None and second is not None and stated.dimension == second.dimension
-        return self.units[name] if alike else "s"
+    def _time_unit(self, name: str, key: str) -> str:
+        """Return the unit of time that the log states for a column; s where it states none."""
+        text = self.units.get(name, "").strip(" -[]()")
+        stated, second = parse_unit(text), parse_unit("s")
+        if stated is not None and second is not None and stated.dimension == second.dimension:
+            return text
+        if text:
+            problem = f'the log states {shown(text, 40)!r}, no unit of time; give {key}, as "ms"'
+            raise InputError(self.file, name, problem)
+        return "s"
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,7 @@ def _take(found: dict[str, Found], file: Any, item: Any, name: str, depth: int) 
     if values is None:
         return
     unit = _unit(item.attrs)
+    values = _unpacked(values, item.attrs)
     if values.dtype.names:
         for field in values.dtype.names:
             _keep(found, f"{name}.{field}", values[field], "")
@@ -154,9 +155,27 @@ def _word(value: Any) -> str:
 
 def _unit(attributes: Mapping[str, Any]) -> str:
     for key in UNITS:
-        if key in attributes and np.ndim(attributes[key]) == 0:
-            return _word(attributes[key])[:40].strip()
+        if key in attributes and np.size(attributes[key]) == 1:
+            return _word(np.ravel(attributes[key])[0])[:40].strip()
     return ""
+
+
+def _unpacked(values: Any, attributes: Mapping[str, Any]) -> Any:
+    """Return physical values where attributes of netCDF's conventions say how they are packed."""
+    scale, offset = _number(attributes, "scale_factor"), _number(attributes, "add_offset")
+    empty = [_number(attributes, key) for key in ("_FillValue", "missing_value")]
+    if values.dtype.kind not in "iuf" or {scale, offset, *empty} == {None}:
+        return values
+    lacking = np.isin(values, [each for each in empty if each is not None])
+    if scale is None and offset is None and not lacking.any():
+        return values
+    physical = values * (1.0 if scale is None else scale) + (offset or 0.0)
+    return np.where(lacking, np.nan, physical)
+
+
+def _number(attributes: Mapping[str, Any], key: str) -> float | None:
+    value = np.ravel(attributes[key]) if key in attributes else np.zeros(0)
+    return float(value[0]) if value.size == 1 and value.dtype.kind in "iuf" else None
 
 
 def _words(file: Any, item: Any) -> list[str]:

@@ -1,9 +1,9 @@
 """MCAP, as robots and test benches log, by mcap: messages in JSON, ROS 2's CDR or protobuf.
 
 The columns are `topic.field`. Elements of an array are `field[0]`; where a list of names of the
-same length stands beside it or above it in the message, they are `field[name]` too: the order of
-the joints in a `JointState` may change from message to message. ROS 1's messages are left out:
-their decoder makes a program of what the file says and runs it.
+same length stands beside it or above it in the message, or each element has a `name` or an `id`,
+they are `field[name]` too: the order of joints may change from message to message. ROS 1's
+messages are left out: their decoder makes a program of what the file says and runs it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_num
 DEEPEST = 6  # messages within messages
 LONGEST = 64  # elements of an array that become columns
 STAMPS = "log_time"
-NAMES = ("names", "name", "labels", "ids")  # how fields with names of elements end
+NAMES = ("name", "names", "label", "labels", "id", "ids")  # how fields with names of elements end
+IDENTIFIERS = ("id", "ids", "joint_id", "joint_ids")  # whose numbers name elements
 Labels = tuple[list[str], ...]
 TIMES = ({"sec", "nanosec"}, {"seconds", "nanos"}, {"sec", "nsec"})
 
@@ -97,7 +98,8 @@ def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
         if len(called) > 1:
             first, other = (shown(word, 40) or "without a name" for word in called[:2])
             refused = f"is {first} in one message and {other} in another: give it by its name, as"
-            refused += f" {topic}.{name.rpartition('[')[0]}[{first}]"
+            array, _, field = name.rpartition("[")
+            refused += f" {topic}.{array}[{first}]{field.partition(']')[2]}"
         unit = "ns" if name in (STAMPS, "publish_time") or name.endswith(".stamp") else ""
         values = values[:0] if refused else values
         columns.append(Found(f"{topic}.{name}", values, unit, topic, stamps, refused))
@@ -120,7 +122,7 @@ def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Valu
         for key, inner in fields.items():
             yield from _values(inner, f"{name}.{key}" if name else key, depth + 1, labels)
     elif hasattr(value, "__len__") and len(value) <= LONGEST:
-        words = next((each for each in labels if len(each) == len(value)), None)
+        words = _own_names(value) or next((w for w in labels if len(w) == len(value)), None)
         for place, inner in enumerate(value):
             word = "" if words is None else words[place]
             for each in _values(inner, f"{name}[{place}]", depth + 1, labels):
@@ -132,14 +134,36 @@ def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Valu
 def _labels(fields: Mapping[str, Any]) -> Labels:
     """Return the lists of words in a message, those first whose field's name says names."""
     lists = {
-        key: [str(word) for word in value]
+        key: [_called(word) for word in value]
         for key, value in fields.items()
         if not isinstance(value, (str, bytes)) and hasattr(value, "__len__")
         if 0 < len(value) <= LONGEST and _fields(value) is None
-        if all(isinstance(word, str) for word in value)
+        if all(_is_name(key, word) for word in value)
     }
     by_name = sorted(lists, key=lambda key: not key.lower().endswith(NAMES))
     return tuple(lists[key] for key in by_name)
+
+
+def _own_names(elements: Any) -> list[str] | None:
+    """Return the names that elements have in a field of their own, as {"name": "a", …}."""
+    each = [_fields(element) or {} for element in elements]
+    for key in each[0] if each else ():
+        words = [fields.get(key) for fields in each]
+        if key.lower().endswith(NAMES) and all(_is_name(key, word) for word in words):
+            return [_called(word) for word in words]
+    return None
+
+
+def _called(word: object) -> str:
+    """Return an element's name, which is never one of the numbers that count elements."""
+    text = str(word)
+    return f"id {text}" if text.lstrip("-").isdecimal() else text
+
+
+def _is_name(key: str, word: object) -> bool:
+    """Tell whether a value names an element: a word, or a number in a field of identifiers."""
+    number = isinstance(word, int) and not isinstance(word, bool)
+    return isinstance(word, str) or (number and key.lower() in IDENTIFIERS)
 
 
 def _fields(value: Any) -> Mapping[str, Any] | None:

@@ -68,7 +68,7 @@ def _group(mdf: Any, place: int, group: Any, missing: Sequence[str]) -> list[Fou
     for index, channel in enumerate(group.channels):
         if index == master:
             continue
-        signal = mdf.get(group=place, index=index, raw=True, ignore_invalidation_bits=False)
+        signal = mdf.get(group=place, index=index, raw=True, ignore_invalidation_bits=True)
         raw = as_numbers(signal.samples)
         if raw is None:
             continue
