@@ -63,7 +63,8 @@ def _check_member(owner: type, name: str, member: Any) -> None:
     """Let a function of a class check its arguments; leave what is none."""
     kind = type(member) if isinstance(member, (classmethod, staticmethod)) else None
     function = member.__func__ if kind else member
-    if not isinstance(function, types.FunctionType):
+    # What a library puts into a class, as pydantic does, checks its arguments itself.
+    if not isinstance(function, types.FunctionType) or function.__module__ != owner.__module__:
         return
     own = "" if name == "__init__" else f".{name}"
     checked = _checked(function, f"coupled.{owner.__name__}{own}")

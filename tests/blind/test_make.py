@@ -265,14 +265,17 @@ def test_a_folder_or_key_that_is_there_is_refused(made: Path, tmp_path: Path) ->
     assert files(tmp_path) == {"full/mine.txt"}
 
 
+FIRST = '"format": "coupled blind key 1", "seed": 1, "salt": "00"'
+
+
 @pytest.mark.slow
 def test_a_key_that_is_none_is_refused(made: Path, tmp_path: Path) -> None:
     for text, word in (
         ("{", "not JSON"),
         ("{}", "format"),
         ('{"format": "coupled blind key 99", "records": {}}', "coupled blind key 1"),
-        ('{"format": "coupled blind key 1"}', "records"),
-        ('{"format": "coupled blind key 1", "records": {"r001": {}}}', "r001"),
+        (f"{{{FIRST}}}", "records"),
+        (f'{{{FIRST}, "records": {{"r001": {{}}}}}}', "r001"),
     ):
         path = tmp_path / "key.json"
         path.write_text(text)

@@ -187,7 +187,8 @@ def public_functions() -> dict[str, Any]:
             if owner.__module__.startswith("coupled."):
                 for key, member in vars(owner).items():
                     function = getattr(member, "__func__", member)
-                    if inspect.isfunction(function) and not key.startswith("_"):
+                    ours = getattr(function, "__module__", "") == owner.__module__
+                    if inspect.isfunction(function) and ours and not key.startswith("_"):
                         found[f"{owner.__name__}.{key}"] = function
     return found
 
