@@ -149,19 +149,23 @@ def airframe_floor(rig: Rig, record: Record, noise: Floats) -> tuple[float, floa
     return first.gap(rig), first.floor
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 def test_coloured_noise_of_a_surface_reaches_the_airframes_floor(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its colour is heard beside where the host put the surface: by itself it gave gaps of 1.3."""
+    """The noise is estimated beside the host's command; from the surface alone gaps were 1.3.
+
+    The gap of one sample of noise scatters by 0.06 (seeds 1 to 8), so the mean of four is tested.
+    """
     still = {name: level for name, level in NOISE.items() if name != "elevator_rad"}
     monkeypatch.setattr(gaps, "NOISE", still)
     rig = gaps.nominal_rig(True)
     record = gaps.made(tmp_path, rig, {}, 3)
-    lagged = np.random.default_rng(seed).normal(size=len(record) + 200)
-    memory = math.exp(-2.0 * math.pi * 4.0 / 120.0)
-    noise = lfilter([math.sqrt(1.0 - memory**2)], [1.0, -memory], lagged)[200:]
-    assert airframe_floor(rig, record, 1e-4 * noise)[0] < 1.1
+    memory, found = math.exp(-2.0 * math.pi * 4.0 / 120.0), []
+    for seed in range(1, 5):
+        lagged = np.random.default_rng(seed).normal(size=len(record) + 200)
+        noise = lfilter([math.sqrt(1.0 - memory**2)], [1.0, -memory], lagged)[200:]
+        found.append(airframe_floor(rig, record, 1e-4 * noise)[0])
+    assert np.mean(found) < 1.1
     # A surface that goes elsewhere than it is put is no noise.
     faulty = gaps.made(tmp_path, rig, {"surface_lag": {"lag_s": 0.05}}, 3)
     plain = airframe_floor(rig, record, 0.0 * noise)[1]
