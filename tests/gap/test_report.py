@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -163,13 +164,14 @@ def test_a_folder_is_diagnosed_by_one_command(tmp_path: Path) -> None:
     assert refused.returncode == 2
     assert "there is no c.csv" in refused.stderr
     assert not (tmp_path / "again").exists()
+    shutil.copy(tmp_path / "a.csv", tmp_path / "bare.csv")  # without a manifest
     for words, says in (
         ((".", "--output", "x", "--json", "-"), "not for a folder"),
         (("."), "--output: is missing"),
         ((".", "--rig", "737", "--output", "x"), "leave it out"),
         (("a.csv", "--rig", "737", "--output", "x"), "is for a folder"),
         (("a.csv", "a.csv", "--rig", "737"), "is a duplicate"),
-        (("a.csv",), "--rig: is missing"),
+        (("bare.csv",), "bare.csv"),
         (("a.csv", "--rig", "737", "--improve", "x.csv"), "ends in .toml"),
     ):
         refused = coupled(tmp_path, "diagnose", *words)
