@@ -177,21 +177,25 @@ def test_beside_a_healthy_record_of_the_rig_the_change_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_a_machine_as_it_was_is_not_called_noise_beside_a_misfit() -> None:
-    """Without a change the linkage is as little judged, and the loader is."""
+def test_a_machine_as_it_was_has_no_gap_beside_a_healthy_record_that_misses_its_rig() -> None:
+    """The servo that the healthy record shows is taken over, and the misfit is stated."""
     found = api.diagnose(FILED, pushed(MACHINE, K, 2), healthy=pushed(MACHINE, K, 1))
-    assert found.verdict == "ambiguous"
-    assert found.stage("loader").judged
+    assert found.verdict == "no_gap"
+    assert "The rig misses it in column_deflection_m by" in found.summary
+    assert "within its noise" not in found.summary
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the record lies beside the project")
-def test_the_bench_with_another_servo_is_not_said_to_have_no_gap() -> None:
+def test_the_bend_of_the_bench_with_another_servo_is_found() -> None:
     rig = read_rig(SHARED / "rig_s18.toml")
     well, now = (read_record(SHARED / f"{name}.csv") for name in ("r16_well", "r18_bend"))
     found = api.diagnose(rig, now, healthy=well)
-    assert found.verdict == "ambiguous"
-    assert "by 41.4 times its noise" in found.summary
+    assert found.verdict == "effect"
+    (effect,) = found.effects
+    assert effect.name == "bend"
+    assert effect.value == pytest.approx(CHANGED / K * 5.71e-5, rel=0.01)
+    assert "which had no servo" in found.summary
 
 
 def test_no_effect_is_stated_to_be_surer_than_was_measured() -> None:

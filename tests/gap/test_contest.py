@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,7 +9,7 @@ from numpy.typing import NDArray
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search import contest
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import _leaves_friction
+from coupled.gap.search.choose import _is_explained_without
 from coupled.gap.search.contest import switched
 from coupled.gap.search.rivals import Found
 from coupled.gap.signals.output import Output
@@ -62,31 +60,13 @@ def test_an_effect_without_a_number_is_not_fitted_where_it_leaves_most(
     assert (step.effect, last) == (OFFSET, current)
 
 
-@pytest.mark.parametrize(
-    ("friction_N", "size", "left"), [(2.0, 0.3, True), (2.0, 3.0, False), (0.0, 0.3, False)]
-)
-def test_what_dry_friction_may_leave_is_none_of_an_effect_s(
-    friction_N: float, size: float, left: bool
+@pytest.mark.parametrize(("size", "needless"), [(0.3, True), (3.0, False)])
+def test_an_effect_without_which_its_stage_is_within_its_limit_is_needless(
+    size: float, needless: bool
 ) -> None:
-    """A breakout of 1.4 N stayed beside a relaxation, which alone leaves 0.88 of 1.26 floors."""
-
     def predict(rig: Rig) -> NDArray[np.float64]:
         return np.asarray(rig.controls["column"].loader.offset * SHAPE)
 
     measured = size * SHAPE + NOISE
     case = Case(bench(), "column", [Output("loader", "x", measured, predict, 1.0, 120.0)])
-    case = replace(case, nominal=bench({"friction_N": friction_N})) if friction_N else case
-    assert _leaves_friction(case, OFFSET, case.fit(())) == left
-
-
-def test_the_other_effect_is_begun_from_each_start_and_the_least_fit_is_taken(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    case = Case(bench(), "column", [Output("loader", "x", SHAPE, acting, 1.0, 120.0)])
-    current = case.fit((LAG,))
-    costs = {1.0: 30.0, 2.0: 10.0, 3.0: 20.0}
-    monkeypatch.setattr(
-        Case, "fit", lambda _, effects, start: replace(current, cost=costs[start["at"]])
-    )
-    starts = [{"at": at} for at in costs]
-    assert contest._instead(case, current, LAG, OFFSET, starts).cost == 10.0
+    assert _is_explained_without(case, OFFSET, case.fit(())) == needless

@@ -88,16 +88,17 @@ def searched(case: Case, library: Sequence[Effect]) -> Choice:
             current = case.fit(even[0], start=even[1])
             steps[-1:] = [replace(steps[-1], effect=effect, rivals=()) for effect in read]
             continue
-        needless = _needless(case, current)
-        if needless is not None:
+        dropped = set[Effect]()
+        while (needless := _needless(case, current)) is not None:
+            dropped.add(needless)
             steps = [step for step in steps if step.effect is not needless]
             current = _with_only(case, stood, steps, current)
-            if needless is best.effect:
-                break
-            # Effects that displace one another would be found and dropped without end.
-            circled = any(set(one.effects) == set(current.effects) for one in stood)
-            if circled:
-                break
+        if best.effect in dropped:
+            break
+        # Effects that displace one another would be found and dropped without end.
+        circled = bool(dropped) and any(set(one.effects) == set(current.effects) for one in stood)
+        if circled:
+            break
         stood.append(current)
     steps, current = _looked_over(case, library, stood, steps, current)
     tried = next((gains for gains in rounds if gains), {})
@@ -202,19 +203,19 @@ def _needless(case: Case, current: Fit) -> Effect | None:
         rest = tuple(other for other in current.effects if other is not effect)
         without = case.fit(rest, "fitted", current.values)
         missed = ranked_by_gain(case.outputs, without, [(effect, whole)])[0].gain
-        needless = missed < NEEDLESS_GAIN or _leaves_friction(case, effect, without)
+        needless = missed < NEEDLESS_GAIN or _is_explained_without(case, effect, without)
         if needless and (least is None or missed < least[0]):
             least = (missed, effect)
     return None if least is None else least[1]
 
 
-def _leaves_friction(case: Case, effect: Effect, without: Fit) -> bool:
-    """Tell whether the loader is within its limit without an effect, and has dry friction.
+def _is_explained_without(case: Case, effect: Effect, without: Fit) -> bool:
+    """Tell whether the outputs of an effect are within their limits without it.
 
-    No law of that is exact: what it leaves there is not enough to look for an effect by.
+    Not of a number with a tolerance, whose neighbours may hide it, nor of a discrete effect, which
+    may be known by its signature.
     """
-    rubs = is_dry(case.nominal, case.control) or any(one.dry for one in without.effects)
-    if effect.stage != "loader" or effect.dry or not rubs:
+    if not effect.free or effect.name in case.known:
         return False
     gaps, limits = case.gaps(without.rig), stage_limits(case.outputs)
     return all(gaps[at] <= limits[at] for at in effect.shows_in if at in gaps)
