@@ -265,3 +265,6 @@ def _diagnose_folder(
     write_text(output / "summary.csv", summary(found))
     print_summary(out, found)
     say(f"diagnoses: {output}  ({len(found)}, and summary.csv)")
+    if all(row.why for row in found):
+        say("no record could be diagnosed: summary.csv has the reason for each")
+        raise typer.Exit(2)

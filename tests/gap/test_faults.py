@@ -104,7 +104,8 @@ def test_a_folder_is_diagnosed_on_the_control_that_was_asked_for(
 ) -> None:
     folder_of(tmp_path, clean, "a")
     done = coupled(tmp_path, "diagnose", ".", "--output", "out", "--control", "wheel")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 2
+    assert "no record could be diagnosed" in done.stdout
     found = json.loads((tmp_path / "out" / "a.json").read_text())
     assert (found["verdict"], found["made"]["control"]) == ("refused", "wheel")
     assert "the rig has no wheel" in found["why"]
