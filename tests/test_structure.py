@@ -212,7 +212,7 @@ def circles(graph: dict[str, set[str]]) -> set[frozenset[str]]:
     return found
 
 
-def test_a_circle_is_found() -> None:
+def test_a_circle_of_imports_is_found() -> None:
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": {"e"}, "e": set[str]()}
     assert circles(graph) == {frozenset("abc")}
 
@@ -231,7 +231,7 @@ TESTS = sorted(Path(__file__).parent.rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda p: str(p.relative_to(PACKAGE.parent)))
-def test_what_tests_share_lies_in_their_support(path: Path) -> None:
-    """No test module imports another: who moves one would break it unseen."""
+def test_test_modules_share_code_only_through_tests_support(path: Path) -> None:
+    """No test module imports another."""
     for name in imports(path):
         assert not name.startswith("tests.") or name.startswith("tests.support"), name

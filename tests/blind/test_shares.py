@@ -1,4 +1,4 @@
-"""What each effect truly holds of a gap, and which readings of it are the same law."""
+"""True shares of the effects in the residual power, and effects that are the same law."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
 
 
 def test_a_stage_without_an_output_is_judged_where_its_effects_show() -> None:
-    """A loader that has a gap of its own is no part of what the transducer's zero holds."""
+    """The residual of the loader does not enter the share of the transducer's zero."""
     still = np.zeros(2400)
     noise = np.random.default_rng(1).normal(0.0, 1.0, 2400)
     outputs = [
@@ -74,7 +74,7 @@ def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it(
     assert set(true_shares(*given)["surface"]) == both
 
 
-def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
+def test_the_known_rig_has_the_drawn_contact_and_stamps() -> None:
     deck = read_deck(4)
     assert (deck.effects, deck.outsiders, deck.realism) == (
         read_deck(3).effects,
@@ -99,7 +99,7 @@ def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
 
 
 @pytest.mark.slow
-def test_what_a_rig_has_besides_takes_no_share_of_an_effect() -> None:
+def test_conditions_of_the_rig_take_no_share_of_an_effect() -> None:
     """Of a gap of 4.1 floors a gradient holds 0.96. By the nominal rig it was 0.47: contact and
     gradient make up for each other in part, and what the contact leaves alone was taken off whole.
     """
@@ -114,9 +114,9 @@ def test_what_a_rig_has_besides_takes_no_share_of_an_effect() -> None:
 
 @pytest.mark.slow
 def test_a_reading_begins_at_the_true_numbers() -> None:
-    """A mode of 54 Hz is a bend by 120 frames a second. Its fit from elsewhere ended at 3.5 Hz.
+    """At 120 frames a second a mode of 54 Hz equals a bend; the fit starts at the true values.
 
-    What it did there to the noise passed for what tells it from a bend.
+    A fit from other values ended at 3.5 Hz, where the mode fits noise.
     """
     numbers = Numbers(2035, 600, 24, 4)
     plan = plans(np.random.default_rng([2035, 1]), 600, read_deck(4))[43]

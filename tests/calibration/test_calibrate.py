@@ -83,7 +83,7 @@ def test_noise_does_not_pass_for_a_second_gradient() -> None:
         ({"deflection": 1000.0 * grid()[0]}, "row 2: deflection: is .* another unit"),
     ],
 )
-def test_readings_that_tell_nothing_are_refused(change: Any, says: str) -> None:
+def test_readings_that_do_not_determine_k_are_refused(change: Any, says: str) -> None:
     with pytest.raises(InputError, match=says):
         fit(replace(readings(*grid()), **change))
 
@@ -109,7 +109,7 @@ def test_a_supply_against_the_hand_is_named() -> None:
         fit(r)
 
 
-def test_too_few_readings() -> None:
+def test_too_few_readings_are_refused() -> None:
     with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
         fit(readings(*grid(3, 1), per_set=1))
 

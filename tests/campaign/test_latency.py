@@ -143,7 +143,7 @@ def test_each_level_has_its_limit() -> None:
         ({"duration_s": 1.5}, "lacks 1 s after the command"),
     ],
 )
-def test_what_is_no_test_of_latency_is_not_judged(changed: dict[str, Any], says: str) -> None:
+def test_a_flight_without_a_latency_test_is_not_judged(changed: dict[str, Any], says: str) -> None:
     run = replace(case("pitch"), **changed)
     with pytest.raises(UnjudgedError, match=says):
         latency(run)
@@ -172,7 +172,7 @@ NOT_LATE |= {"loader.relaxing_time_s", "sensing.force_stamp_s", "sensing.hum_fre
 
 @pytest.mark.parametrize("control", CONTROL_NAMES)
 def test_the_reference_leaves_out_whatever_takes_time(control: ControlName) -> None:
-    """Each key of a control in seconds or hertz is in the list, or known to make nothing late."""
+    """Each key of a control in seconds or hertz is in the list, or causes no delay."""
     for name, section in SECTIONS.items():
         for key in file_keys(section, "{d}"):
             takes_time = key.endswith(("_Hz", "_s")) and not key.endswith("per_s")

@@ -169,7 +169,7 @@ def gone() -> int:
     return process.pid
 
 
-def test_a_sweep_in_as_few_words(folder: Path) -> None:
+def test_a_sweep_is_a_table_or_a_file_with_or_without_a_folder(folder: Path) -> None:
     """From tables or a file, with no folder kept or one to go on in."""
     table = {
         "name": "s",

@@ -1,4 +1,4 @@
-"""A user's own aircraft, its XML damaged: it flies, or one line says why not, and nothing dies."""
+"""User models with damaged XML: each flies or is refused in one line; no process crashes."""
 
 from __future__ import annotations
 

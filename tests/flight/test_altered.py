@@ -153,7 +153,7 @@ def test_fuel_counts_in_the_mass() -> None:
     assert light == pytest.approx(0.9 * dry, rel=1e-9)
 
 
-def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> None:
+def test_pitch_damping_reaches_functions_that_the_moment_refers_to(tmp_path: Path) -> None:
     """The Augmentor Wing's tail meets the pitch rate in functions that its lift shares."""
     factor = 0.4
 
@@ -217,7 +217,7 @@ def test_an_elevator_does_more_or_less_about_its_trim(tmp_path: Path, name: str)
     assert ratio == pytest.approx(factor, rel=0.05)
 
 
-def test_factors_count_together() -> None:
+def test_factors_act_together() -> None:
     both = make_aircraft(shipped("c172p", elevator_effectiveness=0.5, pitch_damping=3.0), FRAME)
     damped = make_aircraft(shipped("c172p", pitch_damping=3.0), FRAME)
     # Half the effect of a small command is that of half the command.
@@ -253,7 +253,7 @@ def test_the_models_folder_is_left_alone_and_the_temporary_one_cleared(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_a_temporary_folder_it_says_so(
+def test_a_missing_temporary_folder_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))

@@ -1,8 +1,8 @@
 """An aircraft that is kept flies as a fresh one does, to the byte, whatever it flew before.
 
 Slow: each model that is kept, after flights that stall, tumble, meet the ground, stop the engines,
-burn their fuel or lose every number. Properties that a flight sets and a reset leaves are told, and
-the aircraft is then not taken.
+burn their fuel or lose every number. A property that a reset leaves
+changed is detected, and the aircraft is then loaded anew.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def test_whatever_it_flew_before_a_kept_aircraft_flies_as_a_fresh_one(model: str
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", sorted(PUT_BACK_EXACTLY))
-def test_what_a_reset_leaves_is_told(model: str) -> None:
+def test_a_property_that_a_reset_leaves_changed_is_detected(model: str) -> None:
     for spoil in LEFT:
         lent = in_trim(made(model), "any")
         assert isinstance(lent.airframe, JSBSimAirframe)

@@ -1,4 +1,4 @@
-"""Flights: how they end, what their record says, and that they repeat to the bit."""
+"""Flights: how they end, the content of their record, and that they repeat to the bit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
 
 
 def test_one_kernel_flies_every_kind_of_rig() -> None:
-    """Each kind of its own would compile for ten seconds more."""
+    """A kernel for each kind of rig would take ten more seconds to compile."""
     for run, controls in (("pull-up-c172p", 1), ("three-controls", 3), ("appendix-c", 1)):
         fly(shortened(run, controls, 2))
     kernel: Any = step_frame_at
@@ -126,7 +126,7 @@ def test_a_state_that_is_not_finite_ends_the_flight(
 
 
 class Onlooker:
-    """Who goes along and does nothing: the flight is then taken frame by frame."""
+    """A companion that does nothing; with it the flight runs frame by frame."""
 
     elsewhere = leads = False
 

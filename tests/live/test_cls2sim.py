@@ -201,7 +201,7 @@ def test_a_stream_that_its_loader_closed_is_waited_for_and_not_read_in_a_rush() 
         ("counts=1", "counts_per_N"),
     ],
 )
-def test_what_no_source_gives_has_to_be_said(words: str, said: str) -> None:
+def test_a_value_that_no_source_gives_is_required(words: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         open_link(f"cls2sim://127.0.0.1:9?{words}", RIG, lockstep=True, deflection=False)
 
@@ -240,7 +240,7 @@ def test_a_minute_with_a_healthy_fake_has_no_gap(kind: str, words: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_rig_file_lacks_is_named() -> None:
+def test_a_key_that_the_rig_file_lacks_is_named() -> None:
     record = fly_with("v2", V2, 60.0, hand=30.0, damping=110.0)
     found = diagnose(RIG, record)
     assert [one.name for one in found.effects] == ["viscous_damping"]

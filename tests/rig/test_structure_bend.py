@@ -129,7 +129,7 @@ def test_the_host_adds_the_force_as_it_reads_it() -> None:
 
 
 def test_the_host_adds_the_force_that_the_gauge_has() -> None:
-    """Before its slow amplifier has answered, the wheel's gauge knows nothing of the force."""
+    """The wheel's gauge has a slow amplifier, so the host adds its force late."""
     slow = {"gauge_frequency_Hz": 0.01, "gauge_order": "first"}
     changes = {f"controls.wheel.sensing.{key}": value for key, value in slow.items()}
     column, wheel = settled(joined(changes, assumed=FULL), 150.0, 60.0)
@@ -189,7 +189,7 @@ def test_the_static_line_holds_with_forces_on_the_others() -> None:
 
 @pytest.mark.parametrize("stiffness", [1e4, 1e7, 1e10])
 def test_two_stiff_clamps_on_one_structure_are_stable(stiffness: float) -> None:
-    """Between loaders that stand still, at 0.95 of what positive definiteness allows: F = K⁻¹·δ."""
+    """Between loaders at rest, at 0.95 of what positive definiteness allows: F = K⁻¹·δ."""
     most = 0.95 * float(np.sqrt(K_REPORT * 8e-4 * RADIUS))
     between = {
         "column_by_wheel_m_per_N": most,

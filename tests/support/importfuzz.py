@@ -106,7 +106,7 @@ def _signals(time_s: Floats) -> tuple[Floats, Floats]:
 
 
 def with_a_fault(rng: np.random.Generator, motion: Motion) -> Motion:
-    """Return rows with a fault as loggers make them, with or without the map's word for it."""
+    """Return rows with a typical fault of loggers, with or without the map's key for it."""
     fault = FAULTS[int(rng.integers(len(FAULTS)))]
     return fault(rng, motion)
 

@@ -225,7 +225,7 @@ def test_a_formula_behind_a_value_table_is_not_run(tmp_path: Path) -> None:
         read(tmp_path, "a.mf4", ONE.format(unit="", **CASES["a.mf4"][1]))
 
 
-def test_what_a_reader_library_warns_of_is_a_line(tmp_path: Path) -> None:
+def test_a_warning_of_a_reader_library_is_shown_as_one_line(tmp_path: Path) -> None:
     formats.write_tdms(tmp_path / "a.tdms")
     content = bytearray((tmp_path / "a.tdms").read_bytes())
     content[8:12] = (4714).to_bytes(4, "little")  # the version of the format
@@ -262,7 +262,7 @@ def test_a_ulog_of_which_parts_are_damaged_says_so(tmp_path: Path) -> None:
     assert account.warnings == ()
 
 
-def test_all_ways_of_warning_are_kept_and_those_of_code_are_not() -> None:
+def test_warnings_about_the_file_are_kept_and_those_about_code_are_not() -> None:
     notes: list[str] = []
     with kept_warnings(notes):
         warnings.warn("of the file", UserWarning, stacklevel=1)
