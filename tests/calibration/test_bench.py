@@ -12,7 +12,7 @@ import pytest
 from coupled.authority.compare import Outcome, compare
 from coupled.calibration.accuracy import deflection_off, felt_off, made_of_asked
 from coupled.calibration.assumed import Scales, real_scales
-from coupled.calibration.bench import CalibrationBench, _null, _without_converters, take_readings
+from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.coverage import measure_coverage
@@ -145,11 +145,11 @@ def test_the_mean_of_both_sides_is_s2_where_one_side_is_not(
     """Friction keeps a wandering hand's extreme: outward nulls are high, inward ones low."""
     rig = read_rig(shipped_rigs()[name])
     tools = replace(perfect_instruments(), hand=0.003)
-    made = CalibrationBench(rig, control, [], tools, 50)
-    null = _null(_without_converters(rig, control), made, np.random.default_rng(1))
+    made = CalibrationBench(rig, control, stations(rig, control, 2, 1), tools, 50)
+    read = take_readings(made, 1)
     true = real_scales(rig.controls[control])
-    ratio = null[1] / null[2] * true.s3 / true.s2 - 1.0
-    out, back = ratio[null[3] > 0.0].mean(), ratio[null[3] < 0.0].mean()
+    ratio = read.null_v2 / read.null_v3 * true.s3 / true.s2 - 1.0
+    out, back = ratio[read.null_side > 0.0].mean(), ratio[read.null_side < 0.0].mean()
     assert out > 0.002
     assert back < -0.002
     assert abs(0.5 * (out + back)) < 0.0018  # 4 standard errors

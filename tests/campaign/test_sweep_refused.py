@@ -156,7 +156,7 @@ def test_another_sweep_does_not_go_on_in_a_folder(folder: Path) -> None:
 def test_a_cluster_that_does_not_answer_is_one_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coupled.parallel._PATIENCE_s", 0.5)
+    monkeypatch.setattr("coupled.parallel.PATIENCE_s", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with (
             pytest.raises(InputError, match=r"--cluster: .* does not answer"),

@@ -43,7 +43,7 @@ def made(model: str) -> JSBSimAirframe:
 def put(airframe: JSBSimAirframe, values: dict[str, float]) -> None:
     for name, value in values.items():
         if airframe.has(name):
-            airframe._fdm[name] = value
+            airframe.lever(name).set(value)
 
 
 def steered(airframe: JSBSimAirframe, seed: int, frames: int) -> bytes:
@@ -61,9 +61,10 @@ def tumble(airframe: JSBSimAirframe) -> None:
 
 
 def crash(airframe: JSBSimAirframe) -> None:
+    height = airframe.lever("position/h-agl-ft").read
     for _ in range(6000):
         airframe.step((1.0, 0.1, 0.0))
-        if airframe._height() < 2.0:
+        if height() < 2.0:
             break
     for _ in range(60):
         airframe.step((0.5, 0.0, 0.0))
@@ -147,8 +148,8 @@ def test_why_a_c172p_is_not_kept() -> None:
     stall(lent.airframe)
     fresh = c172p()
     stall(fresh)
-    assert fresh._fdm["aero/stall-hyst-norm"] == 1.0
-    assert lent.airframe._fdm["aero/stall-hyst-norm"] == 0.0
+    reads = [each.reader("aero/stall-hyst-norm") for each in (fresh, lent.airframe)]
+    assert [read() for read in reads if read is not None] == [1.0, 0.0]
 
 
 def short(run: str, force_N: float, changes: dict[str, Any] | None = None) -> Manoeuvre:

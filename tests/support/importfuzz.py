@@ -618,7 +618,7 @@ def make_table(seed: int, number: int) -> tuple[str, bytes]:
 
 def _here(path: Path, content: bytes, kind: str, layout: Layout) -> tuple[Any, tuple[str, ...]]:
     """Read a log in this process; what its reader raises ends another process in an import."""
-    if kind == "mat" and separate._is_hdf5(content):
+    if kind == "mat" and separate.is_hdf5(content):
         kind = "hdf5"
     task = separate.Task(kind, str(path), layout.matrix, layout.names, layout.missing)
     notes: list[str] = []
@@ -631,7 +631,7 @@ def _here(path: Path, content: bytes, kind: str, layout: Layout) -> tuple[Any, t
         if isinstance(error, KeyboardInterrupt):
             raise
         raise InputError(path, "", "is damaged") from None
-    return table, tuple(separate._shortened(notes, kind))
+    return table, tuple(separate.shortened(notes, kind))
 
 
 def _found_here(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import io
+import json
 import logging
 import os
 import warnings
@@ -13,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from nptdms import ChannelObject, TdmsWriter
 
 from coupled.errors import InputError
@@ -282,7 +285,15 @@ def test_names_above_and_beside_an_array_name_its_elements() -> None:
             {"interface_names": ["y", "x"], "values": [21, 20]},
         ],
     }
-    found = {each.name: each.number for each in mcap._values(message, "", 0, ())}
+    file = io.BytesIO()
+    writer: Any = Writer(file)
+    writer.start()
+    schema = writer.register_schema("state", "jsonschema", b"{}")
+    channel = writer.register_channel("/arm", "json", schema)
+    writer.add_message(channel, 1, json.dumps(message).encode(), 1)
+    writer.finish()
+    read = mcap.read_mcap(Path("arm.mcap"), file.getvalue())
+    found = {each.name.removeprefix("/arm."): each.values[0] for each in read if not each.refused}
     assert found["actual.positions[b]"] == found["actual.positions[1]"] == 2.0
     assert found["each[b].values[x]"] == 20
     assert found["each[0].values[y]"] == 11
