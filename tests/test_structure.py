@@ -15,8 +15,7 @@ from coupled.flight.expectation import Expect
 from coupled.flight.manoeuvre import Measure, PressureProfile
 from coupled.flight.pilot import PILOTS
 from coupled.flight.runfile import RunFile
-from coupled.flight.weather import Gust, Turbulence
-from coupled.flight.wind import Wind
+from coupled.flight.weather import Gust, Turbulence, Wind
 from coupled.record import channels
 from coupled.record.importing.mapping import Channel, Clock, Layout, LogMap
 from coupled.rig import parameters
@@ -27,7 +26,10 @@ from coupled.schema import Section, file_keys
 PACKAGE = Path(__file__).parents[1] / "coupled"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
-# A room may import from the rooms left of it.
+# A room may import from the rooms before it. Parts of a package that are listed by themselves:
+# - `plots/histories` draws channels and needs no record, so that `Record.plot` can use it;
+# - `record/importing` checks a log against the rig that it is from, so it comes after `rig`;
+# - the parts of `gap`, `blind` and `cli` import each other in this order only.
 ORDER = [
     "errors",
     "timing",

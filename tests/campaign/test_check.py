@@ -16,10 +16,9 @@ from coupled.authority.compare import Flight, Outcome
 from coupled.campaign.check import check_run, read_expecting
 from coupled.campaign.standards import judge_standard
 from coupled.campaign.tolerances import sustained_force
-from coupled.campaign.unjudged import UnjudgedError
 from coupled.campaign.verdict import judge_expectation
 from coupled.errors import InputError
-from coupled.flight.expectation import Expect, Figure, Standard
+from coupled.flight.expectation import Expect, Figure, Standard, UnjudgedError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS

@@ -13,7 +13,7 @@ from coupled.authority.compare import fly_and_judge
 from coupled.campaign.check import check_run
 from coupled.campaign.latency import AT_ONCE, FRAMES_LATE, fly_undelayed, latency_s
 from coupled.campaign.standards import judge_standard
-from coupled.campaign.unjudged import UnjudgedError
+from coupled.flight.expectation import UnjudgedError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import CONFIGURATIONS, Manoeuvre
 from coupled.flight.pilot import Clamp, Step

@@ -16,9 +16,9 @@ import pytest
 
 from coupled.campaign.flights import fly_planned, fly_sweep
 from coupled.campaign.journal import JOURNAL, opened
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.plan import planned_flights, read_plan
 from coupled.campaign.sweep import sweep, write_table
+from coupled.display import parameter_label
 from coupled.files import unfinished_name
 from coupled.parallel import executor
 from coupled.plots.campaign import draw_sweep

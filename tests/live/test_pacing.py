@@ -9,8 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from coupled.live.pacing import EDGES_ms, Pacer
-from coupled.live.priority import first_place
+from coupled.live.pacing import EDGES_ms, Pacer, first_place
 
 FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
 
