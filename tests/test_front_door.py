@@ -241,8 +241,8 @@ def test_a_missing_pandas_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_record_is_diagnosed_from_a_file_as_from_memory(tmp_path: Path) -> None:
     rig = coupled.load_rig("t37")
     worn = rig.changed({"controls.column.loader.bend_m_per_N": 4e-4})
-    sweep = coupled.FrequencySweep(force_N=40, start_s=0.5, duration_s=8)
-    record = coupled.fly(worn, column=sweep, duration_s=10).record
+    sweep = coupled.FrequencySweep(force_N=40, start_s=0.2, duration_s=5)
+    record = coupled.fly(worn, column=sweep, duration_s=5.5).record
     path = tmp_path / "worn.csv"
     coupled.write_record(record, path)
     found = coupled.diagnose(rig, path)

@@ -99,10 +99,10 @@ def test_an_invalid_survival_condition_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("severity", "configuration", "alive"),
     [
-        (-0.58, "gradient only", True),
-        (-0.59, "gradient only", False),
-        (-0.60, "uncompensated", True),
-        (-0.61, "uncompensated", False),
+        pytest.param(-0.58, "gradient only", True, marks=pytest.mark.slow),
+        pytest.param(-0.59, "gradient only", False, marks=pytest.mark.slow),
+        pytest.param(-0.60, "uncompensated", True, marks=pytest.mark.slow),
+        pytest.param(-0.61, "uncompensated", False, marks=pytest.mark.slow),
         (-0.66, "compensated", True),
         (-0.67, "compensated", False),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,16 @@ import pytest
 from coupled import InputError, import_log
 from coupled.record.record import read_record
 from tests.support.commands import coupled
+from tests.support.readhere import in_process
 
 CASES = Path(__file__).parents[1] / "data" / "cases"
+
+
+@pytest.fixture(autouse=True)
+def here() -> Iterator[None]:
+    """Read in this process."""
+    with in_process():
+        yield
 
 
 def taken(folder: Path, case: str) -> Path:

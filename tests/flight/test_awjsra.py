@@ -183,6 +183,7 @@ def test_a_row_left_out_is_missed_or_met_as_the_page_says() -> None:
     assert made.splitlines()[-2:] == held.splitlines()[-2:]
 
 
+@pytest.mark.slow
 def test_trims_elsewhere_are_as_the_page_says() -> None:
     validation()
     assert in_tables("elsewhere") == script("elsewhere").table()

@@ -222,8 +222,8 @@ def test_a_loader_far_from_neutral_gets_no_force() -> None:
     [pytest.param("cls2sim", "counts_per_N=100", marks=pytest.mark.slow), ("v2", V2)],
 )
 def test_a_fake_is_flown_and_feels_as_specified(kind: str, words: str) -> None:
-    record = fly_with(kind, words, 20.0, hand=30.0)
-    assert len(record) == 2400
+    record = fly_with(kind, words, 10.0, hand=30.0)
+    assert len(record) == 1200
     assert record.manifest["live"]["dropped_packets"] == {}
     assert ("column_force_N" in record) == (kind == "v2")
     assert "column_deflection_m" not in record

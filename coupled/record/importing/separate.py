@@ -109,7 +109,7 @@ def _answer(
             timeout=LONGEST_s + LONGEST_s_per_MiB * len(content) / 2**20,
         )
     except subprocess.TimeoutExpired as late:
-        problem = f"was not read within {late.timeout:.0f} s: it is damaged, or leads in a circle"
+        problem = f"was not read within {late.timeout:.0f} s: it is damaged, or the machine is busy"
         raise InputError(path, "", problem) from None
     if done.returncode == REFUSED:
         said = json.loads(done.stdout)

@@ -224,7 +224,13 @@ def let_go(rig: Rig) -> Manoeuvre:
     return replace(made, rig=rig)
 
 
-@pytest.mark.parametrize("name", sorted(shipped_rigs()))
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("737", "bench") else pytest.param(name, marks=pytest.mark.slow)
+        for name in sorted(shipped_rigs())
+    ],
+)
 def test_every_shipped_control_has_its_limits_where_theory_has_them(name: str) -> None:
     rig = read_rig(shipped_rigs()[name])
     for control in rig.controls:
