@@ -72,6 +72,7 @@ def test_a_law_that_holds_plain_friction_is_begun_there_and_nowhere_else() -> No
     assert begun["asymmetric_friction.pull_N"] == 1.25
 
 
+@pytest.mark.slow
 def test_what_plain_friction_leaves_open_is_asked_of_the_breakaway_on_all_of_the_record() -> None:
     """Half of the record had named plain friction, and no little breakaway is foretold to gain."""
     case, _ = stuck(38)
@@ -224,6 +225,7 @@ def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_
     assert not richer._is_cause(case, LAW, PLAIN, corner, rigid)
 
 
+@pytest.mark.slow
 def test_a_setting_at_its_end_beside_friction_begins_anew_where_it_would_be_held_against_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
