@@ -111,6 +111,8 @@ def split_unit(name: str) -> tuple[str, str]:
     """Return a name without its unit, and the unit as it is written: `play_m` is play, m."""
     words = name.split("_")
     first = len(words)
+    if first > 1 and words[-2] == "per":
+        words[-1] = _POWERS.get(words[-1], words[-1])
     while first > 1 and words[first - 1] in _PARTS:
         first -= 1
     over, _, under = "·".join(words[first:]).partition("per")
@@ -118,7 +120,23 @@ def split_unit(name: str) -> tuple[str, str]:
     return "_".join(words[:first]), text
 
 
-_PARTS: Final = frozenset(("N", "m", "s", "rad", "kg", "Pa", "V", "g", "Hz", "per", "norm", "bits"))
+_POWERS: Final[Mapping[str, str]] = {"m3": "m³", "rad3": "rad³", "s2": "s²"}
+_PARTS: Final = frozenset(
+    ("N", "m", "s", "rad", "kg", "Pa", "V", "g", "Hz", "per", "norm", "bits", *_POWERS.values())
+)
+
+
+def parameter_label(key: str) -> str:
+    """Return a varied key of a rig or run with its unit: `column loader bend, m/N`."""
+    *tables, last = key.split(".")
+    name, unit = split_unit(last)
+    words = [table for table in tables if table not in _TABLES]
+    label = " ".join([*words, name.replace("_", " ")])
+    return f"{label}, {'of travel' if unit == 'norm' else unit}" if unit else label
+
+
+# Tables of the files that a label leaves out.
+_TABLES: Final = frozenset(("rig", "controls", "flight", "properties", "event"))
 
 
 def shown(name: str, system: System = "si") -> Shown:

@@ -25,7 +25,7 @@ from typing import Any, TypeVar
 from coupled.errors import InputError, say_warning
 
 MOST_WORKERS = 512  # processes: more than any machine has cores for
-_PATIENCE_s = 10.0
+PATIENCE_s = 10.0
 _ATTENTIVE_s = 0.2  # a wait without end may not see an interruption before a job is done
 T = TypeVar("T")
 S = TypeVar("S")
@@ -295,11 +295,11 @@ def _cluster(address: str) -> Iterator[Executor]:
         raise InputError("--cluster", "", problem) from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        client = distributed.Client(address, timeout=_PATIENCE_s, set_as_default=False)
+        client = distributed.Client(address, timeout=PATIENCE_s, set_as_default=False)
     except (OSError, ValueError, TypeError, AssertionError):  # the last of a malformed address
         raise InputError("--cluster", "", f"{address} does not answer") from None
     try:
-        client.wait_for_workers(1, timeout=_PATIENCE_s)
+        client.wait_for_workers(1, timeout=PATIENCE_s)
     except TimeoutError:
         client.close()
         raise InputError("--cluster", "", f"{address} has no workers") from None

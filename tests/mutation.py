@@ -1,4 +1,4 @@
-"""Break a module in small ways, one at a time, and see whether its tests notice.
+"""Change a module in small ways, one at a time, and print the changes that no test detects.
 
     python -m tests.mutation coupled/campaign/standards.py tests/campaign/test_check.py
     python -m tests.mutation coupled/rig/linkage.py tests/rig/test_linkage.py --plain --sample 25

@@ -93,12 +93,12 @@ def faults(read: Callable[[], object]) -> dict[str, str]:
     ],
     ids=["keys", "values", "together", "no list"],
 )
-def test_a_sweeps(tmp_path: Path, text: str, keys: set[str]) -> None:
+def test_every_fault_of_a_sweep_file_is_named(tmp_path: Path, text: str, keys: set[str]) -> None:
     (tmp_path / "s.toml").write_text(text)
     assert set(faults(lambda: read_plan(tmp_path / "s.toml"))) == keys
 
 
-def test_a_maps(tmp_path: Path) -> None:
+def test_every_fault_of_an_import_map_is_named(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(MAP)
     found = faults(lambda: read_map(tmp_path / "m.toml"))
     assert set(found) == {"channels.column_force_N.sgin", "channels.column_computd_m"} | {
@@ -108,7 +108,7 @@ def test_a_maps(tmp_path: Path) -> None:
     }
 
 
-def test_a_calibrations_readings(tmp_path: Path) -> None:
+def test_every_fault_of_a_readings_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(READINGS)
     found = faults(lambda: read_readings(tmp_path / "r.csv", "column"))
     rows = {"row 2: force_N", "row 3: v3_V", "row 4: gradient_set", "row 5", "row 7"}
@@ -118,15 +118,17 @@ def test_a_calibrations_readings(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rig", ["", 'rig = ""', "rig = 3"], ids=["none", "empty", "number"])
-def test_a_runs_without_its_rig(tmp_path: Path, rig: str) -> None:
-    """What is no name of a rig is said once, and not looked for among the shipped ones."""
+def test_faults_of_a_run_file_are_named_although_its_rig_is_missing(
+    tmp_path: Path, rig: str
+) -> None:
+    """An invalid rig name is reported once, without a list of shipped rigs."""
     (tmp_path / "r.toml").write_text(f'{rig}\nname = "r"\ncard = "c"\nduration_s = "long"\n')
     with pytest.raises(InputError) as fault:
         read_run(str(tmp_path / "r.toml"))
     assert sorted(one.key for one in fault.value.every) == ["duration_s", "rig"]
 
 
-def test_a_runs_misspelt_rig_beside_a_key_that_lacks(tmp_path: Path) -> None:
+def test_a_misspelt_rig_and_a_missing_key_are_both_named(tmp_path: Path) -> None:
     """The rig is looked at, too, where each table of the run is right and only a key lacks."""
     (tmp_path / "r.toml").write_text(
         'name = "r"\nrig = "t73"\nduration_s = 1.0\n[pilot.column]\nkind = "step"\nforce_N = 1.0\n'
@@ -136,6 +138,6 @@ def test_a_runs_misspelt_rig_beside_a_key_that_lacks(tmp_path: Path) -> None:
     assert found["rig"].startswith("t73: is no shipped rig; did you mean")
 
 
-def test_a_folders_records(tmp_path: Path) -> None:
+def test_every_fault_of_a_records_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "records.toml").write_text(RECORDS)
     assert set(faults(lambda: jobs(tmp_path, tmp_path / "out"))) == {"no", "b", "../c"}

@@ -36,8 +36,10 @@ def folder(tmp_path: Path) -> Path:
     ],
     ids=lambda given: given[0] if isinstance(given, list) else str(given),
 )
-def test_a_shell_meets_what_these_tests_meet(folder: Path, words: list[str], code: int) -> None:
-    """Most tests give a command in their own process; a Python of its own says the same."""
+def test_a_command_in_a_process_of_its_own_prints_the_same(
+    folder: Path, words: list[str], code: int
+) -> None:
+    """Most tests run a command in their own process; a new process prints the same."""
     here, anew = coupled(folder, *words), coupled_anew(folder, *words)
     assert (here.returncode, here.stdout, here.stderr) == (code, anew.stdout, anew.stderr)
     assert anew.returncode == code
@@ -213,7 +215,7 @@ def test_bad_input_is_one_line_exit_2_and_nothing_written(
         ("", "is not a table"),
     ],
 )
-def test_a_table_that_is_no_record(folder: Path, text: str, says: str) -> None:
+def test_a_table_that_is_not_a_record_is_refused(folder: Path, text: str, says: str) -> None:
     (folder / "r.csv").write_text(text)
     done = coupled(folder, "plot", "r.csv")
     assert (done.returncode, done.stdout) == (2, "")
@@ -269,7 +271,9 @@ HOSTILE = [
 @pytest.mark.parametrize(
     ("which", "old", "new"), HOSTILE, ids=[str(i) for i in range(len(HOSTILE))]
 )
-def test_hostile_files_end_in_a_line_a_fault(folder: Path, which: str, old: str, new: str) -> None:
+def test_hostile_files_are_refused_with_one_line_a_fault(
+    folder: Path, which: str, old: str, new: str
+) -> None:
     """Found by trying: each of these once died, hung, or wrote where it should not."""
     (folder / "t.csv").write_text("time_s,column_force_N\n0,0\n1,1\n")
     rig = (ROOT / RIG).read_text(encoding="utf-8")
@@ -308,9 +312,7 @@ def test_hostile_files_end_in_a_line_a_fault(folder: Path, which: str, old: str,
     ],
     ids=lambda words: " ".join(words)[:40],
 )
-def test_words_that_lead_nowhere_are_refused_before_the_flight(
-    folder: Path, words: list[str]
-) -> None:
+def test_wrong_arguments_are_refused_before_the_flight(folder: Path, words: list[str]) -> None:
     done = coupled(folder, *words)
     assert done.returncode == 2
     assert done.stderr.startswith("error: ")
@@ -327,7 +329,7 @@ def test_a_dollar_sign_is_a_word_and_a_bracket_a_file(folder: Path) -> None:
     assert coupled(folder, "plot", "r[1].csv", "--figure", "$x.png").returncode == 0
 
 
-def test_units_of_people_are_theirs_and_those_of_files_stay(folder: Path) -> None:
+def test_the_units_option_changes_tables_and_not_files(folder: Path) -> None:
     words = ("compare", "short.toml", "--no-figure", "--json", "t.json")
     si, us = coupled(folder, *words), coupled(folder, *words, "--units", "us")
     assert us.returncode == 0, us.stderr

@@ -38,7 +38,9 @@ def test_a_name_ends_in_its_unit(name: str, unit: str) -> None:
         ("load_factor", 1.5, "1.5", "1.5"),
     ],
 )
-def test_people_get_their_units(name: str, value: float, si: str, us: str) -> None:
+def test_a_quantity_is_shown_in_the_units_of_each_system(
+    name: str, value: float, si: str, us: str
+) -> None:
     for system, text in (("si", si), ("us", us)):
         unit = shown(name, "us" if system == "us" else "si")
         assert f"{unit.written(value)} {unit.unit}".strip() == text

@@ -19,7 +19,9 @@ def test_every_example_is_run_here() -> None:
         assert path.read_text(encoding="utf-8").startswith("# %% [markdown]\n# # "), path
 
 
-def test_authority_lost(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_authority_lost_prints_the_closed_form(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     shown = runpy.run_path(str(EXAMPLES / "authority_lost.py"))
     table = shown["table"]
     assert table.loss("uncompensated") == pytest.approx(shown["bent"].loss_closed_form, abs=0.02)
@@ -30,7 +32,7 @@ def test_authority_lost(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(shown["figure"].axes) == 4
 
 
-def test_calibrating_a_loader(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_calibration_finds_the_rig_s_scales(capsys: pytest.CaptureFixture[str]) -> None:
     shown = runpy.run_path(str(EXAMPLES / "calibrating_a_loader.py"))
     assert shown["bend"].holds(shown["true"])
     before, after = capsys.readouterr().out.splitlines()[-2:]
@@ -43,7 +45,7 @@ def test_calibrating_a_loader(capsys: pytest.CaptureFixture[str]) -> None:
     assert abs(float(after.split()[1])) < 1.5
 
 
-def test_diagnosing_a_record() -> None:
+def test_the_example_diagnosis_finds_the_effects() -> None:
     shown = runpy.run_path(str(EXAMPLES / "diagnosing_a_record.py"))
     found = shown["found"]
     assert found.verdict == "effect"

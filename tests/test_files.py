@@ -82,13 +82,13 @@ def test_a_key_of_hundreds_of_parts_is_refused(line: str) -> None:
         loads_toml("x = 1\n" + line, "f")
 
 
-def test_many_points_are_no_deep_key() -> None:
+def test_a_value_with_many_points_is_not_a_deep_key() -> None:
     numbers = ", ".join(["0.5"] * 500)
     told = loads_toml(f'x = [{numbers}]\ncard = "{"... " * 90}"', "f")
     assert len(told["x"]) == 500
 
 
-def test_formats() -> None:
+def test_a_record_of_a_newer_format_is_refused() -> None:
     assert check_format(None, 2, "f", "record") == 0
     assert check_format(1, 2, "f", "record") == 1
     assert check_format(2, 2, "f", "record") == 2
@@ -174,7 +174,7 @@ def test_what_a_killed_process_left_is_cleared_and_nothing_else(tmp_path: Path) 
     assert set(names(tmp_path)) == kept
 
 
-def test_a_number_of_this_process_from_an_earlier_life_is_stale(tmp_path: Path) -> None:
+def test_a_partial_file_of_an_earlier_process_with_this_id_is_removed(tmp_path: Path) -> None:
     left = tmp_path / unfinished_name("")
     left.write_text("")
     an_hour_ago = time.time() - 3600.0
@@ -198,7 +198,7 @@ except InputError as error:
 
 
 @pytest.mark.parametrize("name", ["r.csv", "r.parquet"])
-def test_a_disk_that_fills_while_a_record_is_written(tmp_path: Path, name: str) -> None:
+def test_a_full_disk_leaves_no_part_of_a_record(tmp_path: Path, name: str) -> None:
     words = [sys.executable, "-c", FULL, str(tmp_path / name)]
     done = subprocess.run(words, check=True, capture_output=True, text=True)
     assert done.stderr == ""
@@ -216,7 +216,7 @@ def test_a_message_is_one_printable_line_of_bounded_length() -> None:
     assert shown("q̄ is 3 µm\n") == "q̄ is 3 µm?"
 
 
-def test_a_hint_among_many_names_stays_short_and_quick() -> None:
+def test_a_hint_among_100_000_names_is_short_and_quick() -> None:
     known = [f"column_{i}" + "x" * 1000 for i in range(100_000)]
     hint = nearest("y" * 100_000, known)
     assert len(InputError("f", "k", hint).problem) < 3100
@@ -224,7 +224,7 @@ def test_a_hint_among_many_names_stays_short_and_quick() -> None:
     assert nearest("zzz", ["b", "a"]) == "known: a, b"
 
 
-def test_json_and_text_hold_a_file_name_that_is_no_text(tmp_path: Path) -> None:
+def test_a_file_name_that_is_not_utf_8_is_kept_in_json_and_text(tmp_path: Path) -> None:
     name = os.fsdecode(b"r\xff.csv")
     assert json.loads(json_text({name: "q̄"})) == {name: "q̄"}
     assert "q̄" in json_text({"a": "q̄"})

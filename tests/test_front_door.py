@@ -1,4 +1,4 @@
-"""The front door: what a notebook does in a few words, and what `import coupled` costs."""
+"""The Python interface: short calls from a notebook, and the cost of `import coupled`."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def test_a_fault_of_the_rig_names_the_rig_where_there_is_no_file() -> None:
     assert "no-such-aircraft" in str(caught.value)
 
 
-def test_a_record_says_what_it_holds_and_draws_it() -> None:
+def test_a_record_lists_its_channels_and_draws_them() -> None:
     record = fly(column=PULL)
     assert repr(record).startswith("Record(120 rows, 1 s at 120 Hz; 46 channels: time_s, ")
     frame = record.to_polars()
@@ -232,7 +232,7 @@ def test_a_record_says_what_it_holds_and_draws_it() -> None:
         record.plot("pitch_rads")
 
 
-def test_pandas_is_asked_for_by_name_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_pandas_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(coupled.InputError, match="pandas: is not installed: pip install pandas"):
         fly(column=PULL).to_pandas()
@@ -241,8 +241,8 @@ def test_pandas_is_asked_for_by_name_where_it_lacks(monkeypatch: pytest.MonkeyPa
 def test_a_record_is_diagnosed_from_a_file_as_from_memory(tmp_path: Path) -> None:
     rig = coupled.load_rig("t37")
     worn = rig.changed({"controls.column.loader.bend_m_per_N": 4e-4})
-    sweep = coupled.FrequencySweep(force_N=40, start_s=0.5, duration_s=8)
-    record = coupled.fly(worn, column=sweep, duration_s=10).record
+    sweep = coupled.FrequencySweep(force_N=40, start_s=0.2, duration_s=5)
+    record = coupled.fly(worn, column=sweep, duration_s=5.5).record
     path = tmp_path / "worn.csv"
     coupled.write_record(record, path)
     found = coupled.diagnose(rig, path)
@@ -251,7 +251,7 @@ def test_a_record_is_diagnosed_from_a_file_as_from_memory(tmp_path: Path) -> Non
     assert coupled.diagnose("t37", {"worn": record}).improved == found.improved
 
 
-def test_a_flight_of_eight_seconds_tells_of_its_play() -> None:
+def test_the_backlash_of_an_eight_second_flight_is_found() -> None:
     """From a rig's name to a diagnosis, without a file: the way in that the package promises."""
     rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
     flight = coupled.fly(rig, column=coupled.Step(force_N=50), duration_s=8)

@@ -192,8 +192,8 @@ class Gone(OneThread):
 
 
 @pytest.mark.parametrize("kind", [OneThread, Gone])
-def test_no_thread_is_left_of_the_work(kind: type[OneThread]) -> None:
-    """And workers that died are said to have where their work is waited for."""
+def test_work_leaves_no_thread_behind(kind: type[OneThread]) -> None:
+    """Workers that died are reported where their work is awaited."""
     before = threading.active_count()
     with kind() as pool:
         ends = contextlib.nullcontext() if kind is OneThread else pytest.raises(BrokenExecutor)
@@ -204,7 +204,7 @@ def test_no_thread_is_left_of_the_work(kind: type[OneThread]) -> None:
         assert time.monotonic() - began < HELD_s
 
 
-def test_what_the_work_raises_is_raised_whatever_it_is() -> None:
+def test_any_exception_of_the_work_is_raised() -> None:
     """A queue that was empty within the work was taken for one in which no work is done yet."""
 
     def empty(_: int) -> int:

@@ -66,7 +66,7 @@ def test_the_unchanged_files_are_valid(here: Path) -> None:
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=NAMES)
-def test_a_changed_file(
+def test_a_changed_file_is_read_or_refused_in_one_line(
     here: Path, number: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["coupled", *cases()[number][0]])
@@ -75,7 +75,7 @@ def test_a_changed_file(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", NUMBERS, ids=NAMES)
-def test_many_changed_files(
+def test_many_changed_files_are_read_or_refused_in_one_line(
     here: Path, number: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["coupled", *cases()[number][0]])

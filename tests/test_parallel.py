@@ -12,7 +12,7 @@ import pytest
 from coupled.parallel import HaltedError, go_on, in_threads, threads
 
 
-def test_threads_give_what_one_gives_in_the_same_order() -> None:
+def test_several_threads_return_what_one_returns_in_the_same_order() -> None:
     def square(x: int) -> int:
         time.sleep(0.001 * (x % 3))
         return x * x
@@ -62,7 +62,7 @@ def test_work_within_work_takes_the_thread_that_is_done(first: int) -> None:
         assert in_threads(meet, range(2)) == [first == 0, first == 1]
 
 
-def test_without_leave_there_is_one_thread() -> None:
+def test_one_thread_is_the_default() -> None:
     assert set(in_threads(lambda _: threading.get_ident(), range(4))) == {threading.get_ident()}
 
 

@@ -58,7 +58,9 @@ CLOSED = b"error: standard output: --json: is closed; give a file\n"
         ),
     ],
 )
-def test_streams_that_take_no_more(folder: Path, line: str, code: int, says: bytes) -> None:
+def test_a_full_or_closed_stream_ends_the_command_without_a_traceback(
+    folder: Path, line: str, code: int, says: bytes
+) -> None:
     done = shell(folder, line)
     assert done.returncode == code, done.stderr
     assert says in done.stderr
@@ -81,7 +83,9 @@ def test_a_library_that_prints_does_not_print_into_the_record(folder: Path) -> N
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "latin-1"])
-def test_a_terminal_without_our_letters_gets_question_marks(folder: Path, encoding: str) -> None:
+def test_a_terminal_that_lacks_a_character_gets_a_question_mark(
+    folder: Path, encoding: str
+) -> None:
     done = shell(folder, "coupled runs", PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
     done.stdout.decode(encoding)
@@ -91,7 +95,7 @@ def test_a_terminal_without_our_letters_gets_question_marks(folder: Path, encodi
 
 
 @pytest.mark.slow
-def test_files_whose_names_are_no_text(folder: Path) -> None:
+def test_a_file_whose_name_is_not_utf_8_is_read_and_written(folder: Path) -> None:
     (folder / os.fsdecode(b"r\xff.toml")).write_text(SHORT)
     done = shell(folder, "coupled fly $'r\\xff.toml' -o $'o\\xff.parquet' --json $'j\\xff.json'")
     assert done.returncode == 0, done.stderr
@@ -122,7 +126,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(folder: Path) ->
 
 
 @pytest.mark.slow
-def test_sigterm_keeps_a_flight_so_far_as_ctrl_c_does(folder: Path) -> None:
+def test_sigterm_keeps_the_flight_up_to_then_as_ctrl_c_does(folder: Path) -> None:
     (folder / "long.toml").write_text(SHORT.replace("duration_s = 2.0", "duration_s = 7200.0"))
     kept = {}
     for number in (signal.SIGINT, signal.SIGTERM):

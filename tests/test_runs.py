@@ -156,7 +156,7 @@ ORIGINS = ("source: ", "closed form: ", "purpose: ", "regression: ")
 
 @pytest.mark.parametrize("name", sorted(shipped_runs()))
 def test_every_bound_says_where_it_is_from(name: str) -> None:
-    """As specified or as rigid (1, or 0) and a limit of the standards speak for themselves."""
+    """Bounds of 1 or 0 (as specified, as rigid) and limits of standards need no source."""
     for expect in tomllib.loads(shipped_runs()[name].read_text(encoding="utf-8"))["expect"]:
         plain = "standard" in expect or expect.get("is") in (0.0, 1.0)
         assert plain or expect.get("why", "").startswith(ORIGINS), expect

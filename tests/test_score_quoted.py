@@ -82,7 +82,7 @@ def kept() -> Score:
 
 
 def sentence(score: Score) -> str:
-    """Return what the README says of a score."""
+    """Return the README's paragraph on a score."""
 
     def percent(found: Share) -> str:
         assert found.share is not None

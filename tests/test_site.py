@@ -1,4 +1,4 @@
-"""The site: each page is reached, each notebook stands as it is run, and the whole builds."""
+"""The site: each page is linked, notebooks are kept without outputs, and the site builds."""
 
 from __future__ import annotations
 

@@ -53,6 +53,9 @@ def test_a_name_is_split_from_its_unit() -> None:
     assert split_unit("damping_N_s_per_m") == ("damping", "N·s/m")
     assert split_unit("column_deflection_m") == ("column_deflection", "m")
     assert split_unit("drift_per_s") == ("drift", "1/s")
+    assert split_unit("cubic_N_per_m3") == ("cubic", "N/m³")
+    assert split_unit("acceleration_rad_per_s2") == ("acceleration", "rad/s²")
+    assert split_unit("s1_over_s2") == ("s1_over_s2", "")
     assert split_unit("factor") == ("factor", "")
 
 

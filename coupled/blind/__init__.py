@@ -1,1 +1,5 @@
-"""Blind trials: sealed records of an independent twin of the rig, and their scores."""
+"""For developers of the diagnosis: sealed records of an independent twin of the rig, and scores.
+
+`coupled blind` measures how accurate `coupled.gap` is. Simulation and diagnosis need nothing of
+this package.
+"""

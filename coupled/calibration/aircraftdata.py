@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.calibration.readingscolumns import ANGLES, FORCES, LENGTHS
-from coupled.calibration.readingsfile import number_in, rows_of
+from coupled.calibration.readingsfile import ANGLES, FORCES, LENGTHS, number_in, rows_of
 from coupled.calibration.specification import LEGS, SweepLeg
 from coupled.errors import InputError, nearest
 from coupled.record.channels import ControlName

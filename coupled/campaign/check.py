@@ -11,10 +11,9 @@ import polars as pl
 from coupled.arguments import public
 from coupled.authority.compare import Flight, compare
 from coupled.campaign.latency import fly_undelayed
-from coupled.campaign.unjudged import UnjudgedError
 from coupled.campaign.verdict import Verdict, judge_expectation
 from coupled.errors import InputError
-from coupled.flight.expectation import LATENCIES, Expect
+from coupled.flight.expectation import LATENCIES, Expect, UnjudgedError
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import read_run
 

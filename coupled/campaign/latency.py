@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.compare import Flight, fly_and_judge
-from coupled.campaign.unjudged import UnjudgedError
 from coupled.flight.conditions import Conditions
+from coupled.flight.expectation import UnjudgedError
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Attitude, Clamp, Track
 from coupled.record.channels import RATE, ControlName, channel

@@ -20,8 +20,7 @@ import numpy as np
 
 from coupled.campaign.entry import Columns
 from coupled.campaign.points import points
-from coupled.campaign.sweepcheck import flight_count, read_sections
-from coupled.campaign.sweepfile import SweepFile, Vary
+from coupled.campaign.sweepfile import SweepFile, Vary, flight_count, read_sections
 from coupled.errors import InputError, collected, nearest, together
 from coupled.files import sha256
 from coupled.flight.loop import make_airframe

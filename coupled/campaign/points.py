@@ -49,11 +49,3 @@ def _drawn(vary: Vary, shares: Floats) -> list[Any]:
     else:
         values = vary.low + (vary.high - vary.low) * shares
     return [float(value) for value in values]
-
-
-def grid_size(sweep: SweepFile) -> int:
-    """Return how many points a grid has."""
-    size = 1
-    for vary in sweep.vary:
-        size *= vary.steps or len(vary.values or ())
-    return size

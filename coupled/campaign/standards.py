@@ -32,8 +32,7 @@ from coupled.campaign.tolerances import (
     force_band,
     sustained_force,
 )
-from coupled.campaign.unjudged import UnjudgedError
-from coupled.flight.expectation import LATENCIES, RATE, SMALL_RATE, Standard
+from coupled.flight.expectation import LATENCIES, RATE, SMALL_RATE, Standard, UnjudgedError
 from coupled.record.channels import ControlName, channel
 from coupled.units import DEGREE_rad
 

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from coupled.authority.compare import Flight
 from coupled.campaign.standards import StandardFigure, judge_standard
-from coupled.campaign.unjudged import UnjudgedError
 from coupled.display import System, shown, unit_in
-from coupled.flight.expectation import Expect
+from coupled.flight.expectation import Expect, UnjudgedError
 from coupled.record.channels import TIME
 
 Floats = NDArray[np.float64]

@@ -13,8 +13,7 @@ from coupled.flight.altered import ALTERATIONS
 from coupled.flight.event import OFF, PICK, Event
 from coupled.flight.loop import make_airframe
 from coupled.flight.manoeuvre import Manoeuvre
-from coupled.flight.weather import Gust, Turbulence
-from coupled.flight.wind import Wind
+from coupled.flight.weather import Gust, Turbulence, Wind
 from coupled.record.channels import SURFACES
 from coupled.resources import aircraft_folder
 from coupled.rig.packing import COMMAND_SIGN

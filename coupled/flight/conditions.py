@@ -6,8 +6,16 @@ from typing import Any
 
 from coupled.errors import InputError
 from coupled.flight.event import Event, Events, check_events
-from coupled.flight.weather import DiscreteGust, Gust, Turbulence, TurbulentAir, check_gust
-from coupled.flight.wind import MovingAir, Wind, check_wind
+from coupled.flight.weather import (
+    DiscreteGust,
+    Gust,
+    MovingAir,
+    Turbulence,
+    TurbulentAir,
+    Wind,
+    check_gust,
+    check_wind,
+)
 from coupled.flight.wrapper import Wrapper
 from coupled.schema import Section, build
 

@@ -62,6 +62,10 @@ RELATIVE += ("felt_ratio", "felt_ratio_closed_form")
 _PER_CENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
 
 
+class UnjudgedError(Exception):
+    """Why an expectation cannot be judged: a figure of its flight is not defined."""
+
+
 class Expect(Section):
     """One expectation; of `channel`, `measure` and `standard` just one is given."""
 

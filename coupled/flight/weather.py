@@ -1,26 +1,42 @@
-"""Gusts and turbulence of a run: JSBSim's own, given in SI and drawn from the run's seed.
+"""Wind, gusts and turbulence of a run, in SI.
 
-A gust is air that moves as (1 − cos(π·t/rise))/2 of its velocity, holds it, and comes to rest in
-the same way. Turbulence is JSBSim's: `milspec`, MIL-F-8785C by its discrete approximation, or
-`tustin`, the same spectra by Tustin's rule; below 1000 ft above the ground its strength is that
-of the wind at 20 ft, above 2000 ft that of a severity. It shakes all axes.
+The wind is a velocity of the air over time, along the aircraft's initial heading and upwards. The
+aircraft is trimmed in still air, where a constant wind has no effect, so the wind starts at zero.
+
+Gusts and turbulence are JSBSim's own. A gust is air that moves as (1 − cos(π·t/rise))/2 of its
+velocity, holds it, and comes to rest in the same way. Turbulence is `milspec`, MIL-F-8785C by its
+discrete approximation, or `tustin`, the same spectra by Tustin's rule. Below 1000 ft above the
+ground its strength is that of the wind at 20 ft, above 2000 ft that of a severity. It acts on all
+axes, and is drawn from the run's seed.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Literal
+
+import numpy as np
 
 from coupled.errors import InputError
 from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.schema import Section, quantity
 from coupled.units import FOOT_m
 
+_WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 _GUST = "atmosphere/cosine-gust/"
 _LOCAL = 3.0  # JSBSim's number of the frame north, east, down; the aircraft starts northwards
 _STRONGEST = 100.0  # m/s
 _TURBULENCE = "atmosphere/turbulence/milspec/"
 _MODELS = {"milspec": 3.0, "tustin": 4.0}
+
+
+class Wind(Section):
+    """Velocity of the air over time, straight between: tail wind and updraught positive."""
+
+    time: list[float] = quantity("s", min_length=1)
+    along: list[float] = quantity("m_per_s")
+    up: list[float] | None = quantity("m_per_s", None)
 
 
 class Gust(Section):
@@ -43,11 +59,49 @@ class Turbulence(Section):
     severity: int = quantity("", 3, ge=1, le=7)
 
 
+def check_wind(wind: Wind, file: object) -> None:
+    """Refuse a wind whose times do not rise, or whose speeds cannot be flown."""
+    if any(b <= a for a, b in pairwise(wind.time)):
+        raise InputError(file, "wind.time_s", "must rise from value to value")
+    speeds = {"along_m_per_s": wind.along, "up_m_per_s": wind.up}
+    for key, values in speeds.items():
+        if values is None:
+            continue
+        if len(values) != len(wind.time):
+            raise InputError(file, f"wind.{key}", "needs as many values as time_s")
+        if values[0] != 0.0:
+            raise InputError(file, f"wind.{key}", "must start at 0: it is the change since trim")
+        if max(map(abs, values)) > _STRONGEST:
+            raise InputError(file, f"wind.{key}", f"is beyond ±{_STRONGEST:g} m/s")
+
+
 def check_gust(gust: Gust, file: object) -> None:
     """Refuse a gust of no air."""
     if gust.along == gust.across == gust.up == 0.0:
         problem = "moves no air: give along_m_per_s, across_m_per_s or up_m_per_s"
         raise InputError(file, "gust", problem)
+
+
+class MovingAir(Wrapper):
+    """A run's wind: along the heading of the start, which is north, and upwards."""
+
+    def __init__(self, wind: Wind, frame_s: float) -> None:
+        self._wind, self._frame_s = wind, frame_s
+
+    def meet(self, aircraft: Aircraft) -> Hook | None:
+        """Let the air move, frame by frame from the start."""
+        wind, frame_s, frame = self._wind, self._frame_s, 0
+        north, down = (aircraft.lever(name).set for name in _WINDS)
+        rising = [0.0] * len(wind.time) if wind.up is None else wind.up
+
+        def blow() -> None:
+            nonlocal frame
+            time = frame * frame_s
+            north(float(np.interp(time, wind.time, wind.along)) / FOOT_m)
+            down(-float(np.interp(time, wind.time, rising)) / FOOT_m)
+            frame += 1
+
+        return blow
 
 
 class DiscreteGust(Wrapper):

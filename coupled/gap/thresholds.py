@@ -69,7 +69,7 @@ SHORTEST_STRETCH_s = 0.25  # chosen: the shortest to which one is cut
 STRETCH_POWER = 0.125  # of the residual's power, from which a stretch is cut; blind trials 6 to 8
 
 # What noise alone may leave of a stage (`output`).
-GUILTY_FROM = 1.2  # gap; records of another program without an effect stand at up to 1.1
+GUILTY_FROM = 1.2  # gap; records of the independent twin without an effect reach 1.1
 NOISE_SIGMAS = 3.0  # standard deviations of noise's own rms: a false alarm in some 700 stages
 # Of what a channel does, rms over rms: the floors of 77 records of the rig's own stand under 0.02.
 FLOOR_SHARE = 0.1  # chosen: from which a stage within its floor is not judged

@@ -20,9 +20,8 @@ from coupled.flight.companion import Aboard
 from coupled.live.attached import Attached
 from coupled.live.hands import Follower, Wishes
 from coupled.live.link import Link
-from coupled.live.measured import only_measured
 from coupled.live.pacing import Pacer
-from coupled.live.rows import Rows
+from coupled.live.rows import Rows, only_measured
 from coupled.live.safety import Limits
 from coupled.live.service import Adaptation, BendEstimator
 from coupled.live.switches import Switches

@@ -1,4 +1,4 @@
-"""What a live flight records beside a batch flight's channels, one value a frame."""
+"""The channels that a live flight records and a batch flight does not, and the reverse."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from coupled.record.channels import LOADER_TIME, VALIDITY
+from coupled.live.link import Link
+from coupled.record.channels import LOADER_TIME, VALIDITY, channel
 from coupled.record.record import Record
+from coupled.rig.rig import Rig
 
 
 class Rows:
@@ -39,3 +41,24 @@ class Rows:
         names = (*record.channels, *added)
         data = np.column_stack((record.data, *added.values()))
         return Record(names, data, {**record.manifest, "channels": list(names)})
+
+
+def only_measured(record: Record, link: Link, rig: Rig) -> Record:
+    """Return a record without what its loader did not measure.
+
+    F_mod of a hybrid loader is among it: the loader's own multiplier makes it of δc as it is, and
+    what the host would make of its reading would pass for a product that is held over the frame.
+    """
+    lacking: set[str] = set()
+    for name, control in rig.controls.items():
+        lacking |= {channel(name, "force_step"), channel(name, "stop"), channel(name, "hand_force")}
+        if control.loader.multiplier == "hybrid":
+            lacking.add(channel(name, "modifying_force"))
+        if not link.measures_force:
+            lacking.add(channel(name, "force"))
+        if not link.measures_deflection:
+            lacking.add(channel(name, "deflection"))
+    kept = [i for i, name in enumerate(record.channels) if name not in lacking]
+    names = tuple(record.channels[i] for i in kept)
+    manifest = {**record.manifest, "channels": list(names)}
+    return Record(names, np.ascontiguousarray(record.data[:, kept]), manifest)

@@ -5,17 +5,18 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from coupled.errors import InputError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
+from coupled.live.hands import LiveHand
 from coupled.live.host import STOPPED, Host, Plan
-from coupled.live.measured import as_measured
-from coupled.live.pacing import Lateness
-from coupled.live.priority import first_place
+from coupled.live.pacing import Lateness, first_place
 from coupled.live.roundtrip import RoundTrips
 from coupled.record.record import Record
+from coupled.rig.parameters import Sensing
 from coupled.rig.rig import Rig
 
 Progress = Callable[[int, int], None]
@@ -61,6 +62,25 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
         stopped,
         None if plan.link is None else plan.link.round_trips,
     )
+
+
+def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
+    """Return the manoeuvre as a host flies it whose loader is real.
+
+    What simulates the loader's electronics, its gauge and its noise, is left out: the readings
+    have their own.
+    """
+    rig = manoeuvre.rig
+    neutral: dict[str, Any] = {"noise": {}}
+    for name, control in rig.controls.items():
+        kept = {key: getattr(control.sensing, key) for key in ("s1", "s2", "s3", "full_scale")}
+        neutral[f"controls.{name}.sensing"] = Sensing().model_copy(update=kept)
+        neutral |= {f"controls.{name}.loader.{key}": 0.0 for key in _MULTIPLIER}
+    pilots = dict.fromkeys(rig.controls, LiveHand(real=True))
+    return replace(manoeuvre, rig=rig.changed(neutral), pilots=pilots)
+
+
+_MULTIPLIER = ("multiplier_offset_N", "multiplier_drift_N_per_s")
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from coupled.campaign.entry import AS_FILED
-from coupled.campaign.labels import parameter_label
+from coupled.display import parameter_label
 from coupled.plots.grids import draw_grid, is_grid
 from coupled.plots.sweepview import Shown, mark_ended, place_of, titled, varying
 

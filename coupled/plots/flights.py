@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from coupled.authority.figures import corrects_nothing, named, remarks
 from coupled.authority.held import true_deflection
-from coupled.campaign.labels import parameter_label
+from coupled.display import parameter_label
 from coupled.plots.histories import legend_above, plain
 from coupled.record.channels import RATE, channel, unit_of
 from coupled.rig.equations import specified_force

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from coupled.campaign.entry import AS_FILED
-from coupled.campaign.labels import parameter_label
+from coupled.display import parameter_label
 from coupled.plots.histories import plain
 from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.sensitivity import SobolIndex
+from coupled.display import parameter_label
 from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
 from coupled.plots.sweepview import LABELS
 

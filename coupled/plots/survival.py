@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.survival import SurvivalLimit
+from coupled.display import parameter_label
 
 _LIVES, _LOST = "#009e73", "#cc0000"
 

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.campaign.labels import parameter_label
+from coupled.display import parameter_label
 from coupled.plots.histories import plain
 
 Floats = NDArray[np.float64]

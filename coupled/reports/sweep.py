@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.sensitivity import SobolIndex, VarianceShare
 from coupled.campaign.sweep import SweepResult
+from coupled.display import parameter_label
 from coupled.plots.results import draw_result
 from coupled.plots.saving import svg_text
 from coupled.plots.sweepview import Shown

@@ -40,7 +40,7 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
     packed = pack(rig, {name: hand})
     logs = np.empty(frames)
     rate = math.sqrt(stiffness / control.loader.mass)
-    _grow(packed, packed.view(np.float64), _growing(), rate, logs)
+    _grow(packed, packed.view(np.float64), growing_numbers(), rate, logs)
     late = logs[frames // 2 :]
     if not np.all(np.isfinite(late)):
         return math.inf
@@ -69,7 +69,7 @@ def _size(s: ControlState, rate: float) -> float:
 
 
 @cache
-def _growing() -> NDArray[np.bool_]:
+def growing_numbers() -> NDArray[np.bool_]:
     """Return which of a control's numbers, eight bytes each, grow with its motion."""
     marks = np.zeros(1, CONTROL)
     for name, declared in STAGES.items():

@@ -47,7 +47,7 @@ PLACE = "controls.column"
 
 
 def report(stiff_set: float, multiplier: str = "hybrid", low: float = LOW_SET) -> Rig:
-    """Return a bench rig whose basic gradient is the low one, and which asks for another."""
+    """Return a bench rig whose specified gradient differs from its low basic gradient."""
     changes: dict[str, Any] = {
         "bend_m_per_N": K,
         "basic_gradient_N_per_m": LOW_SET,
@@ -87,8 +87,7 @@ def test_the_equation_is_the_ratio_of_two_calibrations() -> None:
 def test_the_reports_worst_case_flown(multiplier: str, corrected: bool) -> None:
     """Eq. (7a) at 2 in and 12.5 lb/in felt: 0.31 in lost, where a known S₁ would lose 0.4.
 
-    ΔG is multiplied by a v₁ that stands for 1/(1 − K·G₀) of δc: the G_T asked for is the one
-    that is felt as 12.5 lb/in with that.
+    v₁ is read as δc/(1 − K·G₀), so the specified G_T is the one that is felt as 12.5 lb/in.
     """
     added = (float(total_to_computed(STIFF, K)) - LOW_SET) * (1.0 - K * LOW)
     asked = LOW_SET + added
@@ -157,7 +156,7 @@ def test_what_the_scales_were_before_does_not_count(
     assert sensing.deflection_scale == reading
 
 
-def test_it_is_flown_where_it_is_asked_for_only() -> None:
+def test_calibrated_low_is_flown_on_request_only() -> None:
     assert EVERY_CONFIGURATION[:5] == CONFIGURATIONS
     clamp = Clamp(deflection_m=TWO_INCHES)
     at = PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[3000.0])

@@ -15,7 +15,7 @@ from coupled.schema import build
 
 
 def test_a_bob_weight_is_no_part_of_the_felt_gradient() -> None:
-    """Held at a deflection in a pull-up, b·(n_z − 1) stands in the force, and is taken off."""
+    """In a pull-up the held force contains b·(n_z − 1), which is subtracted."""
     loader = "controls.column.loader"
     heavy = {f"{loader}.bob_weight_N_per_g": 60.0, f"{loader}.friction_N": 0.0}
     rig = read_rig(shipped_rigs()["c172p"]).changed(heavy)

@@ -1,4 +1,4 @@
-"""What a person feels is the hand's own force, whatever the strain gauge says of it.
+"""The felt force is the hand's own force, independent of the gauge reading.
 
 S₃ is off by a factor: the host's F, and the δ̂ that it makes of it, are read by it; the force of
 the hand is not. Each figure for a person is the true one.
@@ -34,7 +34,7 @@ def held(scale: float) -> Flight:
 
 @pytest.mark.parametrize("scale", [0.9, 1.0, 1.1])
 def test_felt_and_needed_are_the_hands(scale: float) -> None:
-    """111.2 N at 2 in and 12.5 lb/in, where the gauge says 122.3: the specified force is felt."""
+    """111.2 N at 2 in and 12.5 lb/in are felt, as specified; the gauge reads 122.3 N."""
     flight = held(scale)
     hand, read = flight.record["column_hand_force_N"], flight.record["column_force_N"]
     assert hand[-1] == pytest.approx(G_STIFF * PULL_m, rel=1e-6)
@@ -55,7 +55,7 @@ def test_s3_has_no_influence_on_what_is_felt() -> None:
 
 
 def test_the_standards_judge_the_hand() -> None:
-    """320 N for 3 s is under 75 lbf (333.6 N), though a gauge says 352; 350 N is over it."""
+    """320 N for 3 s is under 75 lbf (333.6 N), although the gauge reads 352 N; 350 N is over it."""
     for force, passes in ((320.0, True), (350.0, False)):
         pull = Step(force_N=force, start_s=0.5, duration_s=3.0)
         scale = 1.1 if passes else 0.9

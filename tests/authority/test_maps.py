@@ -56,7 +56,7 @@ def test_stick_force_is_as_specified_with_and_without_compensation(rig: str) -> 
         assert np.all(np.isnan(found.per_knot_N[name]) if rests else found.per_knot_N[name] > 0.0)
 
 
-def test_the_figure_says_what_its_grey_is() -> None:
+def test_the_figure_explains_its_grey() -> None:
     """With no number at all, too: numpy's warnings are errors in these tests."""
     place = "controls.column.loader."
 
@@ -141,7 +141,7 @@ def test_the_command_writes_figures_and_tables(
         (["bench", "--record", "alien.csv"], "alien.csv: dynamic_pressure_Pa: no such column"),
     ],
 )
-def test_a_map_of_nothing_is_one_line_and_writes_nothing(
+def test_an_impossible_map_is_refused_in_one_line_and_writes_nothing(
     tmp_path: Path, words: list[str], says: str
 ) -> None:
     (tmp_path / "alien.csv").write_text("time_s,column_force_N\n0.0,1.0\n0.1,1.0\n")

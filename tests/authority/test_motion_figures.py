@@ -1,4 +1,4 @@
-"""Peak rate, peak load factor and time to an attitude, of motions whose figures are known."""
+"""Peak rate, peak load factor and time to an attitude, of motions with known values."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ SECONDS = float(os.environ.get("COUPLED_LIVE_SECONDS", "30"))
 WAITS = """
 import json, sys
 from coupled.live.pacing import Pacer
-from coupled.live.priority import first_place
+from coupled.live.pacing import first_place
 frames = int(120 * float(sys.argv[1]))
 pacer = Pacer(1 / 120, frames)
 with first_place():

@@ -48,7 +48,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def grown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ship one more rig, and know one more effect and one more outsider than now."""
+    """Add a shipped rig, an effect and a fault outside the library."""
     shipped = tmp_path / "grown" / "aircraft"
     shutil.copytree(aircraft_folder(), shipped)
     text = (shipped / "bench" / "bench.toml").read_text()
@@ -145,7 +145,9 @@ def test_the_same_seed_gives_the_same_bytes_whatever_is_shipped_and_after_a_stop
         ),  # record for record
     ],
 )
-def test_a_version_draws_what_it_drew(grown: None, version: int, plans_are: str) -> None:
+def test_each_version_draws_the_same_trials_as_when_it_was_frozen(
+    grown: None, version: int, plans_are: str
+) -> None:
     # Of the draws of seed 8 by the sources of which each version's first score is.
     planned, texts = drawn(version, 8, 400, 3)
     said = repr([(plan.category, plan.names) for plan in planned])
@@ -214,7 +216,7 @@ def test_a_killed_make_goes_on(made: Path, tmp_path: Path) -> None:
         assert (tmp_path / "set" / name).read_bytes() == (made / name).read_bytes(), name
 
 
-def test_a_version_that_there_is_not_is_refused(tmp_path: Path) -> None:
+def test_an_unknown_version_is_refused(tmp_path: Path) -> None:
     done = coupled(tmp_path, "blind", "make", "set", "--trials", "99")
     assert done.returncode == 2
     assert "there is no version 99" in done.stderr
@@ -269,7 +271,7 @@ FIRST = '"format": "coupled blind key 1", "seed": 1, "salt": "00"'
 
 
 @pytest.mark.slow
-def test_a_key_that_is_none_is_refused(made: Path, tmp_path: Path) -> None:
+def test_an_invalid_key_is_refused(made: Path, tmp_path: Path) -> None:
     for text, word in (
         ("{", "not JSON"),
         ("{}", "format"),

@@ -149,7 +149,7 @@ def test_a_wheel_is_recorded_beside_the_column() -> None:
     assert setting.fly().record.channels == record.channels[:-1]
 
 
-def test_what_bends_rings_at_its_frequency() -> None:
+def test_a_structure_with_mass_rings_at_its_frequency() -> None:
     rig, twin = plain()
     bend, rate, ratio = 1e-4, 2.0 * np.pi * 6.0, 0.05
     twin.set(bend=bend, mode_rate=rate, mode_ratio=ratio)
@@ -195,7 +195,7 @@ def test_a_play_whose_contact_yields() -> None:
     assert np.max(np.abs(held)) == pytest.approx(0.5 * play + 20.0 / stiffness, rel=0.01)
 
 
-def test_what_is_read_is_not_what_is() -> None:
+def test_sensor_errors_change_the_reading_and_not_the_motion() -> None:
     rig, twin = plain()
     force = 20.0 * np.sin(2 * np.pi * nodes(6.0) / 3.0)
     true = alone(rig, twin, force)

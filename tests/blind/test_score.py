@@ -1,4 +1,4 @@
-"""The score of diagnoses made by hand, whose score is known."""
+"""Scores of hand-made diagnoses against their known values."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def trials(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_share_is_the_one_made(trials: Path) -> None:
+def test_a_score_counts_every_kind_of_trial(trials: Path) -> None:
     found = score(read_answers(trials / "answers", read_key(trials / "set.key.json"))).as_dict()
     shares = {
         (group, name): (value["right"], value["of"])
@@ -315,7 +315,7 @@ def test_a_changed_key_or_a_bad_diagnosis_scores_nothing(trials: Path) -> None:
     assert files(trials) == before
 
 
-def test_other_faults_of_diagnoses(trials: Path, tmp_path: Path) -> None:
+def test_an_invalid_diagnosis_is_refused(trials: Path, tmp_path: Path) -> None:
     key = read_key(trials / "set.key.json")
     (tmp_path / "empty").mkdir()
     for folder, word in ((tmp_path / "none", "no folder"), (tmp_path / "empty", "no diagnosis")):

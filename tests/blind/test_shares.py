@@ -1,18 +1,21 @@
-"""What each effect truly holds of a gap, and which readings of it are the same law."""
+"""True shares of the effects in the residual power, and effects that are the same law."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from coupled.blind.trials import shares
 from coupled.blind.trials.deck import read_deck
 from coupled.blind.trials.make import Numbers, make_one
 from coupled.blind.trials.readings import same_law
-from coupled.blind.trials.shares import _judged, _shared, _shown, true_shares
+from coupled.blind.trials.shares import (
+    effects_shown,
+    judged_outputs,
+    share_power,
+    shares_of_outputs,
+)
 from coupled.blind.trials.trial import Plan, draw_trial, plans
 from coupled.blind.twin.setting import draw_setting
 from coupled.gap.signals.output import Output
@@ -21,60 +24,58 @@ from tests.support.rigs import bench
 
 def test_shares_of_two_that_add_up_and_of_two_that_overlap() -> None:
     a, b, both, none = frozenset("a"), frozenset("b"), frozenset("ab"), frozenset[str]()
-    found = _shared(both, {none: 1.0, a: 4.0, b: 7.0, both: 10.0})
+    found = share_power(both, {none: 1.0, a: 4.0, b: 7.0, both: 10.0})
     assert found == pytest.approx({"a": 0.3, "b": 0.6})  # and noise a tenth
     # Together they leave what either leaves alone: they share it.
-    assert _shared(both, {none: 1.0, a: 10.0, b: 10.0, both: 10.0}) == pytest.approx(
+    assert share_power(both, {none: 1.0, a: 10.0, b: 10.0, both: 10.0}) == pytest.approx(
         {"a": 0.45, "b": 0.45}
     )
     # What the rig has besides, here three floors² more, is no part of the gap.
-    besides = _shared(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
+    besides = share_power(both, {none: 4.0, a: 7.0, b: 10.0, both: 13.0})
     assert besides == pytest.approx({"a": 0.3, "b": 0.6})
     # A floor taken for 1.7 times as high as the noise is says nothing of what an effect holds.
-    quiet = _shared(a, {none: 0.36, a: 1.44})
+    quiet = share_power(a, {none: 0.36, a: 1.44})
     assert quiet == pytest.approx({"a": 0.75})
 
 
 def test_a_stage_without_an_output_is_judged_where_its_effects_show() -> None:
-    """A loader that has a gap of its own is no part of what the transducer's zero holds."""
+    """The residual of the loader does not enter the share of the transducer's zero."""
     still = np.zeros(2400)
     noise = np.random.default_rng(1).normal(0.0, 1.0, 2400)
     outputs = [
         Output(name, name, gap * noise, lambda rig: still, 1.0, 120.0)
         for name, gap in (("loader", 3.0), ("linkage", 2.0))
     ]
-    seen = _judged("sensing", outputs, bench({}), frozenset(["deflection_zero"]))
+    seen = judged_outputs("sensing", outputs, bench({}), frozenset(["deflection_zero"]))
     assert [output.stage for output in seen] == ["linkage"]
-    both = _judged("sensing", outputs, bench({}), frozenset(["force_scale"]))
+    both = judged_outputs("sensing", outputs, bench({}), frozenset(["force_scale"]))
     assert [output.stage for output in both] == ["loader", "linkage"]
 
 
-def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_effect_that_only_moves_a_stage_s_input_has_no_share_of_it() -> None:
     still = np.zeros(2400)
     surface = Output("surface", "elevator_rad", still, lambda rig: still, 1.0, 120.0)
     both = frozenset(("surface_rate_limit", "viscous_damping"))
-    assert _shown([surface], both) == {"surface_rate_limit"}
-    assert _shown([surface], frozenset(["flutter"])) == {"flutter"}  # an outsider has no outputs
+    assert effects_shown([surface], both) == {"surface_rate_limit"}
+    # An effect outside the library has no outputs of its own.
+    assert effects_shown([surface], frozenset(["flutter"])) == {"flutter"}
     rate, damping = frozenset(["surface_rate_limit"]), frozenset(["viscous_damping"])
     none = frozenset[str]()
     noise = np.random.default_rng(1).normal(0.0, 1.0, 2400)
     noise /= np.sqrt(np.mean(noise**2))
     sizes = {both: 4.0, damping: 2.0, rate: 3.0, none: 1.0}
 
-    def outputs(rig: object, size: float, flown: bool) -> list[Output]:
-        return [replace(surface, measured=size * noise, _known=[])]
-
-    monkeypatch.setattr(shares, "outputs_of", outputs)
-    given: Any = (bench({}), sizes, ["surface"])
-    assert true_shares(*given, apart=True) == {
+    outputs = {
+        had: [Output("surface", "elevator_rad", size * noise, lambda rig: still, 1.0, 120.0)]
+        for had, size in sizes.items()
+    }
+    assert shares_of_outputs(bench({}), outputs, ["surface"], apart=True) == {
         "surface": pytest.approx({"surface_rate_limit": 12.0 / 13.0})
     }
-    assert set(true_shares(*given)["surface"]) == both
+    assert set(shares_of_outputs(bench({}), outputs, ["surface"])["surface"]) == both
 
 
-def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
+def test_the_known_rig_has_the_drawn_contact_and_stamps() -> None:
     deck = read_deck(4)
     assert (deck.effects, deck.outsiders, deck.realism) == (
         read_deck(3).effects,
@@ -99,7 +100,7 @@ def test_a_rig_as_it_was_built_has_what_the_file_does_not_say() -> None:
 
 
 @pytest.mark.slow
-def test_what_a_rig_has_besides_takes_no_share_of_an_effect() -> None:
+def test_conditions_of_the_rig_take_no_share_of_an_effect() -> None:
     """Of a gap of 4.1 floors a gradient holds 0.96. By the nominal rig it was 0.47: contact and
     gradient make up for each other in part, and what the contact leaves alone was taken off whole.
     """
@@ -114,9 +115,9 @@ def test_what_a_rig_has_besides_takes_no_share_of_an_effect() -> None:
 
 @pytest.mark.slow
 def test_a_reading_begins_at_the_true_numbers() -> None:
-    """A mode of 54 Hz is a bend by 120 frames a second. Its fit from elsewhere ended at 3.5 Hz.
+    """At 120 frames a second a mode of 54 Hz equals a bend; the fit starts at the true values.
 
-    What it did there to the noise passed for what tells it from a bend.
+    A fit from other values ended at 3.5 Hz, where the mode fits noise.
     """
     numbers = Numbers(2035, 600, 24, 4)
     plan = plans(np.random.default_rng([2035, 1]), 600, read_deck(4))[43]

@@ -77,7 +77,7 @@ def test_a_preload_holds_and_then_gives_way() -> None:
     )
 
 
-def test_servo_play_and_bend() -> None:
+def test_the_linkage_has_servo_play_and_bend() -> None:
     rig, twin = plain()
     twin.set(play=1e-3, bend=1e-4)
     record = alone(rig, twin, stepped(4.0))
@@ -131,7 +131,7 @@ def test_rising_air_raises_alpha() -> None:
 
 
 @pytest.mark.parametrize("name", ["bench-compensated", "c172p-compensated", "737-uncompensated"])
-def test_the_library_flies_the_same(tmp_path: Path, name: str) -> None:
+def test_the_rig_flies_as_the_twin_does(tmp_path: Path, name: str) -> None:
     rig = POOL[name]
     frames = 20 * 120
     rng = np.random.default_rng(6)
@@ -224,7 +224,7 @@ def _clean(name: str, other: bool) -> tuple[Setting, Clean] | None:
     return fly_clean(with_other(np.random.default_rng(3), setting) if other else setting)
 
 
-def test_a_clean_record_tells_its_own_measures() -> None:
+def test_a_clean_record_has_the_duration_speed_and_spread_of_its_motion() -> None:
     rig = POOL["bench-rigid"]
     t = np.arange(1200) / 120
     data = np.column_stack((t, 3.0 * t))

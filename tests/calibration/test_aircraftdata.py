@@ -85,7 +85,7 @@ def test_a_rig_like_the_aircraft_passes_and_one_place_beyond_ten_percent_fails(
 
 
 def test_a_fault_that_the_rigs_own_file_shares_fails_against_the_aircraft(tmp_path: Path) -> None:
-    """A schedule that was typed 30 % too steep passes its own specification."""
+    """A schedule that is 30 % too steep passes against its own specification."""
     aircraft = bench(RIG)
     steep = aircraft.changed({"controls.column.schedule.total_gradient_N_per_m": [728.0, 2846.0]})
     own = check_feel(steep, "column", 0.4)
@@ -103,7 +103,7 @@ def test_friction_is_the_aircrafts_where_directions_were_noted(tmp_path: Path) -
     assert not failing(rubbing, written(tmp_path, rows(aircraft, 1500.0, directions=False)))
 
 
-def test_units_and_sides_that_were_not_read(tmp_path: Path) -> None:
+def test_data_in_us_units_and_one_direction_are_judged_in_that_direction(tmp_path: Path) -> None:
     """Pounds, inches and psf; a pull only, which is then all that is judged."""
     rig = bench(RIG)
     lines = []

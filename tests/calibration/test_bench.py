@@ -1,4 +1,4 @@
-"""The virtual bench: exact without errors, honest with them, and the full circle."""
+"""The virtual bench: exact without noise, correct coverage with noise, and calibrated flights."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from coupled.authority.compare import Outcome, compare
 from coupled.calibration.accuracy import deflection_off, felt_off, made_of_asked
 from coupled.calibration.assumed import Scales, real_scales
-from coupled.calibration.bench import CalibrationBench, _null, _without_converters, take_readings
+from coupled.calibration.bench import CalibrationBench, take_readings
 from coupled.calibration.calibrate import calibrate_control
 from coupled.calibration.calibrated import with_calibration
 from coupled.calibration.coverage import measure_coverage
@@ -66,7 +66,9 @@ def test_noise_free_readings_give_s1_s2_s3_and_k_to_1e_9(changes: dict[str, Any]
 @pytest.mark.parametrize(
     ("name", "control"), [("bench", "column"), ("c172p", "wheel"), ("c172p", "pedals")]
 )
-def test_breakout_friction_two_segments_and_other_controls(name: str, control: ControlName) -> None:
+def test_noise_free_readings_give_k_with_breakout_friction_and_two_segments(
+    name: str, control: ControlName
+) -> None:
     found, data = without_errors(read_rig(shipped_rigs()[name]), control)
     true = real_scales(data)
     assert found.line.bend.value == pytest.approx(data.loader.bend, rel=1e-8)
@@ -143,11 +145,11 @@ def test_the_mean_of_both_sides_is_s2_where_one_side_is_not(
     """Friction keeps a wandering hand's extreme: outward nulls are high, inward ones low."""
     rig = read_rig(shipped_rigs()[name])
     tools = replace(perfect_instruments(), hand=0.003)
-    made = CalibrationBench(rig, control, [], tools, 50)
-    null = _null(_without_converters(rig, control), made, np.random.default_rng(1))
+    made = CalibrationBench(rig, control, stations(rig, control, 2, 1), tools, 50)
+    read = take_readings(made, 1)
     true = real_scales(rig.controls[control])
-    ratio = null[1] / null[2] * true.s3 / true.s2 - 1.0
-    out, back = ratio[null[3] > 0.0].mean(), ratio[null[3] < 0.0].mean()
+    ratio = read.null_v2 / read.null_v3 * true.s3 / true.s2 - 1.0
+    out, back = ratio[read.null_side > 0.0].mean(), ratio[read.null_side < 0.0].mean()
     assert out > 0.002
     assert back < -0.002
     assert abs(0.5 * (out + back)) < 0.0018  # 4 standard errors
@@ -211,10 +213,10 @@ def flown(rig: Rig, configuration: Configuration) -> Outcome:
     return flight.outcome
 
 
-def test_full_circle(tmp_path: Path) -> None:
-    """Bench, calibrate, write, fly: a rig that lost 20 % gives its authority and feel back.
+def test_a_bench_calibrated_and_flown_has_the_promised_authority(tmp_path: Path) -> None:
+    """A calibration restores the authority and feel of a rig that lost 20 %.
 
-    The rig's S₁ is 4 % off and its host knows of no bend: 1 − 0.96/1.2 = 20 % is lost.
+    The rig's S₁ is 4 % off and K̂ is 0: 1 − 0.96/1.2 = 20 % is lost.
     """
     base = read_run("worst-case")[0].rig
     rig = base.changed(
@@ -251,7 +253,7 @@ def test_full_circle(tmp_path: Path) -> None:
 
 
 def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
-    """A fault crosses from a worker as the one line that it is."""
+    """An error in a worker process is reported in the same one line."""
     rig = report_rig()
     few = stations(rig, "column", 3, 1)
     with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
@@ -261,7 +263,7 @@ def test_a_bench_that_cannot_be_fitted_says_so_from_another_process() -> None:
 
 
 def test_a_wandering_hand_parts_the_instruments_readings() -> None:
-    """Perfect instruments, read one after the other: what is left is the hand's 1 %."""
+    """With perfect instruments read in sequence, the residual is the hand's 1 % variation."""
     rig = report_rig()
     tools = replace(perfect_instruments(), hand=0.01)
     readings = take_readings(

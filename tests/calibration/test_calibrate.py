@@ -83,7 +83,7 @@ def test_noise_does_not_pass_for_a_second_gradient() -> None:
         ({"deflection": 1000.0 * grid()[0]}, "row 2: deflection: is .* another unit"),
     ],
 )
-def test_readings_that_tell_nothing_are_refused(change: Any, says: str) -> None:
+def test_readings_that_do_not_determine_k_are_refused(change: Any, says: str) -> None:
     with pytest.raises(InputError, match=says):
         fit(replace(readings(*grid()), **change))
 
@@ -109,7 +109,7 @@ def test_a_supply_against_the_hand_is_named() -> None:
         fit(r)
 
 
-def test_too_few_readings() -> None:
+def test_too_few_readings_are_refused() -> None:
     with pytest.raises(InputError, match="in 3 rows; 4 readings are the least"):
         fit(readings(*grid(3, 1), per_set=1))
 
@@ -211,7 +211,7 @@ def test_a_calibration_changes_what_the_host_assumes_and_not_the_hardware() -> N
     assert taken.sensing.deflection_scale == taken.sensing.force_scale == 1.0
 
 
-@pytest.mark.parametrize("counts", [(5, 8), (8, 5), (3, 9), (12, 4)])
+@pytest.mark.parametrize("counts", [(3, 9), (12, 4)])
 def test_repeated_corners_are_not_taken_for_mistyped(counts: tuple[int, int]) -> None:
     """A plan repeats two corners: the smaller group must not look like outliers to the larger."""
     delta = np.repeat([0.169, 0.0685], counts)

@@ -29,7 +29,7 @@ def oscillator(omega: float, zeta: float, start: float = 0.1) -> Release:
 
 
 @pytest.mark.parametrize("start", [0.1, -0.1])
-def test_a_swing_in_closed_form(start: float) -> None:
+def test_a_damped_oscillation_has_the_figures_of_its_closed_form(start: float) -> None:
     omega, zeta = 9.0, 0.2
     wd = omega * math.sqrt(1.0 - zeta**2)
     swing = swing_of(oscillator(omega, zeta, start))
@@ -38,7 +38,7 @@ def test_a_swing_in_closed_form(start: float) -> None:
     np.testing.assert_allclose(swing.peaks, heights[heights > 0.05], rtol=1e-5)
 
 
-def test_an_overdamped_fall_in_closed_form() -> None:
+def test_an_overdamped_release_has_the_figures_of_its_closed_form() -> None:
     time = np.arange(0.0, 6.0, 1e-4)
     swing = swing_of(Release(time, 0.2 * np.exp(-2.0 * time), 0.2))
     assert swing.fall_s == pytest.approx(math.log(9.0) / 2.0, rel=1e-6)
@@ -47,7 +47,7 @@ def test_an_overdamped_fall_in_closed_form() -> None:
     assert math.isnan(never.fall_s)
 
 
-def test_the_rules_tolerances_of_a_release() -> None:
+def test_a_release_has_the_tolerances_of_the_rule() -> None:
     wanted = oscillator(9.0, 0.2)
     for slower, crossing in ((1.09, True), (1.11, False)):
         checks = {

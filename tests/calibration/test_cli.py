@@ -39,7 +39,7 @@ def test_help_has_examples(folder: Path) -> None:
         assert "Examples" in done.stdout
 
 
-def test_bench_calibrate_write_and_again(folder: Path) -> None:
+def test_the_commands_bench_and_calibrate_write_a_rig_that_calibrates_again(folder: Path) -> None:
     done = coupled(folder, "bench", "-o", "b.csv")
     assert done.returncode == 0, done.stderr
     assert done.stdout == "readings: b.csv  (25 readings, 6 nulls)\n"
@@ -63,7 +63,7 @@ def test_bench_calibrate_write_and_again(folder: Path) -> None:
     assert json.loads(printed.stdout) == table
 
 
-def test_typed_readings_in_inches(folder: Path) -> None:
+def test_readings_in_inches_and_pounds_are_calibrated(folder: Path) -> None:
     done = coupled(folder, "calibrate", "r.csv")
     assert done.returncode == 0, done.stderr
     assert "6 readings of the column in 2 gradient sets, rows 2 to 7" in done.stdout
@@ -159,7 +159,7 @@ def test_a_stale_calibration_is_said(folder: Path) -> None:
     assert flown.stderr == f"stale calibration: column: {change}\n"
 
 
-def test_a_plan_and_its_form(folder: Path) -> None:
+def test_the_command_prints_a_plan_and_writes_its_form(folder: Path) -> None:
     done = coupled(folder, "calibrate", "--plan", "--write", "form.csv", "--json", "p.json")
     assert done.returncode == 0, done.stderr
     assert "fewest for" in done.stdout
@@ -172,7 +172,7 @@ def test_a_plan_and_its_form(folder: Path) -> None:
     assert "row 2: v1_V: is empty" in unfilled.stderr
 
 
-def test_many_benches_are_counted(folder: Path) -> None:
+def test_the_command_counts_intervals_of_many_benches(folder: Path) -> None:
     done = coupled(folder, "bench", "--repeat", "6", "--json", "-")
     table = json.loads(done.stdout)
     assert table["benches"] == 6
@@ -245,7 +245,7 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize(("words", "says"), HOSTILE, ids=[" ".join(w)[:40] for w, _ in HOSTILE])
-def test_words_that_lead_nowhere_end_in_one_line(
+def test_wrong_arguments_are_refused_in_one_line(
     folder: Path,
     words: list[str],
     says: str,

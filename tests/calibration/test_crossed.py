@@ -97,7 +97,7 @@ def test_the_file_holds_forces_on_others(tmp_path: Path, inches: bool) -> None:
         ("force_on_wheel_N", ["10", "20", "30", "10", "20", "30"], "go with this control's own"),
     ],
 )
-def test_forces_on_others_that_tell_nothing_are_refused(
+def test_forces_on_others_that_do_not_determine_a_term_are_refused(
     tmp_path: Path, column: str, cells: list[str], problem: str
 ) -> None:
     force = [10.0, 20.0, 30.0, 10.0, 20.0, 30.0]
@@ -146,7 +146,7 @@ def test_a_plan_says_how_well_the_terms_get_known() -> None:
     assert weak == pytest.approx(3.0 * planned, rel=0.1)
 
 
-def test_forces_on_others_go_with_nothing_else() -> None:
+def test_forces_on_others_are_orthogonal_to_the_rest_of_the_design() -> None:
     held = crossed_forces(RIG, "column", 25, 100.0)["wheel"]
     assert {*held} == {-100.0, 0.0, 100.0}
     force = [station.force for station in stations(RIG, "column", 5, 5)]

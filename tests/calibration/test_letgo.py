@@ -1,4 +1,4 @@
-"""A compensated control let go: it fails Part 60's dynamic check, and passes with the remedy."""
+"""Release of a compensated control: Part 60's dynamic check fails, and passes with the remedy."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_in_flight_a_column_let_go_comes_back_when_specified() -> None:
         ({"inertia_gradient_N_per_m": [float(i) for i in range(33)]}, "has more than 32 rows"),
     ],
 )
-def test_a_table_that_cannot_be_is_refused(changes: dict[str, list[float]], says: str) -> None:
+def test_an_invalid_table_is_refused(changes: dict[str, list[float]], says: str) -> None:
     with pytest.raises(InputError, match=says):
         bench({f"{HOST}.{key}": value for key, value in changes.items()})
 
@@ -185,7 +185,7 @@ def test_the_command_writes_the_rig_whose_releases_pass(tmp_path: Path) -> None:
         (True, "rig.toml", "rig.toml: is a file that this command reads"),
     ],
 )
-def test_what_cannot_be_written_is_refused_before_anything_is_made(
+def test_an_unwritable_target_is_refused_before_any_work(
     tmp_path: Path, gradient: bool, target: str, says: str
 ) -> None:
     rig = bench({f"{HOST}.gradient": gradient})

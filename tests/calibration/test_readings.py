@@ -130,7 +130,7 @@ def test_a_fault_is_one_line_with_its_row(tmp_path: Path, text: str, says: str) 
     assert len(str(caught.value)) < 500
 
 
-def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         read_readings(tmp_path / "none.csv", "column")
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x01")

@@ -1,4 +1,4 @@
-"""Why control checks fail: each reason stands where its cause does, and goes with it."""
+"""Reasons of failed control checks: each is present exactly when its cause is."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def test_intervals_of_a_mean_hold_19_times_in_20() -> None:
     assert held / 2000 == pytest.approx(0.95, abs=0.015)
 
 
-def test_eqs_15_to_17() -> None:
+def test_the_arc_correction_is_that_of_eqs_15_to_17() -> None:
     """1 % at 14.0° and 2 % at 19.8°, and the correction is exact."""
     assert arc.shortfall(np.array([14.04 * DEGREE_rad]))[0] == pytest.approx(0.01, abs=1e-4)
     assert arc.shortfall(np.array([19.8 * DEGREE_rad]))[0] == pytest.approx(0.02, abs=1e-4)

@@ -16,10 +16,9 @@ from coupled.authority.compare import Flight, Outcome
 from coupled.campaign.check import check_run, read_expecting
 from coupled.campaign.standards import judge_standard
 from coupled.campaign.tolerances import sustained_force
-from coupled.campaign.unjudged import UnjudgedError
 from coupled.campaign.verdict import judge_expectation
 from coupled.errors import InputError
-from coupled.flight.expectation import Expect, Figure, Standard
+from coupled.flight.expectation import Expect, Figure, Standard, UnjudgedError
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile, configure
 from coupled.flight.pilot import PILOTS
@@ -131,12 +130,14 @@ def test_a_difference_is_taken_row_by_row() -> None:
         ({"measure": "time_to_attitude_s", "most": 5.0}, False, "no such figure"),
     ],
 )
-def test_what_cannot_be_judged_says_why(keys: dict[str, Any], ended: bool, says: str) -> None:
+def test_an_expectation_that_cannot_be_judged_has_its_reason(
+    keys: dict[str, Any], ended: bool, says: str
+) -> None:
     with pytest.raises(UnjudgedError, match=says):
         judge_expectation(expect(**keys), flight(RISE, ended), None)
 
 
-def test_what_lies_before_an_early_end_is_judged() -> None:
+def test_rows_before_an_early_end_are_judged() -> None:
     kept = expect(channel="x", to_s=0.5, most=1.0)
     assert judge_expectation(kept, flight(RISE, ended=True), None).passed
     reached = expect(channel="x", reaches=0.45, by_s=0.5)
@@ -292,7 +293,7 @@ def test_what_a_shipped_run_expects_holds(name: str) -> None:
     assert [v for v in verdicts if not v.passed] == []
 
 
-def test_only_what_is_looked_at_is_flown(tmp_path: Path) -> None:
+def test_only_flights_with_an_expectation_are_flown(tmp_path: Path) -> None:
     path = written(tmp_path, 'measure = "loss"\nconfiguration = "compensated"\nmost = 0.1')
     seen = set()
     check_run(read_expecting(str(path)), lambda label, done, total: seen.add((label, total)))
@@ -376,7 +377,9 @@ def test_check_tells_pass_and_fail_and_writes_junit(tmp_path: Path) -> None:
         (["check", "capture", "--junit", "push.toml/x.xml"], "cannot be written there"),
     ],
 )
-def test_a_check_that_cannot_be_is_one_line(tmp_path: Path, words: list[str], says: str) -> None:
+def test_an_invalid_check_is_refused_in_one_line(
+    tmp_path: Path, words: list[str], says: str
+) -> None:
     written(tmp_path)
     done = coupled(tmp_path, *words)
     assert (done.returncode, done.stdout) == (2, "")

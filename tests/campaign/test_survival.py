@@ -86,7 +86,9 @@ def test_the_closed_form_moves_the_rigid_boundary_by_the_loss() -> None:
         ("[[survive]]", "[survive]", "survive: each is written [[survive]]"),
     ],
 )
-def test_survival_of_nothing_is_one_line(folder: Path, old: str, new: str, says: str) -> None:
+def test_an_invalid_survival_condition_is_refused_in_one_line(
+    folder: Path, old: str, new: str, says: str
+) -> None:
     (folder / "s.toml").write_text(SWEEP.replace(old, new))
     with pytest.raises(InputError) as fault:
         read_plan(folder / "s.toml")
@@ -97,10 +99,10 @@ def test_survival_of_nothing_is_one_line(folder: Path, old: str, new: str, says:
 @pytest.mark.parametrize(
     ("severity", "configuration", "alive"),
     [
-        (-0.58, "gradient only", True),
-        (-0.59, "gradient only", False),
-        (-0.60, "uncompensated", True),
-        (-0.61, "uncompensated", False),
+        pytest.param(-0.58, "gradient only", True, marks=pytest.mark.slow),
+        pytest.param(-0.59, "gradient only", False, marks=pytest.mark.slow),
+        pytest.param(-0.60, "uncompensated", True, marks=pytest.mark.slow),
+        pytest.param(-0.61, "uncompensated", False, marks=pytest.mark.slow),
         (-0.66, "compensated", True),
         (-0.67, "compensated", False),
     ],

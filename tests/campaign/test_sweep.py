@@ -16,9 +16,9 @@ import pytest
 
 from coupled.campaign.flights import fly_planned, fly_sweep
 from coupled.campaign.journal import JOURNAL, opened
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.plan import planned_flights, read_plan
 from coupled.campaign.sweep import sweep, write_table
+from coupled.display import parameter_label
 from coupled.files import unfinished_name
 from coupled.parallel import executor
 from coupled.plots.campaign import draw_sweep
@@ -169,7 +169,7 @@ def gone() -> int:
     return process.pid
 
 
-def test_a_sweep_in_as_few_words(folder: Path) -> None:
+def test_a_sweep_is_a_table_or_a_file_with_or_without_a_folder(folder: Path) -> None:
     """From tables or a file, with no folder kept or one to go on in."""
     table = {
         "name": "s",

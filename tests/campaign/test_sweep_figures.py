@@ -37,7 +37,7 @@ def table(bends: np.ndarray, speeds: np.ndarray, ended: bool = False) -> pl.Data
 
 
 def words(figure: Figure) -> str:
-    """Return all that a figure says of itself, but for ticks."""
+    """Return all texts of a figure except tick labels."""
     axes = figure.axes
     said = [figure.get_suptitle(), *(a.get_xlabel() + a.get_ylabel() for a in axes)]
     for legend in figure.legends:

@@ -1,4 +1,4 @@
-"""Sweeps that mean nothing, journals that were meddled with, places that cannot be written."""
+"""Refused sweeps: invalid files, damaged journals, targets that cannot be written."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def folder(tmp_path: Path) -> Path:
         ('{"flight": 1, OTHERS, "seed": 0.5}', "line 3: seed is 0.5"),
     ],
 )
-def test_a_journal_that_was_meddled_with_is_one_line(folder: Path, line: str, says: str) -> None:
+def test_a_damaged_journal_is_refused_in_one_line(folder: Path, line: str, says: str) -> None:
     plan = plan_of(folder)
     entry = fly_planned(plan, planned_flights(plan)[0])
     with opened(folder / "o", plan) as journal:
@@ -52,14 +52,14 @@ def test_a_journal_that_was_meddled_with_is_one_line(folder: Path, line: str, sa
     assert "\n" not in str(fault.value)
 
 
-def test_two_sweeps_into_one_folder_are_one_line(folder: Path) -> None:
+def test_two_sweeps_into_one_folder_are_refused_in_one_line(folder: Path) -> None:
     with opened(folder / "o", plan_of(folder)):
         second = coupled(folder, "sweep", "s.toml", "--folder", "o")
     assert (second.returncode, second.stdout) == (2, "")
     assert second.stderr == "error: o: another sweep is writing there\n"
 
 
-def test_a_full_disk_is_one_line_and_keeps_what_is_there(folder: Path) -> None:
+def test_a_full_disk_is_one_line_and_keeps_the_finished_flights(folder: Path) -> None:
     plan, limits = plan_of(folder), resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         with opened(folder / "o", plan) as journal:
@@ -108,7 +108,7 @@ def changed(old: str, new: str) -> str:
         ('name = "s"\nrun = "push.toml"\nvary = 3\n', "each is written [[vary]]"),
     ],
 )
-def test_a_sweep_that_means_nothing_is_one_line(folder: Path, text: str, says: str) -> None:
+def test_an_invalid_sweep_is_refused_in_one_line(folder: Path, text: str, says: str) -> None:
     with pytest.raises(InputError) as fault:
         plan_of(folder, text)
     assert says in str(fault.value)
@@ -131,7 +131,7 @@ def test_a_property_that_the_aircraft_lacks_is_refused(folder: Path) -> None:
         (["--cluster", "tcp://127.0.0.1:9", "-j", "2"], "--workers: a cluster has its own"),
     ],
 )
-def test_words_that_lead_nowhere_write_nothing(folder: Path, words: list[str], says: str) -> None:
+def test_wrong_arguments_write_nothing(folder: Path, words: list[str], says: str) -> None:
     before = files(folder)
     done = coupled(folder, "sweep", "s.toml", *words)
     assert (done.returncode, done.stdout) == (2, ""), done.stderr
@@ -156,7 +156,7 @@ def test_another_sweep_does_not_go_on_in_a_folder(folder: Path) -> None:
 def test_a_cluster_that_does_not_answer_is_one_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coupled.parallel._PATIENCE_s", 0.5)
+    monkeypatch.setattr("coupled.parallel.PATIENCE_s", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with (
             pytest.raises(InputError, match=r"--cluster: .* does not answer"),

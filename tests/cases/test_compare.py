@@ -1,4 +1,4 @@
-"""What a comparison says where shares of a command would mislead, and what it is held against."""
+"""Comparisons at stops, breakouts and services, against closed forms of the statics."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_a_surface_at_its_stop_loses_nothing() -> None:
 
 
 def test_short_of_the_stop_the_loss_is_what_the_surface_lacks() -> None:
-    """The hand asks for 80 % of travel; 75 % are there, and uncompensated 74 % are reached."""
+    """80 % of travel is commanded and 75 % available; uncompensated 74 % is reached."""
     found = pulled(0.0802)
     rigid, bent = found.flight("rigid"), found.flight("uncompensated")
     assert rigid.outcome.surface_stop_norm is not None
@@ -88,7 +88,7 @@ def test_short_of_the_stop_the_loss_is_what_the_surface_lacks() -> None:
     assert bent.outcome.loss_closed_form == pytest.approx(lacks, abs=5e-3)  # without friction
 
 
-def test_short_of_any_stop_none_is_named() -> None:
+def test_a_flight_that_meets_no_stop_names_none() -> None:
     found = pulled(0.05)
     assert found.remarks() == []
     assert all(flight.outcome.surface_stop_norm is None for flight in found)
@@ -265,7 +265,7 @@ def test_a_leak_of_another_force_is_in_the_closed_form() -> None:
 
 @pytest.mark.parametrize("deflection", [1e-4, 1e-3, -1.5e-3])
 def test_within_the_breakout_the_point_is_that_of_the_structure_alone(deflection: float) -> None:
-    """δc = 0, F = δ/K and δ̂ = K̂·F, as a loader under that force comes to stand."""
+    """δc = 0, F = δ/K and δ̂ = K̂·F, as a loader at rest under that force."""
     rig = bench({LOADER + "breakout_N": 20.0})
     point = static_point(rig, "column", 3000.0, deflection)
     assert point.deflection[0] == pytest.approx(deflection, rel=1e-12)
@@ -589,7 +589,7 @@ def test_a_grip_does_not_pass_its_reach(structure: str, push: str) -> None:
 def test_at_its_reach_the_grip_stands_where_the_statics_have_it(
     structure: str, side: float
 ) -> None:
-    """The hand asks for more: F is what the statics ask for at δ = r, the loader stands there."""
+    """Under a larger force, F is the static force at δ = r, and the loader is at rest there."""
     rig = bench({LOADER + key: value for key, value in STRUCTURES[structure].items()})
     push = coupled.Step(force_N=600.0 * side, reach_m=0.12)
     record = fly(Manoeuvre(rig, {"column": push}, 8.0, bench=STATIC))
@@ -605,7 +605,7 @@ def test_at_its_reach_the_grip_stands_where_the_statics_have_it(
 
 
 def test_grips_on_one_structure_do_not_pass_their_reach() -> None:
-    """A jump of the wheel's force bends the column too, whose grip stands at its reach."""
+    """A jump of the wheel's force bends the column too, whose grip is at its reach."""
     pilots: dict[ControlName, Pilot] = {
         "column": coupled.Step(force_N=400.0, reach_m=0.1),
         "wheel": coupled.Doublet(force_N=90.0, half_period_s=0.6, rise_s=0.0, start_s=2.0),

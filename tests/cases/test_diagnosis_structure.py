@@ -155,7 +155,7 @@ def test_a_machine_without_a_servo_has_no_gap_by_a_rig_without_one() -> None:
     assert found.stage("linkage").gap == pytest.approx(1.0, abs=0.2)
 
 
-@pytest.mark.parametrize("filed_Hz", [18.0, 60.0])
+@pytest.mark.parametrize("filed_Hz", [18.0, pytest.param(60.0, marks=pytest.mark.slow)])
 def test_the_absence_of_a_servo_is_named(filed_Hz: float) -> None:
     found = diagnose(bench_rig(filed_Hz), {"r": measured_bench("well.csv")})
     assert (found.verdict, named(found)) == ("effect", ["no_servo"])

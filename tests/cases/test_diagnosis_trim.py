@@ -1,4 +1,4 @@
-"""A record is held against its rig in its own trim, and by the rig of its manifest."""
+"""A record is compared with its rig in the record's trim, and with the rig of its manifest."""
 
 from __future__ import annotations
 

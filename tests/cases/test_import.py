@@ -1,10 +1,11 @@
-"""Logs that an import once read wrong without a word, or refused without a way out."""
+"""Logs that earlier imports read wrong without a message, or refused without a remedy."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,16 @@ import pytest
 from coupled import InputError, import_log
 from coupled.record.record import read_record
 from tests.support.commands import coupled
+from tests.support.readhere import in_process
 
 CASES = Path(__file__).parents[1] / "data" / "cases"
+
+
+@pytest.fixture(autouse=True)
+def here() -> Iterator[None]:
+    """Read in this process."""
+    with in_process():
+        yield
 
 
 def taken(folder: Path, case: str) -> Path:
@@ -168,7 +177,7 @@ def test_stamps_that_stand_still_are_no_clock(tmp_path: Path, name: str) -> None
     assert tomllib.loads((folder / "m.toml").read_text())["clock"] == {"rate_Hz": "?"}
 
 
-def test_lists_of_lists_are_no_numbers(tmp_path: Path) -> None:
+def test_a_column_of_nested_lists_is_refused(tmp_path: Path) -> None:
     folder = taken(tmp_path, "robust-06")
     done = coupled(folder, "import", "nested.parquet", "--suggest", "m.toml")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
@@ -331,6 +340,6 @@ def test_joints_that_change_places_are_read_by_name(tmp_path: Path, form: str) -
     np.testing.assert_allclose(found["pedals_deflection_m"], columns["D"], atol=1e-12)
 
 
-def test_no_log_at_all_is_named() -> None:
+def test_a_map_of_no_log_is_refused() -> None:
     with pytest.raises(InputError, match="import_log: log: is empty"):
         import_log([], "map.toml")

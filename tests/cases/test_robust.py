@@ -286,8 +286,8 @@ def test_a_diagnosis_of_a_data_frame_is_that_of_its_record() -> None:
     rig = bench()
     pressure = coupled.PressureProfile(time_s=[0.0], dynamic_pressure_Pa=[3000.0])
     worn = rig.changed({"controls.column.loader.bend_m_per_N": 4e-4})
-    sweep = coupled.FrequencySweep(force_N=40, start_s=0.2, duration_s=5)
-    record = coupled.fly(worn, column=sweep, duration_s=6, dynamic_pressure_Pa=pressure).record
+    sweep = coupled.FrequencySweep(force_N=40, start_s=0.2, duration_s=4.5)
+    record = coupled.fly(worn, column=sweep, duration_s=5.2, dynamic_pressure_Pa=pressure).record
     by_record = coupled.diagnose(rig, record)
     by_frame = coupled.diagnose(rig, {"worn": record.to_polars()})
     assert by_frame.improved == by_record.improved

@@ -163,7 +163,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.usefixtures("folder")
 def test_a_sample_of_wrong_calls_ends_in_one_line() -> None:
     made = list(wrong_calls(calls(), seed=35, more=400))
-    sample = random.Random(1).sample(made, 700)
+    sample = random.Random(1).sample(made, 300)
     assert tracebacks(iter(sample)) == []
 
 

@@ -222,7 +222,7 @@ def test_a_model_folder_that_no_file_can_have_is_one_line(tmp_path: Path, name: 
         ({"controls": {"column": {"schedule": 1}}}, "controls.column.schedule: should be a table"),
     ],
 )
-def test_a_fault_is_said_in_words(table: dict[str, Any], says: str) -> None:
+def test_a_fault_is_described_in_plain_words(table: dict[str, Any], says: str) -> None:
     whole = {**tomllib.loads(shipped_rigs()["bench"].read_text()), **table}
     with pytest.raises(coupled.InputError) as caught:
         rig_from_table(whole, "rig.toml")

@@ -1,4 +1,4 @@
-"""A user's own aircraft, its XML damaged: it flies, or one line says why not, and nothing dies."""
+"""User models with damaged XML: each flies or is refused in one line; no process crashes."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_model_as_packaged_flies_from_a_folder_of_its_own(tmp_path: Path) -> N
     assert make_aircraft(flight, FRAME_s, ("column",), (), "rig.toml").trouble() == ""
 
 
-@pytest.mark.parametrize("encoding", [b"no-such", b"utf-16", b"big5"])
+@pytest.mark.parametrize("encoding", [b"no-such", pytest.param(b"utf-16", marks=pytest.mark.slow)])
 def test_an_encoding_that_python_does_not_read_is_one_line(tmp_path: Path, encoding: bytes) -> None:
     body = as_packaged()[as_packaged().index(b"<fdm_config") :]
     folder = own_model(tmp_path, b'<?xml version="1.0" encoding="%s"?>' % encoding + body)
@@ -88,7 +88,7 @@ def test_an_encoding_that_python_does_not_read_is_one_line(tmp_path: Path, encod
 
 
 def test_a_few_damaged_models_end_in_a_line(tmp_path: Path) -> None:
-    assert wrong(tmp_path, 6, seed=1) == []
+    assert wrong(tmp_path, 3, seed=1) == []
 
 
 @pytest.mark.slow

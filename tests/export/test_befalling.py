@@ -84,7 +84,7 @@ BEFALLS: dict[str, tuple[str, dict[str, float], dict[str, Any], str, float, floa
 
 
 @pytest.mark.parametrize("what", BEFALLS)
-def test_a_script_lets_befall_what_our_own_flight_has(what: str) -> None:
+def test_a_script_has_the_wind_and_events_of_our_own_flight(what: str) -> None:
     rig_name, changes, conditions, channel, moved, off = BEFALLS[what]
     rig = read_rig(shipped_rigs()[rig_name]).changed(changes)
     conditions = dict(conditions)

@@ -186,7 +186,7 @@ def test_a_key_that_cannot_be_exported_is_refused_by_name() -> None:
 
 
 def test_a_key_that_came_to_the_rig_later_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the export does not know it does not leave out in silence."""
+    """A key that the export does not list is refused."""
     known: dict[type[Section], frozenset[str]] = dict(EXPORTED)
     known[parameters.Loader] -= {"play"}
     monkeypatch.setattr("coupled.export.keys.EXPORTED", known)

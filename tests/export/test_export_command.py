@@ -12,7 +12,7 @@ from tests.support.commands import coupled, files
 
 
 @pytest.mark.slow
-def test_a_folder_stands_for_itself(tmp_path: Path) -> None:
+def test_an_exported_folder_is_self_contained(tmp_path: Path) -> None:
     done = coupled(tmp_path, "export", "737", "--jsbsim", "out/737", "--run", "from-table")
     assert done.returncode == 0, done.stderr
     assert "8 steps a run" in done.stdout

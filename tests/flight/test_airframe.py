@@ -39,7 +39,7 @@ def test_every_shipped_aircraft_trims_and_answers_to_the_rigs_signs(name: str) -
     assert climb == pytest.approx(2.0 * start[SPEED] * math.sin(rig.flight.flight_path), abs=1.0)
 
 
-def test_it_opens_no_socket_writes_no_file_and_prints_nothing(tmp_path: Path) -> None:
+def test_the_airframe_opens_no_socket_and_writes_no_file_and_prints_nothing(tmp_path: Path) -> None:
     """Loading, trimming, failing to trim and flying, in a process of its own."""
     code = """
 import os, sys, pathlib, jsbsim
@@ -106,7 +106,7 @@ def test_two_aircraft_flown_alike_are_bit_equal() -> None:
         ("c172p", {"properties": {"fcs/flaps": 1.0}}, "flight.properties.fcs/flaps", "none is"),
     ],
 )
-def test_models_that_cannot_be_flown(
+def test_a_model_that_cannot_be_flown_is_refused(
     model: str, changes: dict[str, object], key: str, says: str
 ) -> None:
     flight = Flight(**{**C172.model_dump(), "model": model, **changes})

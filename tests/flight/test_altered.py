@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.flight.aircraft import make_aircraft
+from coupled.flight.aircraft import make_aircraft, make_unchecked
 from coupled.flight.airframe import JSBSimAirframe, packaged_models
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.modelfile import Scaled
@@ -69,7 +69,7 @@ def test_pitch_damping_is_the_coefficient_of_the_pitch_rate(
 ) -> None:
     flight = shipped(name)
     models = edited_model(tmp_path, flight.model, multiplied({"/Cmq": factor}))
-    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    wanted = motions(make_unchecked(flight, FRAME, models=[models]))
     found = motions(make_aircraft(shipped(name, pitch_damping=factor), FRAME))
     nominal = motions(make_aircraft(flight, FRAME))
     scale = np.ptp(nominal, axis=0) + 1e-6
@@ -85,7 +85,7 @@ def test_pitch_stiffness_is_the_coefficient_of_the_angle_of_attack(
     """It trims with another elevator, and answers as the edited model does."""
     flight = shipped(name)
     models = edited_model(tmp_path, flight.model, multiplied({"/Cmalpha": factor}))
-    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    wanted = motions(make_unchecked(flight, FRAME, models=[models]))
     found = motions(make_aircraft(shipped(name, pitch_stiffness=factor), FRAME))
     nominal = motions(make_aircraft(flight, FRAME))
     scale = np.ptp(nominal, axis=0) + 1e-6
@@ -117,7 +117,7 @@ def test_lift_slope_is_the_lift_beyond_that_at_no_angle_of_attack(
         data.text = "\n".join(" ".join(map(repr, row)) for row in rows)
 
     models = edited_model(tmp_path, flight.model, edit)
-    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    wanted = motions(make_unchecked(flight, FRAME, models=[models]))
     found = motions(make_aircraft(shipped(name, lift_slope=factor), FRAME))
     nominal = motions(make_aircraft(flight, FRAME))
     scale = np.ptp(nominal, axis=0) + 1e-6
@@ -153,7 +153,7 @@ def test_fuel_counts_in_the_mass() -> None:
     assert light == pytest.approx(0.9 * dry, rel=1e-9)
 
 
-def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> None:
+def test_pitch_damping_reaches_functions_that_the_moment_refers_to(tmp_path: Path) -> None:
     """The Augmentor Wing's tail meets the pitch rate in functions that its lift shares."""
     factor = 0.4
 
@@ -174,7 +174,7 @@ def test_it_follows_the_functions_that_a_moment_is_made_of(tmp_path: Path) -> No
         ET.SubElement(product, "property").text = "velocities/q-aero-rad_sec"
 
     models = edited_model(tmp_path, "awjsra", edit, aircraft_folder())
-    wanted = motions(make_aircraft(shipped("awjsra"), FRAME, models=[models]))
+    wanted = motions(make_unchecked(shipped("awjsra"), FRAME, models=[models]))
     flight = shipped("awjsra", pitch_damping=factor)
     altered = make_aircraft(flight, FRAME, models=[aircraft_folder()])
     scale = np.ptp(wanted, axis=0) + 1e-6
@@ -204,7 +204,7 @@ def test_an_elevator_does_more_or_less_about_its_trim(tmp_path: Path, name: str)
         aerodynamics.insert(0, seen)
 
     models = edited_model(tmp_path, flight.model, edit)
-    wanted = motions(make_aircraft(flight, FRAME, models=[models]))
+    wanted = motions(make_unchecked(flight, FRAME, models=[models]))
     found = motions(make_aircraft(shipped(name, elevator_effectiveness=factor), FRAME))
     nominal = motions(make_aircraft(flight, FRAME))
     scale = np.ptp(nominal, axis=0) + 1e-6
@@ -217,7 +217,7 @@ def test_an_elevator_does_more_or_less_about_its_trim(tmp_path: Path, name: str)
     assert ratio == pytest.approx(factor, rel=0.05)
 
 
-def test_factors_count_together() -> None:
+def test_factors_act_together() -> None:
     both = make_aircraft(shipped("c172p", elevator_effectiveness=0.5, pitch_damping=3.0), FRAME)
     damped = make_aircraft(shipped("c172p", pitch_damping=3.0), FRAME)
     # Half the effect of a small command is that of half the command.
@@ -253,7 +253,7 @@ def test_the_models_folder_is_left_alone_and_the_temporary_one_cleared(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_a_temporary_folder_it_says_so(
+def test_a_missing_temporary_folder_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))

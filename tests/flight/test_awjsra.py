@@ -72,7 +72,7 @@ FLIGHTS = {
 
 
 @pytest.mark.parametrize("name", list(FLIGHTS))
-def test_it_trims_and_holds_hands_off(name: str) -> None:
+def test_the_aircraft_trims_and_flies_level_hands_off(name: str) -> None:
     flight = FLIGHTS[name]
     flown = airframe(flight)
     channels = motion_channels(CONTROLS, flown=True)
@@ -183,6 +183,7 @@ def test_a_row_left_out_is_missed_or_met_as_the_page_says() -> None:
     assert made.splitlines()[-2:] == held.splitlines()[-2:]
 
 
+@pytest.mark.slow
 def test_trims_elsewhere_are_as_the_page_says() -> None:
     validation()
     assert in_tables("elsewhere") == script("elsewhere").table()
@@ -305,7 +306,7 @@ def test_a_tail_that_strikes_is_no_landing() -> None:
     assert flown.motion()[PITCH] > math.radians(12.0)
 
 
-def test_its_elevator_stands_where_published() -> None:
+def test_the_elevator_in_the_approach_is_as_published() -> None:
     commands, positions = airframe(APPROACH).surface_map()
     at_trim = float(np.interp(0.0, commands, positions))
     assert at_trim == pytest.approx(math.radians(-5.0), abs=0.005)
@@ -314,7 +315,7 @@ def test_its_elevator_stands_where_published() -> None:
     )
 
 
-def test_it_loads_and_flies_without_a_word(tmp_path: Path) -> None:
+def test_the_model_loads_and_flies_without_output(tmp_path: Path) -> None:
     code = """
 from coupled.flight.runfile import read_run
 from coupled.flight.loop import fly

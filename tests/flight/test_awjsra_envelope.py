@@ -20,7 +20,7 @@ CONTROLS = ("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-nor
     [(-15.0, 0.0), (15.0, 0.0), (35.0, 0.0), (60.0, 0.0), (4.0, 15.0), (4.0, -15.0)],
 )
 @pytest.mark.parametrize("clean", [False, True], ids=["approach", "clean at 130 kt"])
-def test_it_comes_back_from_an_upset_hands_off(
+def test_the_aircraft_recovers_from_an_upset_hands_off(
     alpha_deg: float, beta_deg: float, clean: bool
 ) -> None:
     level = {"calibrated_airspeed_m_per_s": 66.9, "flight_path_rad": 0.0} if clean else {}
@@ -37,7 +37,7 @@ def test_it_comes_back_from_an_upset_hands_off(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_whatever_the_hands_do_it_stays_an_aircraft(seed: int) -> None:
+def test_random_control_inputs_leave_a_bounded_state(seed: int) -> None:
     """A minute of random controls and levers: finite, no tumbling, no energy out of nothing."""
     random = np.random.default_rng(seed)
     fdm = trimmed()
@@ -164,7 +164,7 @@ def test_the_gear_takes_its_sink_rate(sink_fps: float, most_g: float) -> None:
     assert stroke < 2.0
 
 
-def test_it_stands_on_its_wheels_and_takes_off() -> None:
+def test_the_aircraft_stands_on_its_wheels_and_takes_off() -> None:
     fdm = trimmed()
     brakes = {"fcs/left-brake-cmd-norm": 1.0, "fcs/right-brake-cmd-norm": 1.0}
     idle = dict.fromkeys(LEVERS, 0.0)
@@ -223,8 +223,8 @@ def test_thrust_takes_seconds_to_come_and_go() -> None:
     assert fdm["aero/hot-thrust-lbs"] == pytest.approx(20.0 * idle, rel=0.03)
 
 
-def test_jsbsim_has_nothing_to_say_against_it() -> None:
-    """At JSBSim's own debug level, which tells what it loads, no warning is among it."""
+def test_jsbsim_loads_the_model_without_a_warning() -> None:
+    """At JSBSim's debug level, which lists what it loads, there is no warning."""
     code = """
 import sys, jsbsim
 fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())

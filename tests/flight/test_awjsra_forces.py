@@ -155,7 +155,7 @@ def test_forces_and_moments_are_the_closed_forms(name: str) -> None:
 
 
 @pytest.mark.parametrize("alpha_deg", [90.0, -90.0])
-def test_across_the_flow_it_is_a_plate(alpha_deg: float) -> None:
+def test_the_forces_at_90_degrees_are_those_of_a_flat_plate(alpha_deg: float) -> None:
     """No lift; the drag of wing and tail as plates, 1.25 and 1.2; the tail turns it back."""
     still = dict.fromkeys(LEVERS, 0.0)
     fdm = place(trimmed(), still, gamma__deg=0.0, alpha__deg=alpha_deg)

@@ -1,4 +1,4 @@
-"""Adverse conditions: each does to the aircraft what a closed form or its mirror image says."""
+"""Adverse conditions: each acts as its closed form or its mirror image predicts."""
 
 from __future__ import annotations
 
@@ -254,7 +254,7 @@ def test_a_fault_is_one_line_with_its_key(
         ('property = "simulation/dt"\nto = 1.0', "event.a.property", "not set in flight"),
     ],
 )
-def test_what_the_model_lacks_is_refused_before_it_flies(
+def test_a_condition_that_the_model_lacks_is_refused_before_the_flight(
     tmp_path: Path, event: str, key: str, says: str
 ) -> None:
     with pytest.raises(InputError) as caught:
@@ -267,7 +267,7 @@ def test_what_the_model_lacks_is_refused_before_it_flies(
     ("changes", "key", "says"),
     [({"fuel": 50.0}, "flight.fuel", "is more than the tanks"), ({"cg_aft_m": 4.0}, "flight", "")],
 )
-def test_a_load_that_cannot_be_is_refused(changes: dict[str, float], key: str, says: str) -> None:
+def test_an_impossible_load_is_refused(changes: dict[str, float], key: str, says: str) -> None:
     with pytest.raises(InputError) as caught:
         loaded("awjsra", **changes)
     assert caught.value.key.startswith(key)

@@ -26,7 +26,7 @@ def test_the_filter_is_that_of_the_bilinear_rule(lag_s: float, frame_s: float) -
     assert found_bottom == pytest.approx(bottom, rel=1e-12)
 
 
-def test_air_that_rises_meets_the_wing_from_below() -> None:
+def test_rising_air_raises_the_angle_of_attack() -> None:
     """w m/s of rising air at V raise the angle of attack by w/V before the aircraft follows."""
     flight = read_rig(shipped_rigs()["t37"]).flight
     assert flight is not None

@@ -1,23 +1,24 @@
-"""Flights: how they end, what their record says, and that they repeat to the bit."""
+"""Flights: how they end, the content of their record, and that they repeat to the bit."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from coupled.flight import loop
 from coupled.flight.companion import Aboard
+from coupled.flight.everyframe import PlainAircraft, plain_frames
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
 from coupled.record.channels import record_channels
 from coupled.record.record import FORMAT, manifest_path, read_record, write_record
 from coupled.resources import shipped_rigs
-from coupled.rig import placed
 from coupled.rig.placed import step_frame_at
 from coupled.rig.rigfile import read_rig, rig_from_table
 from tests.support.runs import shortened
@@ -51,7 +52,7 @@ def test_the_same_run_twice_is_bit_equal(tmp_path: Path) -> None:
 
 
 def test_one_kernel_flies_every_kind_of_rig() -> None:
-    """Each kind of its own would compile for ten seconds more."""
+    """A kernel for each kind of rig would take ten more seconds to compile."""
     for run, controls in (("pull-up-c172p", 1), ("three-controls", 3), ("appendix-c", 1)):
         fly(shortened(run, controls, 2))
     kernel: Any = step_frame_at
@@ -104,29 +105,30 @@ def test_a_dive_ends_at_the_ground_and_keeps_the_record(tmp_path: Path) -> None:
     assert record["altitude_m"][-1] < 10.0
 
 
-def test_a_state_that_is_not_finite_ends_the_flight(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A NaN command gives JSBSim an all-NaN state while run() goes on saying true."""
-    flown = manoeuvre(tmp_path, 'kind = "step"\nforce_N = 10.0')
-    calls = 0
-
-    def broken(*now: Any) -> float:
-        nonlocal calls
-        calls += 1
-        return float("nan") if calls == 100 else whole.run_column(*now)
-
-    whole = placed._kernels()
-    monkeypatch.setattr(placed, "_kernels", lambda: whole._replace(run_column=broken))
-    record = fly(flown)
+def test_a_state_that_is_not_finite_ends_the_flight(tmp_path: Path) -> None:
+    """A wind of 1e12 ft/s makes JSBSim's state NaN while its run() still returns true."""
+    gale = '\n[event.gale]\nproperty = "atmosphere/wind-north-fps"\nat_s = 0.5\nto = 1e12\n'
+    record = fly(manoeuvre(tmp_path, 'kind = "step"\nforce_N = 10.0', more=gale))
     ended = record.manifest["ended_early"]
     assert ended["reason"] == "the state is not finite"
-    assert ended["time_s"] == pytest.approx(100 / 120)
+    assert 0.5 < ended["time_s"] < 0.6
+    assert len(record) == round(ended["time_s"] * 120)
     assert np.all(np.isfinite(record.data))
 
 
+def test_frames_in_blocks_end_where_the_height_is_not_a_number() -> None:
+    heights = iter([5000.0] * 100 + [float("nan")])
+    reads: Any = [lambda: 0.0] * 7 + [lambda: next(heights)]
+    calls: Any = (lambda: True, 100.0, lambda: "the state is not finite")
+    aircraft = PlainAircraft(reads, (), [(lambda command: None, 0.0)], *calls)
+    rig: Any = SimpleNamespace(run_column=lambda *frame: 0.0, address=0)
+    frames = plain_frames(aircraft, rig)
+    assert frames is not None
+    assert (frames(0, 64), frames(64, 128)) == (64, 100)
+
+
 class Onlooker:
-    """Who goes along and does nothing: the flight is then taken frame by frame."""
+    """A companion that does nothing; with it the flight runs frame by frame."""
 
     elsewhere = leads = False
 
@@ -184,11 +186,15 @@ def test_three_controls_fly_together() -> None:
         assert np.max(np.abs(record[f"{rate}_rate_rad_per_s"])) > 0.1
 
 
-def test_a_seeds_noise_does_not_hang_on_the_hands_own_force() -> None:
-    """That channel has no noise and takes no draw: the noise of a seed is that of older records."""
-    channels = ("time_s", "column_force_N", "column_hand_force_N", "pitch_rad")
-    levels = {"column_force_N": 0.5, "pitch_rad": 0.1}
-    noise = loop._noise(channels, levels, 50, 3)
-    plain = np.random.default_rng(3).standard_normal((50, 3)) * [0.0, 0.5, 0.1]
-    np.testing.assert_array_equal(noise[:, [0, 1, 3]], plain)
-    assert not noise[:, 2].any()
+def test_the_noise_of_a_channel_is_its_column_of_the_seeds_draws() -> None:
+    """The hand's own force takes no draw: the noise of a seed is that of older records."""
+    quiet = shortened("pull-up-c172p", 1, 50)
+    levels = {"noise.column_deflection_m": 1e-5, "noise.pitch_rad": 0.1}
+    noisy = replace(quiet, rig=quiet.rig.changed(levels))
+    record, plain = fly(noisy), fly(quiet)
+    drawn = [name for name in record.channels if name != "column_hand_force_N"]
+    draws = np.random.default_rng(noisy.seed).standard_normal((50, len(drawn)))
+    for name, level in (("column_deflection_m", 1e-5), ("pitch_rad", 0.1)):
+        noise = level * draws[:, drawn.index(name)]
+        np.testing.assert_allclose(record[name] - plain[name], noise, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(record["column_hand_force_N"], plain["column_hand_force_N"])

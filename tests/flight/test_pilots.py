@@ -16,11 +16,11 @@ from coupled.flight.pilot.crossover import (
     Acting,
     Compensation,
     Delay,
+    Remnant,
     adapt,
     compensation_response,
     delay_response,
 )
-from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import elevator_response
 from coupled.flight.runfile import read_run
 from coupled.record.channels import ControlName, motion_channels

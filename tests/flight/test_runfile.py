@@ -125,7 +125,7 @@ def test_edges_go_to_each_level_over_the_rise() -> None:
     assert set(steps) == {0.0, 2.0}
 
 
-def test_the_five_configurations() -> None:
+def test_the_five_configurations_differ_in_their_corrections_only() -> None:
     made = {name: configure(bench(), name).controls["column"] for name in CONFIGURATIONS}
     bends = {name: control.loader.bend for name, control in made.items()}
     assert bends == dict.fromkeys(CONFIGURATIONS, K_REPORT) | {"rigid": 0.0}

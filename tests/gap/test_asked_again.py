@@ -59,6 +59,7 @@ def test_a_richer_law_of_friction_takes_the_plain_one_s_place_by_all_of_the_reco
     assert one.probability > 0.99
 
 
+@pytest.mark.slow
 def test_plain_friction_stays_plain_by_all_of_the_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -307,6 +307,7 @@ def test_what_is_not_certain_with_all_its_rivals_is_incredible(
     assert ("force_scale" in incredible(choice, [found])) is said
 
 
+@pytest.mark.slow
 def test_a_diagnosis_blames_no_stage_by_what_is_incredible(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,7 +27,13 @@ def test_a_gain_that_the_file_says_is_fitted_wherever_it_shows() -> None:
     assert known["force_skew"].shows_in == ("loader",)
 
 
-@pytest.mark.parametrize(("name", "factor"), [("force_scale", 1.006), ("deflection_scale", 0.995)])
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        pytest.param("force_scale", 1.006, marks=pytest.mark.slow),
+        ("deflection_scale", 0.995),
+    ],
+)
 def test_a_gain_within_its_tolerance_is_no_gap_and_is_said(
     tmp_path: Path, name: str, factor: float
 ) -> None:

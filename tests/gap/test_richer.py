@@ -61,8 +61,12 @@ LOOPED = {"bend_{d}_per_N": 1e-4, "share": 0.3, "width_N": 6.0}
     ("values", "named"),
     [
         ({"bend": {"bend_{d}_per_N": 1e-4}}, BEND),
-        ({"bend_hysteresis": LOOPED}, LOOP),
-        ({"stiffening_bend": {"bend_{d}_per_N": 1e-4, "limit_{d}": 8e-3}}, STIFFENING),
+        pytest.param({"bend_hysteresis": LOOPED}, LOOP, marks=pytest.mark.slow),
+        pytest.param(
+            {"stiffening_bend": {"bend_{d}_per_N": 1e-4, "limit_{d}": 8e-3}},
+            STIFFENING,
+            marks=pytest.mark.slow,
+        ),
         ({"structural_mode": {"bend_{d}_per_N": 1e-4, "frequency_Hz": 6.0}}, MODE),
     ],
     ids=lambda one: one.name if hasattr(one, "name") else "",

@@ -377,7 +377,9 @@ def test_a_search_over_lower_floors_loses_nothing_likelier(before: int) -> None:
     assert _kept(case, choices[before], again).fit.effects == (offset,)
 
 
-@pytest.mark.parametrize(("force_N", "width_N"), [(8.0, 2.0), (45.0, 20.0)])
+@pytest.mark.parametrize(
+    ("force_N", "width_N"), [(8.0, 2.0), pytest.param(45.0, 20.0, marks=pytest.mark.slow)]
+)
 def test_a_bend_with_hysteresis_is_sought_at_widths_of_their_own(
     tmp_path: Path, force_N: float, width_N: float
 ) -> None:

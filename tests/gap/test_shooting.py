@@ -42,7 +42,9 @@ def stuck(seed: int) -> tuple[Case, Fit]:
     return case, case.fit((PLAIN,), "fitted", descent=Descent("wide"))
 
 
-@pytest.mark.parametrize("seed", [35, 38, 42, 43])
+@pytest.mark.parametrize(
+    "seed", [35, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (38, 42, 43))]
+)
 def test_short_replays_lead_to_the_breakaway_from_afar(seed: int) -> None:
     """The law's own starts end in hollows: an order of slips that is not the record's.
 
@@ -70,6 +72,7 @@ def test_a_law_that_holds_plain_friction_is_begun_there_and_nowhere_else() -> No
     assert begun["asymmetric_friction.pull_N"] == 1.25
 
 
+@pytest.mark.slow
 def test_what_plain_friction_leaves_open_is_asked_of_the_breakaway_on_all_of_the_record() -> None:
     """Half of the record had named plain friction, and no little breakaway is foretold to gain."""
     case, _ = stuck(38)
@@ -222,6 +225,7 @@ def test_a_contact_that_holds_rigidly_is_asked_of_a_breakaway_with_a_contact_of_
     assert not richer._is_cause(case, LAW, PLAIN, corner, rigid)
 
 
+@pytest.mark.slow
 def test_a_setting_at_its_end_beside_friction_begins_anew_where_it_would_be_held_against_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -1,4 +1,4 @@
-"""A real loader with a fault in what it measures: what is ordered, recorded and said of it."""
+"""A loader with faulty measurements: the orders, the record and the warnings."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Spring:
 
 
 def flown(fault: Fault, seconds: float = 10.0) -> tuple[LiveFlight, list[str], Spring]:
-    """Return a flight with a loader that has a fault, what was said, and the loader."""
+    """Return a flight with a loader that has a fault, the warnings, and the loader."""
     said: list[str] = []
     link = Spring(fault)
     manoeuvre = Manoeuvre(RIG, {"column": LiveHand()}, seconds)
@@ -99,7 +99,7 @@ def test_forces_fade_while_a_measurement_cannot_be_true(
     assert ordered == {0.0}
 
 
-def test_a_sample_that_does_not_come_is_marked_and_teaches_nothing() -> None:
+def test_a_missing_sample_is_marked_and_does_not_change_the_estimate() -> None:
     def lose(time_s: float, now: Measured) -> Measured | None:
         return None if time_s > 1.0 and round(time_s * RIG.frame_rate) % 50 == 0 else now
 
@@ -118,7 +118,7 @@ def test_a_sample_that_does_not_come_is_marked_and_teaches_nothing() -> None:
     assert found["bend"] == pytest.approx(COLUMN.loader.bend, rel=0.02)
 
 
-def test_a_transducer_that_falls_silent_teaches_nothing() -> None:
+def test_a_silent_transducer_does_not_change_the_estimate() -> None:
     def silent(time_s: float, now: Measured) -> Measured:
         return now._replace(deflection=math.nan) if time_s > 4.0 else now
 

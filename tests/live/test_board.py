@@ -1,4 +1,4 @@
-"""What host and page share, and what the page lets in."""
+"""The memory that host and page share, and the messages that the page accepts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_rows_come_in_order_and_once() -> None:
     assert seen + rows[:, 0].tolist() == list(range(3 * ROWS))
 
 
-def test_who_comes_late_gets_the_last_rows() -> None:
+def test_a_late_viewer_gets_the_last_rows() -> None:
     memory = shared_memory()
     host = Board(memory)
     for k in range(2 * ROWS):
@@ -34,7 +34,7 @@ def test_who_comes_late_gets_the_last_rows() -> None:
     assert rows[:, 0].tolist() == list(range(2 * ROWS - ROWS // 2, 2 * ROWS))
 
 
-def test_a_state_is_read_once_and_whole() -> None:
+def test_a_state_is_read_once_and_complete() -> None:
     memory = shared_memory()
     host, page = Board(memory), Board(memory)
     assert page.state(0) == (0, "")
@@ -61,12 +61,12 @@ def test_a_state_is_read_once_and_whole() -> None:
         json.dumps({"what": "mark", "text": "x" * 201}),
     ],
 )
-def test_what_is_no_word_of_the_page_is_dropped(text: str) -> None:
+def test_an_invalid_message_of_the_page_is_dropped(text: str) -> None:
     server = pytest.importorskip("coupled.live.dashboard.server")
     assert server.word_of(text) is None
 
 
-def test_a_word_of_the_page_is_taken() -> None:
+def test_a_valid_message_of_the_page_is_accepted() -> None:
     server = pytest.importorskip("coupled.live.dashboard.server")
     word = server.word_of('{"what": "set", "control": "column", "text": "bend", "value": 1e-4}')
     assert word == {"what": "set", "control": "column", "text": "bend", "value": 1e-4}

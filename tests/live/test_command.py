@@ -26,7 +26,7 @@ def test_a_run_flown_in_lock_step_has_the_bytes_of_fly(tmp_path: Path) -> None:
     assert (tmp_path / "live.csv").read_bytes() == (tmp_path / "batch.csv").read_bytes()
 
 
-def test_real_time_takes_as_long_as_it_says(tmp_path: Path) -> None:
+def test_a_paced_flight_takes_its_duration(tmp_path: Path) -> None:
     begun = time.monotonic()
     done = coupled(tmp_path, "live", "capture", "--duration", "0.5", "--json", "-")
     assert time.monotonic() - begun > 0.5 - 1 / 120
@@ -49,7 +49,7 @@ def test_real_time_takes_as_long_as_it_says(tmp_path: Path) -> None:
         (["capture", "-o", "x.txt"], "a record ends in"),
     ],
 )
-def test_what_cannot_be_is_one_line(words: list[str], said: str, tmp_path: Path) -> None:
+def test_a_wrong_option_is_refused_in_one_line(words: list[str], said: str, tmp_path: Path) -> None:
     done = coupled(tmp_path, "live", *words)
     assert done.returncode == 2
     assert said in done.stderr
@@ -59,7 +59,7 @@ def test_what_cannot_be_is_one_line(words: list[str], said: str, tmp_path: Path)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
-def test_a_signal_leaves_a_whole_record(number: int, code: int, tmp_path: Path) -> None:
+def test_a_signal_leaves_a_complete_record(number: int, code: int, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "coupled", "live", "tracking", "-o", "r.csv"]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(command, cwd=tmp_path, env=env, stdout=subprocess.DEVNULL) as process:

@@ -1,4 +1,4 @@
-"""Who flies live: a stick's axes, and a hand that goes where the stick says."""
+"""The hand of a live flight: the axes of a stick, and the hand that follows it."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def test_axes_are_taken_by_number_and_turned_by_a_minus() -> None:
 
 
 @pytest.mark.parametrize("words", ["", "x", "1,,2", "--1", "99"])
-def test_axes_that_are_none_are_refused(words: str) -> None:
+def test_invalid_axes_are_refused(words: str) -> None:
     with pytest.raises(InputError, match="--axes"):
         axes_of(words)
 
 
-def test_where_no_stick_is_it_is_said() -> None:
+def test_a_missing_stick_is_refused() -> None:
     pytest.importorskip("pygame")
     with pytest.raises(InputError, match="no stick"):
         Stick(number=60)
@@ -75,7 +75,7 @@ class Wanted:
 
 
 class Looker:
-    """Says words at given times."""
+    """A watcher that gives commands at given times."""
 
     def __init__(self, *words: tuple[float, Word]) -> None:
         self._words = list(words)
@@ -95,7 +95,7 @@ class Looker:
         """Nothing is open."""
 
 
-def test_a_hand_goes_where_the_stick_says_with_the_force_that_takes() -> None:
+def test_the_hand_follows_the_stick_with_the_force_that_the_loader_needs() -> None:
     manoeuvre = rig_live("report-column", 4.0)
     record = fly_live(manoeuvre, Plan(paced=False, wishes=Wanted())).record
     held = record.between(3.0, 4.0)
@@ -129,8 +129,8 @@ def test_switches_marks_and_stop_act_at_their_frame() -> None:
     assert len(warned) == 2
 
 
-def test_what_is_led_on_a_rig_without_services_is_recorded_as_a_runs_events_are() -> None:
-    """The rig file gives no services; led from outside, they have a batch flight's own bytes."""
+def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
+    """The record has the bytes of a batch flight, although the rig file gives no services."""
     led = [("trim_m", 0.5, 0.02), ("feel_lost", 1.0, 0.4), ("jammed", 1.5, 1.0)]
     plain = rig_live("report-column", 2.0)
     plain = replace(plain, pilots={"column": Step(force_N=30.0, start_s=0.2)})
@@ -154,7 +154,7 @@ def test_a_bench_is_flown_live_too() -> None:
     assert record["column_deflection_m"][-1] > 0.0
 
 
-def test_what_cannot_be_flown_is_refused() -> None:
+def test_an_impossible_duration_is_refused() -> None:
     for bad in (0.0, -1.0, 8000.0):
         with pytest.raises(InputError, match="--duration"):
             run_live("capture", "", bad, "pilot")

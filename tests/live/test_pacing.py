@@ -9,8 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from coupled.live.pacing import EDGES_ms, Pacer
-from coupled.live.priority import first_place
+from coupled.live.pacing import EDGES_ms, Pacer, first_place
 
 FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
 
@@ -132,7 +131,7 @@ def test_only_the_thread_that_flies_goes_first_and_only_while_it_flies() -> None
     assert os.sched_getscheduler(0) == before
 
 
-def test_a_flight_goes_on_where_the_system_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_continues_without_real_time_priority(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 

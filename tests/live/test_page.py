@@ -62,7 +62,7 @@ def opened(url: str) -> Iterator[tuple[Any, list[str]]]:
 
 
 def alien(asked: str, url: str) -> bool:
-    """Tell whether something from elsewhere is asked for."""
+    """Return whether a request goes to another host."""
     return not asked.startswith("data:") and urlsplit(asked).netloc != urlsplit(url).netloc
 
 
@@ -129,7 +129,7 @@ def test_the_flight_goes_on_without_its_page(tmp_path: Path) -> None:
     assert len(read_record(tmp_path / "r.csv")) == 960
 
 
-def test_only_the_page_itself_is_let_in(tmp_path: Path) -> None:
+def test_requests_of_another_origin_are_refused(tmp_path: Path) -> None:
     with flown(tmp_path, "tracking") as (_, url):
         place = urlsplit(url)
 

@@ -27,14 +27,14 @@ ROOT = Path(__file__).parents[2]
 
 
 def flown(path: Path, seconds: float = 2.5) -> tuple[LiveFlight, Recording, list[str]]:
-    """Fly in real time, recording; return the flight, its recording and what was said."""
+    """Fly in real time, recording; return the flight, its recording and the warnings."""
     said: list[str] = []
     recording = Recording(path, said.append)
     manoeuvre = replace(read_run("capture")[0], duration_s=seconds)
     return fly_live(manoeuvre, Plan(watchers=[recording], warn=said.append)), recording, said
 
 
-def test_what_is_on_disk_in_flight_is_the_record_s_beginning(tmp_path: Path) -> None:
+def test_the_file_in_flight_is_the_beginning_of_the_record(tmp_path: Path) -> None:
     path = tmp_path / "new" / "r.csv"
     flight, recording, said = flown(path)
     assert said == []

@@ -1,4 +1,4 @@
-"""No order goes beyond the limits of size and rate, whatever is asked for."""
+"""Limits of size and rate on every order, and the plausibility of measurements."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ORDERS = st.lists(st.builds(Order, ANY, ANY, ANY, ANY, ANY, ANY, ANY), min_size=
 
 
 @given(ORDERS, st.floats(0.0, 1.0))
-def test_whatever_is_asked_size_and_rate_stay_within(asked: list[Order], share: float) -> None:
+def test_any_order_is_limited_in_size_and_rate(asked: list[Order], share: float) -> None:
     limiter, step = Limiter(LIMITS, TRAVEL, FRAME_s), 2000.0 * FRAME_s * (1.0 + 1e-12)
     last = Order(*[0.0] * 7)
     for order in asked:
@@ -63,7 +63,7 @@ def test_the_loader_s_own_spring_counts_where_the_host_orders_it(asked: list[Ord
         assert most(limiter.order(order, 1.0), own) <= 200.0 * (1.0 + 1e-9)
 
 
-def test_what_is_together_too_much_is_reduced_in_proportion() -> None:
+def test_parts_that_exceed_a_limit_together_are_reduced_in_proportion() -> None:
     limiter, asked = Limiter(LIMITS, TRAVEL, FRAME_s), Order(1000.0, 1000.0, 0, 120.0, 0, 1560.0, 0)
     for _ in range(200):
         sent = limiter.order(asked, 1.0)
@@ -73,7 +73,7 @@ def test_what_is_together_too_much_is_reduced_in_proportion() -> None:
 
 
 def watched(force: Floats, computed: Floats, more: Floats, gauge: bool = True) -> list[str]:
-    """Return what is said of each sample of a control; δ is as it should be, and `more`."""
+    """Return the fault found at each sample of a control; δ is the true one plus `more`."""
     plausible = Plausibility(COLUMN, FRAME_s, gauge)
     servo = Servo(COLUMN, FRAME_s)
     places = [servo.move(float(one)) for one in computed]
@@ -88,7 +88,7 @@ def hand(seconds: float, noise: float = 0.05) -> tuple[Floats, Floats]:
     return force + noise * np.random.default_rng(1).standard_normal(len(time)), force / 1200.0
 
 
-def test_what_a_healthy_control_measures_is_plausible() -> None:
+def test_measurements_of_a_healthy_control_are_plausible() -> None:
     force, computed = hand(20.0)
     for more in (0.0 * force, 0.9 * K * force, 2e-3 * np.sign(force)):  # softened, with play
         assert set(watched(force, computed, more)) == {""}
@@ -129,7 +129,7 @@ def test_an_order_within_the_limits_passes_as_it_is() -> None:
     assert limiter.limited == 1
 
 
-def test_what_is_no_number_leaves_the_last_order() -> None:
+def test_an_order_that_is_not_a_number_repeats_the_last_one() -> None:
     limiter = Limiter(LIMITS, TRAVEL, FRAME_s)
     limiter.order(Order(50.0, 50.0, 0.0, 3.0, 9.0, 610.0, 0.0), 1.0)
     sent = limiter.order(Order(math.nan, math.nan, 0.0, math.nan, math.nan, 610.0, 0.0), 1.0)

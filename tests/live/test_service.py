@@ -32,7 +32,7 @@ def test_the_slope_is_that_of_least_squares_without_noise() -> None:
     assert found.excitation_N == pytest.approx(30.0 / np.sqrt(2.0), rel=0.02)
 
 
-def test_the_interval_holds_k_as_often_as_it_says() -> None:
+def test_the_interval_has_its_nominal_coverage() -> None:
     force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(720))
     held = 0
     for seed in range(100):
@@ -49,7 +49,7 @@ def correlated(count: int, memory: float, random: np.random.Generator) -> np.nda
     return np.asarray(lfilter([1.0], [1.0, -memory], white))
 
 
-def test_the_interval_holds_k_where_the_noise_is_correlated() -> None:
+def test_the_interval_has_its_coverage_with_correlated_noise() -> None:
     """The variance is (1 + ρ)/(1 − ρ) times that of white noise; without it 59 % would hold K."""
     memory, count, frames = 0.7, 100, 1800
     force = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(frames))
@@ -86,7 +86,7 @@ def test_an_alarm_needs_four_standard_errors_and_5_percent(
     assert found.alarm == alarm
 
 
-def test_a_hand_that_does_too_little_teaches_nothing() -> None:
+def test_too_little_excitation_freezes_the_estimate() -> None:
     active = 30.0 * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(720))
     idle = 0.5 * LEAST_N * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(3600))
     estimator = BendEstimator(COLUMN, FRAME_s)
@@ -114,7 +114,7 @@ def servoed(computed: np.ndarray) -> np.ndarray:
     return np.asarray(answer)
 
 
-def test_a_sample_that_is_repeated_teaches_nothing() -> None:
+def test_a_repeated_sample_does_not_change_the_estimate() -> None:
     force, computed = moved(2400)
     deflection = servoed(computed) + K * force
     estimator = BendEstimator(COLUMN, FRAME_s)
@@ -142,7 +142,7 @@ def test_lost_samples_leave_k_without_bias() -> None:
     assert estimator.now.bend == pytest.approx(K, rel=2e-3)
 
 
-def test_adaptation_is_slow_bounded_and_needs_to_be_sure() -> None:
+def test_adaptation_is_slow_and_bounded_and_needs_a_small_error() -> None:
     sure = ServiceBend(3.0 * K, 0.01 * K, 20.0, frozen=False, alarm=True)
     adaptation, used = Adaptation(K, 2189.0), K
     for k in range(60 * 120):

@@ -91,7 +91,7 @@ def test_a_foreign_packet_and_one_of_another_flight_are_dropped(pair: Pair) -> N
     pair.close()
 
 
-def test_a_loader_that_restarts_is_heard_again_after_the_watchdog_s_time(pair: Pair) -> None:
+def test_a_restarted_loader_is_accepted_after_the_watchdog_s_time(pair: Pair) -> None:
     pair.send(pair.good(5000, force=1.0))
     assert pair.link.receive(1.0) is not None
     pair.link.send(ORDERS, RUN)  # the second order
@@ -153,16 +153,16 @@ def flood(pair: Pair, count: int) -> None:
     pair.close()
 
 
-def test_of_a_thousand_bad_packets_none_gets_through(pair: Pair) -> None:
+def test_a_thousand_bad_packets_are_all_dropped(pair: Pair) -> None:
     flood(pair, 1000)
 
 
 @pytest.mark.slow
-def test_of_a_hundred_thousand_bad_packets_none_gets_through(pair: Pair) -> None:
+def test_a_hundred_thousand_bad_packets_are_all_dropped(pair: Pair) -> None:
     flood(pair, 100_000)
 
 
-def test_a_loader_hands_out_nothing_when_the_host_falls_silent() -> None:
+def test_a_loader_outputs_no_force_when_the_host_is_silent() -> None:
     loader = Loader(0)
     acted: list[Sequence[Block]] = []
     link = UdpLink("127.0.0.1", loader.port, RIG)
@@ -213,7 +213,7 @@ def test_a_minute_with_a_loader_names_what_it_has(
 
 
 @pytest.mark.slow
-def test_a_loader_that_dies_leaves_a_whole_record_and_a_held_surface(
+def test_a_loader_that_dies_leaves_a_complete_record_and_a_held_surface(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(attached, "GONE_s", 0.6)
@@ -233,7 +233,7 @@ def test_a_loader_that_dies_leaves_a_whole_record_and_a_held_surface(
     assert not flight.stopped
 
 
-def test_a_loader_that_is_not_there_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_loader_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(attached, "ANSWER_s", 0.2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as closed:
         closed.bind(("127.0.0.1", 0))
@@ -243,7 +243,7 @@ def test_a_loader_that_is_not_there_is_said_in_one_line(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("url", ["udp://", "udp://h:0", "udp://h:x", "tcp://h:1", "here"])
-def test_an_address_that_is_none_is_refused(url: str) -> None:
+def test_an_invalid_address_is_refused(url: str) -> None:
     with pytest.raises(InputError):
         open_link(url, RIG, lockstep=False, deflection=True)
 

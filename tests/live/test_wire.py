@@ -1,4 +1,4 @@
-"""The open protocol's packets: they hold what was put in, and nothing else is let through."""
+"""Packets of the open protocol: they return their content, and others are dropped."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ def test_what_is_packed_comes_back(force: float, computed: float) -> None:
 @example(b"")
 @example(GOOD[:-1])
 @example(GOOD + b"\0")
-def test_no_bytes_from_elsewhere_get_through(packet: bytes) -> None:
+def test_random_bytes_are_dropped(packet: bytes) -> None:
     with pytest.raises(BadPacketError):
         unpack_state(packet, REACHES)
 
 
 @settings(max_examples=300)
 @given(st.integers(0, 8 * len(GOOD) - 1), st.integers(0, 8 * len(GOOD) - 1))
-def test_a_bit_or_two_that_flip_are_noticed(one: int, other: int) -> None:
+def test_one_or_two_flipped_bits_are_detected(one: int, other: int) -> None:
     bits = int.from_bytes(GOOD, "little") ^ (1 << one)
     if other != one:
         bits ^= 1 << other
@@ -85,13 +85,13 @@ def test_a_bit_or_two_that_flip_are_noticed(one: int, other: int) -> None:
         (Measured(0.0, 0.0, 0.26), "out of range"),
     ],
 )
-def test_what_no_loader_can_measure_is_dropped(measured: Measured, reason: str) -> None:
+def test_a_measurement_beyond_any_loader_is_dropped(measured: Measured, reason: str) -> None:
     with pytest.raises(BadPacketError, match=reason):
         unpack_state(pack_state(HEADER, [measured]), REACHES)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 2**31 - 1))
-def test_a_sequence_goes_on_past_its_end(last: int, ahead: int) -> None:
+def test_a_sequence_number_wraps(last: int, ahead: int) -> None:
     assert newer((last + ahead) % 2**32, last)
     assert not newer(last, (last + ahead) % 2**32)
     assert not newer(last, last)

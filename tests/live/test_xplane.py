@@ -63,7 +63,7 @@ def test_a_flight_is_seen_as_it_is_flown() -> None:
     ("option", "place", "says"),
     [("--xplane", "here", "give HOST:PORT"), ("--flightgear", "here:0", "'0' is no port")],
 )
-def test_an_address_that_is_none_names_its_own_option(
+def test_an_invalid_address_names_its_option(
     option: str, place: str, says: str, tmp_path: Path
 ) -> None:
     result = coupled(tmp_path, "live", "capture", option, place)

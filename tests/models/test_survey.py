@@ -111,7 +111,7 @@ def test_a_rig_is_written_for_the_folder_of_a_model(tmp_path: Path) -> None:
         (("models", "T73"), "there is no JSBSim model 'T73'"),
     ],
 )
-def test_what_cannot_be_surveyed_is_refused_in_a_line(
+def test_a_model_that_cannot_be_surveyed_is_refused_in_one_line(
     tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
     done = coupled(tmp_path, *words)

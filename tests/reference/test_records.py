@@ -70,7 +70,7 @@ def carried(stage: Callable[[Floats], Floats], signal: Floats, level: float) -> 
     return float(np.sqrt(np.mean(np.square(tries))))
 
 
-def test_schedule(case: Case) -> None:
+def test_the_schedule_reproduces_the_record_to_its_noise(case: Case) -> None:
     q = case["dynamic_pressure_Pa"]
 
     def stage(pressure: Floats) -> Floats:
@@ -80,7 +80,7 @@ def test_schedule(case: Case) -> None:
     assert left <= 1.1 * carried(stage, q, NOISE["dynamic_pressure_Pa"]) + 1e-3
 
 
-def test_loader(case: Case) -> None:
+def test_the_loader_reproduces_the_record_to_its_noise(case: Case) -> None:
     force, computed = case["column_force_N"], case["column_computed_m"]
     gradient, none = case["column_gradient_N_per_m"], np.zeros_like(computed)
 
@@ -91,7 +91,7 @@ def test_loader(case: Case) -> None:
     assert rms(computed - stage(force)) <= 1.1 * floor
 
 
-def test_modifying_force(case: Case) -> None:
+def test_the_modifying_force_reproduces_the_record_to_its_noise(case: Case) -> None:
     computed, product = case["column_computed_m"], case["column_modifying_force_N"]
     gradient = case["column_gradient_N_per_m"]
     host = case.rig.controls["column"].compensation
@@ -102,7 +102,7 @@ def test_modifying_force(case: Case) -> None:
     assert rms(product - added * computed) <= 1.1 * floor
 
 
-def test_linkage(case: Case) -> None:
+def test_the_linkage_reproduces_the_record_to_its_noise(case: Case) -> None:
     computed, force = case["column_computed_m"], case["column_force_N"]
 
     def stage(c: Floats) -> Floats:
@@ -114,14 +114,14 @@ def test_linkage(case: Case) -> None:
     assert rms(case["column_deflection_m"] - stage(computed)) <= 1.1 * floor
 
 
-def test_compensation_is_exact(case: Case) -> None:
+def test_the_compensation_reproduces_the_record_exactly(case: Case) -> None:
     left = case["column_estimate_m"] - replay_compensation(
         case.rig, "column", case["column_computed_m"], case["column_force_N"]
     )
     assert np.max(np.abs(left)) < 2e-7  # the records' last digit
 
 
-def test_surface_and_airframe(case: Case) -> None:
+def test_surface_and_airframe_reproduce_the_record_to_its_noise(case: Case) -> None:
     """The aircraft flown by the record's own δ̂: nothing is left but white noise."""
     if case.rig.flight is None:
         assert "elevator_rad" not in case.record
@@ -145,7 +145,7 @@ def test_surface_and_airframe(case: Case) -> None:
 
 
 @pytest.mark.slow
-def test_the_shipped_records_are_those_of_the_script() -> None:
+def test_the_twin_makes_the_kept_records_again() -> None:
     """The twin of today makes the record that is kept."""
     _, level_N = rigs()["twin-bench"]
     rig, kept = reference("twin-bench")

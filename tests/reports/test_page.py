@@ -1,4 +1,4 @@
-"""One HTML file: it stands alone, says what it is given, and nothing in a name acts on it."""
+"""The HTML report: self-contained, complete, and with all names escaped."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def report_of(word: str = "x") -> Report:
     return Report("Kind", word, Verdict(word, "good", (word,)), sections, (("rig", word),), MADE)
 
 
-def test_it_stands_alone() -> None:
+def test_the_page_is_self_contained() -> None:
     text = render(report_of())
     page = Page(text)
     assert not page.open
@@ -140,7 +140,7 @@ def _words_only(word: str) -> Report:
         ("3 sides of 4 nets", "3 sides of 4 nets"),
     ],
 )
-def test_numbers_are_set_as_print_has_them(plain: str, set_: str) -> None:
+def test_numbers_are_typeset(plain: str, set_: str) -> None:
     assert typeset(plain) == set_
 
 
@@ -160,7 +160,7 @@ def test_a_browser_prints_it_and_asks_for_nothing(paper: str, tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-def test_a_request_would_be_seen(tmp_path: Path) -> None:
+def test_the_browser_test_detects_a_request(tmp_path: Path) -> None:
     file = tmp_path / "report.html"
     text = render(report_of()).replace("</main>", '<img src="http://127.0.0.1:9/x.png"></main>')
     file.write_text(text, encoding="utf-8")

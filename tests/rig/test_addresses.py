@@ -16,7 +16,7 @@ MOTION = (3000.0, 1.2, *np.linspace(-1.0, 1.0, 13).tolist())
 
 
 @pytest.mark.parametrize("rig_name", ["737", "bench"])
-def test_by_address_as_by_array(rig_name: str) -> None:
+def test_a_frame_by_address_is_the_frame_by_array(rig_name: str) -> None:
     rig = read_rig(shipped_rigs()[rig_name])
     width = 1 + CHANNELS_PER_CONTROL * len(rig.controls) + len(MOTION)
     rng = np.random.default_rng(5)
@@ -34,7 +34,7 @@ def test_by_address_as_by_array(rig_name: str) -> None:
     assert placed[1][:, -len(MOTION) :] == pytest.approx(noise[:, -len(MOTION) :] + MOTION)
 
 
-def test_arrays_that_do_not_lie_in_one_piece_are_not_taken() -> None:
+def test_a_non_contiguous_array_is_refused() -> None:
     rig = read_rig(shipped_rigs()["bench"])
     controls, script = pack(rig), np.zeros((1, 2, 9))
     with pytest.raises(AssertionError):

@@ -33,7 +33,7 @@ class HeavyStep(Step):
 
 
 class DampedStep(HeavyStep):
-    """The same, by an arm that holds fast: the structure has no damping of its own."""
+    """The same with damping in the arm: the structure is undamped."""
 
     damping: ClassVar[float] = 120.0
 
@@ -84,7 +84,7 @@ def test_an_arm_at_the_end_of_a_structure_swings_at_its_own_frequency() -> None:
 def test_the_reports_structure_needs_a_damped_arm(damping: float, stable: bool) -> None:
     """The roots of D·(1 + K·Z) + Z·S with Z = m_h·s² + c_h·s, S the servo, D the loader.
 
-    A structure without damping of its own lets a heavy arm swing against the servo's lag.
+    Without damping of the structure a heavy arm oscillates against the servo's lag.
     """
     loader = bench().controls["column"].loader
     arm = np.poly1d([_ARM_kg, damping, 0.0])

@@ -52,7 +52,7 @@ def test_a_linear_loader_superposes_what_leaks_into_it(name: str, own: int) -> N
     np.testing.assert_array_equal(got[1 - own], alone[1 - own])
 
 
-def test_a_replay_takes_it_as_the_flight_does() -> None:
+def test_a_replay_has_the_crosstalk_of_the_flight() -> None:
     rig = joined(APART | {"controls.column.loader.crosstalk": SHARE})
     times = np.arange(120 * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
     column, wheel = 60.0 * np.sin(5.0 * times), 40.0 * np.sin(7.0 * times)
@@ -64,7 +64,7 @@ def test_a_replay_takes_it_as_the_flight_does() -> None:
     np.testing.assert_allclose(made, flown[:, 1], rtol=0, atol=2e-8)
 
 
-def test_it_comes_from_the_wheel_or_from_what_there_is() -> None:
+def test_crosstalk_comes_from_the_wheel_or_from_the_control_that_the_rig_has() -> None:
     assert leaks("column", 0.1, ["column", "wheel", "pedals"]) == (0.0, 0.1, 0.0)
     assert leaks("wheel", 0.1, ["column", "wheel", "pedals"]) == (0.1, 0.0, 0.0)
     assert leaks("pedals", 0.1, ["column", "pedals"]) == (0.1, 0.0)

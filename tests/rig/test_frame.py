@@ -232,7 +232,7 @@ def test_noise_is_of_the_level_asked_and_of_the_seed() -> None:
 def test_a_control_that_stands_alone_moves_as_one_that_is_asked_for_all(
     hand: Hand, friction_N: float
 ) -> None:
-    """Services that rest change no bit, and nor does what is not asked at every node."""
+    """Inactive services change no bit, and neither do terms that are not needed at each node."""
     rig = bench({"servo_frequency_Hz": 18.0, "friction_N": friction_N, "play_m": 1e-3})
     frames, rng = 200, np.random.default_rng(3)
     script = np.zeros((1, 2, frames * rig.substeps + 1))

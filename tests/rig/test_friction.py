@@ -63,7 +63,7 @@ def test_uneven_friction_is_even_friction_and_a_constant_force() -> None:
     np.testing.assert_allclose(uneven, even, atol=1e-12)
 
 
-def test_it_holds_from_rest_by_the_direction() -> None:
+def test_friction_holds_from_rest_by_the_direction_of_the_force() -> None:
     rig = bench({**PLAIN, "friction_N": 1.0, "breakaway_N": 2.0, "friction_push_N": 3.0})
     for force, moves in ((1.9, False), (2.1, True), (-4.9, False), (-5.1, True)):
         assert bool(push(rig, force, 1.0, K)[-1] != 0.0) is moves

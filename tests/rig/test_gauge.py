@@ -201,7 +201,7 @@ def test_what_no_gauge_can_be_is_refused(changes: dict[str, object], says: str) 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_servo_at_its_rate_limit_does_not_accelerate_the_mass_on_either_side(side: float) -> None:
-    """On the limit x'' is 0 while the servo asks for more, and its equation's where it brakes."""
+    """At the rate limit x'' is 0 while the servo is commanded faster; it brakes by its equation."""
     packed = pack(
         bench({"servo_rate_limit_m_per_s": 0.2, "controls.column.sensing.gauge_mass_kg": 1.0})
     )

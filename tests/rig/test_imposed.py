@@ -50,7 +50,7 @@ def test_in_its_play_a_damper_is_not_felt() -> None:
     assert found[held][1:-1] == pytest.approx(75.0 * SPEED[held][1:-1], rel=2e-3, abs=0.05)
 
 
-def test_it_undoes_what_the_loader_does_with_a_force() -> None:
+def test_the_force_of_an_imposed_motion_is_the_force_that_made_it() -> None:
     rig = bench({"friction_N": 3.0, "friction_stiffness_N_per_m": 3e4, "breakout_N": 0.0})
 
     def pull(t: np.ndarray) -> np.ndarray:

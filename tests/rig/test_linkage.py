@@ -24,7 +24,7 @@ def servo(changes: dict[str, Any], computed: np.ndarray, force: np.ndarray | flo
     return replay_linkage(rig, "column", computed, np.zeros_like(computed) + force)
 
 
-def test_servo_ramp_response() -> None:
+def test_a_servo_answers_a_ramp_by_its_closed_form() -> None:
     w, z = 2 * math.pi * 18.0, 0.7
     t = np.arange(2000) / 2000.0
     x = servo({}, 0.1 * t)
@@ -37,12 +37,12 @@ def test_servo_ramp_response() -> None:
 
 
 @pytest.mark.parametrize("frequency_Hz", [2.0, 1000.0])
-def test_servo_is_stable_at_any_frequency(frequency_Hz: float) -> None:
+def test_a_servo_is_stable_at_any_frequency(frequency_Hz: float) -> None:
     x = servo({"servo_frequency_Hz": frequency_Hz}, np.full(8000, 0.02))
     assert x[-1] == pytest.approx(0.02, rel=1e-9)
 
 
-def test_servo_rate_limit_is_the_slope() -> None:
+def test_a_rate_limit_is_the_slope_of_the_position() -> None:
     t = np.arange(4000) / 2000.0
     x = servo({"servo_rate_limit_m_per_s": 0.05}, np.where(t < 0.2, 0.0, 0.08))
     moving = (x > 0.01) & (x < 0.06)
@@ -108,7 +108,7 @@ def test_bend_is_linear_or_saturates_towards_its_limit() -> None:
     assert linkage.bend_slope(p, 100.0) == pytest.approx(ahead, rel=1e-7)
 
 
-def test_arc_eqs_15_to_17() -> None:
+def test_a_level_ruler_reads_an_arc_by_eqs_15_to_17() -> None:
     """The report: 1 % at 14°, 2 % at 20° (by its own series 19.8°)."""
     for angle_deg, error in ((14.0, 0.01), (19.8, 0.02)):
         rig = bench({"arc_geometry": True, "controls.column.length_m": 0.4})

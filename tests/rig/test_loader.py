@@ -29,7 +29,7 @@ def test_static_deflection_is_force_over_gradient() -> None:
 
 
 @pytest.mark.parametrize("damping", [10.0, 2 * math.sqrt(M * K), 300.0])
-def test_step_response_of_the_mass_spring_damper(damping: float) -> None:
+def test_a_step_response_is_that_of_mass_spring_and_damper(damping: float) -> None:
     x = push(bench({**PLAIN, "damping_N_s_per_m": damping}), 30.0, 2.0)
     t = times(x)
     poles = np.roots([M, damping, K]).astype(complex)
@@ -84,7 +84,7 @@ def test_coulomb_friction_takes_the_same_amplitude_from_every_half_swing() -> No
     assert swings == pytest.approx(math.pi * math.sqrt(M / K), rel=1e-3)
 
 
-def test_it_breaks_away_at_the_breakaway_and_runs_at_the_running_friction() -> None:
+def test_a_loader_breaks_away_at_breakaway_and_moves_at_running_friction() -> None:
     rig = bench({**PLAIN, "friction_N": 6.0, "breakaway_N": 14.0})
     x = push(rig, lambda t: 2.0 * t, 12.0)
     moved = int(np.argmax(x > 0.0))
@@ -127,7 +127,7 @@ def test_free_mass_meets_the_stop_in_time_and_stays_there() -> None:
     assert x[left] == pytest.approx(np.maximum(back, -0.1778), abs=1e-3)
 
 
-def test_delay_shifts_the_answer() -> None:
+def test_a_delay_shifts_the_response() -> None:
     late = 0.0603  # not a whole number of substeps
 
     def force(t: np.ndarray) -> np.ndarray:
@@ -147,7 +147,7 @@ STRIBECK = {"friction_N": 4.0, "breakaway_N": 7.0, "stribeck_rate_m_per_s": 0.05
 @pytest.mark.parametrize(
     ("settings_", "least"), [(SMOOTH, 1.95), (ROUGH, 1.8), (STRIBECK, 1.8)], ids=str
 )
-def test_it_converges_with_second_order_through_stick_slip_and_neutral(
+def test_the_integration_is_of_second_order_through_stick_slip_and_neutral(
     settings_: dict[str, float], least: float
 ) -> None:
     errors = []
@@ -165,7 +165,7 @@ def test_it_converges_with_second_order_through_stick_slip_and_neutral(
     assert order > least, errors
 
 
-def test_it_is_stable_where_an_explicit_scheme_is_not() -> None:
+def test_the_integration_is_stable_where_an_explicit_scheme_is_not() -> None:
     rig = bench({**PLAIN, "mass_kg": 1e-4, "damping_N_s_per_m": 500.0})
     x = push(rig, 30.0, 20.0)
     assert x[-1] == pytest.approx(30.0 / K, rel=1e-6)

@@ -103,7 +103,7 @@ def test_a_break_within_the_breakouts_bend_puts_all_motion_on_the_second_segment
 
 
 def test_under_that_break_the_grip_moves_by_the_bend_alone() -> None:
-    """Up to F₀/(1 − K·G₂), where δ = K·F meets the second segment; then the loader lets go."""
+    """Up to F₀/(1 − K·G₂), where δ = K·F meets the second segment; then the loader moves."""
     rig = bench(STIFF_737)
     leaves = (45.0 + (6130 - 3120) * 0.022) / (1.0 - 1.3e-4 * 3120.0)
     assert 1.3e-4 * leaves > 0.022

@@ -1,7 +1,7 @@
 """S₁ of the loader's electronics, which the analog multiplier sees too: figures 3 and 5.
 
-ΔF = ΔG·δc·(S₁/Ŝ₁)·(Ŝ₂/S₂), whoever multiplies; a scale of the host's reading alone is in the
-digital product and not in the analog one.
+ΔF = ΔG·δc·(S₁/Ŝ₁)·(Ŝ₂/S₂), for either multiplier; an error of the host's reading alone is in
+the digital product and not in the analog one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Signals between the frames: the spline of another library, and what is known of it exactly."""
+"""Signals between the frames, against SciPy's spline and exact cubics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.support.gaps import nominal_rig
 
 
 @pytest.mark.parametrize("samples", [4, 5, 40, 1200])
-def test_it_is_the_cubic_spline_without_knots_at_the_second_samples(samples: int) -> None:
+def test_the_interpolant_is_the_not_a_knot_cubic_spline(samples: int) -> None:
     rig = nominal_rig(False)
     values = np.random.default_rng(samples).normal(size=samples)
     nodes = on_nodes(rig, values)
@@ -21,7 +21,7 @@ def test_it_is_the_cubic_spline_without_knots_at_the_second_samples(samples: int
     np.testing.assert_array_equal(nodes[:: rig.substeps], values)
 
 
-def test_a_cubic_is_met_exactly() -> None:
+def test_a_cubic_is_interpolated_exactly() -> None:
     rig = nominal_rig(False)
     at = np.arange(30 * rig.substeps + 1) / rig.substeps
     cubic = 1.0 - 0.4 * at + 0.03 * at**2 - 7e-4 * at**3

@@ -11,7 +11,7 @@ import pytest
 
 from coupled.rig import control as controls
 from coupled.rig.declaration import Hand, first_order_gain
-from coupled.rig.growth import _growing
+from coupled.rig.growth import growing_numbers
 from coupled.rig.packing import pack
 from coupled.rig.parameters import Control
 from coupled.schema import Section
@@ -119,7 +119,7 @@ def test_the_layout_is_that_of_the_declared_stages() -> None:
 
 def test_every_state_grows_with_the_motion_or_is_said_not_to() -> None:
     growing = np.zeros(1, controls.CONTROL)
-    growing.view(np.int64)[_growing()] = 1
+    growing.view(np.int64)[growing_numbers()] = 1
     grown = {
         f"{stage}.{name}"
         for stage in controls.CONTROL_STATE.names or ()

@@ -42,7 +42,7 @@ def along(ways: Floats) -> Floats:
     return np.array(found)
 
 
-def test_it_is_a_spring_first_and_slips_at_the_friction_last() -> None:
+def test_presliding_friction_starts_as_a_spring_and_ends_at_the_coulomb_force() -> None:
     elastic = ELASTIC_SHARE * TRAVEL_m
     assert along(np.array([elastic]))[0] == pytest.approx(elastic, rel=1e-12)
     assert along(np.array([40.0 * TRAVEL_m]))[0] == pytest.approx(TRAVEL_m, rel=1e-12)
@@ -51,7 +51,7 @@ def test_it_is_a_spring_first_and_slips_at_the_friction_last() -> None:
     assert along(np.array([elastic + soft]))[0] == pytest.approx(TRAVEL_m - soft / math.e)
 
 
-def test_a_way_in_parts_is_the_way_whole() -> None:
+def test_a_motion_in_two_parts_ends_as_the_whole_motion() -> None:
     whole = along(np.array([3.0 * TRAVEL_m, -1.7 * TRAVEL_m]))[-1]
     parts = [np.full(30, 0.1 * TRAVEL_m), np.full(17, -0.1 * TRAVEL_m)]
     assert along(np.concatenate(parts))[-1] == pytest.approx(whole, rel=1e-12)
@@ -117,11 +117,11 @@ def test_a_steps_speed_balances_its_forces(
 @example(0.1)
 @example(math.nextafter(0.1, 1.0))
 @example(1e-300)
-def test_what_is_reached_of_an_exponential_is_known_to_thirteen_digits(x: float) -> None:
+def test_the_exponential_is_accurate_to_thirteen_digits(x: float) -> None:
     assert float(reached(x)) == pytest.approx(-math.expm1(-x), rel=1e-13)
 
 
-def test_nothing_is_kept_of_what_fades_with_speed_far_above_it() -> None:
+def test_the_stribeck_part_vanishes_at_high_speed() -> None:
     p = pack(bench(YIELDS))[0]["parameters"]["friction"]
     for ratio in (0.0, 0.7, -2.0, 5.9):
         rate = ratio * float(p["stribeck_rate"])
@@ -167,7 +167,7 @@ def test_the_stiffer_the_contact_the_nearer_is_coulomb() -> None:
     assert off[2] < 0.4 * off[1] < 0.4 * 0.4 * off[0]
 
 
-def test_its_steps_are_of_second_order() -> None:
+def test_presliding_steps_are_of_second_order() -> None:
     def at(rate_Hz: float) -> Floats:
         return moved(bench({**YIELDS, "breakout_N": 3.0}).changed({"loader_rate_Hz": rate_Hz}))
 
@@ -179,7 +179,7 @@ def test_its_steps_are_of_second_order() -> None:
 
 
 def test_a_rigid_contact_is_as_it_was() -> None:
-    """Neutral: no friction, or no stiffness, and the loader does not know of bristles."""
+    """Without friction or contact stiffness the loader is unchanged."""
     p = pack(bench({**PLAIN, "friction_stiffness_N_per_m": STIFFNESS}))[0]["parameters"]
     assert p["friction"]["stiffness"] == 0.0
     free = moved(bench({**PLAIN, "friction_stiffness_N_per_m": STIFFNESS}))

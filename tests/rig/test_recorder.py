@@ -1,4 +1,4 @@
-"""A recorder that stamps channels late: closed forms, and a host that knows nothing of it."""
+"""A recorder that stamps channels late: closed forms, and no effect on the host."""
 
 from __future__ import annotations
 

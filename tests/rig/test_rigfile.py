@@ -22,7 +22,7 @@ HOST = "controls.column.compensation"
 
 
 @pytest.mark.parametrize("name", list(shipped_rigs()))
-def test_every_shipped_rig_reads(name: str) -> None:
+def test_every_shipped_rig_is_valid(name: str) -> None:
     rig = read_rig(shipped_rigs()[name])
     assert rig.name == name
     assert rig.substeps * rig.frame_rate >= 2000.0
@@ -136,7 +136,7 @@ def test_a_structure_softer_than_the_host_assumes_may_be_as_soft_as_it_is() -> N
     assert bench(soft).controls["column"].loader.bend == 1 / 2500.0
 
 
-def test_files_that_are_no_rigs(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_rig_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     with pytest.raises(InputError, match="cannot be read"):
         read_rig(path)
@@ -151,7 +151,7 @@ def test_files_that_are_no_rigs(tmp_path: Path) -> None:
         read_rig(path)
 
 
-def test_a_wheel_is_in_rad() -> None:
+def test_a_wheel_is_in_radians() -> None:
     table = copy.deepcopy(BENCH)
     column = table["controls"].pop("column")
     wheel: dict[str, Any] = {"surface": "aileron", "travel_rad": 1.5}

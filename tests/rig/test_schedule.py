@@ -13,7 +13,7 @@ from tests.support.rigs import G_STIFF, bench
 SCHEDULE = "controls.column.schedule"
 
 
-def test_schedule_interpolates_and_holds_its_ends() -> None:
+def test_a_schedule_interpolates_linearly_and_is_constant_beyond_its_ends() -> None:
     q = np.array([-10.0, 0.0, 1500.0, 3000.0, 9000.0])
     g = replay_schedule(bench(), "column", q)
     assert g == pytest.approx([560.0, 560.0, (560.0 + G_STIFF) / 2, G_STIFF, G_STIFF], rel=1e-12)
@@ -26,7 +26,7 @@ def test_a_schedule_of_many_rows_is_straight_between_each_two() -> None:
     assert replay_schedule(rig, "column", asked) == pytest.approx(np.interp(asked, q, g), rel=1e-12)
 
 
-def test_schedule_scale_and_slope() -> None:
+def test_scale_and_slope_errors_change_the_gradient_by_their_definition() -> None:
     q = np.array([0.0, 1000.0])
     scaled = replay_schedule(bench({f"{SCHEDULE}.pressure_scale": 1.5}), "column", q)
     assert scaled == pytest.approx([560.0, 560.0 + (G_STIFF - 560.0) * 0.5], rel=1e-12)
@@ -34,7 +34,7 @@ def test_schedule_scale_and_slope() -> None:
     assert sloped == pytest.approx([560.0, 560.0 + 0.5 * (G_STIFF - 560.0) / 3], rel=1e-12)
 
 
-def test_pressure_lag_is_first_order() -> None:
+def test_the_pressure_lag_is_of_first_order() -> None:
     rig = bench({f"{SCHEDULE}.pressure_lag_s": 0.4})
     t = np.arange(200) / rig.frame_rate
     q = np.where(t > 0.0, 3000.0, 0.0)

@@ -104,7 +104,7 @@ def test_f_mod_acts_about_the_trim(multiplier: str) -> None:
 
 
 def test_a_trim_release_leaves_the_control_free_and_keeps_where_it_ends() -> None:
-    """Released: m·v' + c·v = F, no spring and no breakout; then x₀ is where it was let stand."""
+    """Released: m·v' + c·v = F, no spring and no breakout; then x₀ is where it came to rest."""
     events = {
         "press": {"service": "trim_release", "at_s": 0.2},
         "let go": {"service": "trim_release", "at_s": 1.2, "to": 0.0},
@@ -163,7 +163,7 @@ def test_a_hand_that_lets_go_in_between_has_to_hold_for_the_whole_time_again() -
 
 
 def test_an_autopilot_that_is_engaged_again_is_held_against_for_the_whole_time_again() -> None:
-    """60 N from 0.5 s on: it lets go at 1.5 s, and of the second time, from 2 s on, at 3 s."""
+    """60 N from 0.5 s on: it disconnects at 1.5 s; engaged again at 2 s, it disconnects at 3 s."""
     held = {**DRIVEN, "override_time_s": 1.0}
     engage = {"service": "autopilot"}
     events = {"engage": {**engage, "at_s": 0.1}, "again": {**engage, "at_s": 2.0}}
@@ -396,7 +396,7 @@ def test_a_feel_that_fails_leaves_its_share_of_both_segments() -> None:
     assert at(record, "computed_m", 8.9) == pytest.approx(at_m + beyond, rel=1e-3)
 
 
-def test_services_that_rest_change_no_byte_of_the_record() -> None:
+def test_inactive_services_change_no_byte_of_the_record() -> None:
     """Every number of the section given, and nothing led or reached: the same flight."""
     plain = flown(force_N=20.0)
     services = {**DRIVEN, "shaker_N": 10.0, "pusher_N": 50.0, "soft_stop_m": 0.17}
@@ -468,6 +468,6 @@ def test_a_switch_is_led_from_0_to_1_and_a_place_within_the_travel() -> None:
         ({"service": "jammed", "control": "wheel"}, "the rig has no wheel"),
     ],
 )
-def test_what_cannot_be_led_is_refused(event: dict[str, Any], says: str) -> None:
+def test_an_event_that_a_service_cannot_follow_is_refused(event: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError, match=says):
         flown({}, {"it": event})

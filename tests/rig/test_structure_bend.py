@@ -10,12 +10,10 @@ import pytest
 
 import coupled
 from coupled.errors import InputError
-from coupled.flight import loop
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import configure
 from coupled.flight.runfile import read_run
 from coupled.rig import linkage
-from coupled.rig.control import ControlArray
 from coupled.rig.declaration import Hand
 from coupled.rig.frame import CHANNELS_PER_CONTROL, step_frame
 from coupled.rig.packing import pack
@@ -84,30 +82,25 @@ def test_a_structure_without_terms_changes_no_bit() -> None:
     assert np.array_equal(settled(plain, 150.0, 60.0), settled(assumed, 150.0, 60.0))
 
 
-def test_a_flight_is_the_same_node_by_node_together_or_control_by_control(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """What takes controls together only where a structure or crosstalk joins them saves time."""
+def test_a_flight_is_the_same_node_by_node_together_or_control_by_control() -> None:
+    """Controls that a structure joins are integrated together; 1e-30 m/N joins, and bends none."""
     run = replace(read_run("three-controls")[0], duration_s=10.0)
     rig = run.rig.changed({f"controls.{name}.loader.friction_N": 3.0 for name in run.rig.controls})
     # The column's grip comes to its reach.
     pilots = {**run.pilots, "column": run.pilots["column"].model_copy(update={"reach_m": 0.01})}
     run = replace(run, rig=rig, pilots=pilots)
 
-    def joining(*given: Any) -> ControlArray:
-        packed = pack(*given)
-        assert not packed["parameters"]["crossing"]["joined"].any()
-        packed["parameters"]["crossing"]["joined"] = 1
-        return packed
-
-    apart = fly(run)
-    monkeypatch.setattr(loop, "pack", joining)
-    together = fly(run)
+    joining = rig.changed({"structure.column_by_pedals_m_per_N": 1e-30})
+    assert [pack(one)["parameters"]["crossing"]["joined"].any() for one in (rig, joining)] == [
+        False,
+        True,
+    ]
+    apart, together = fly(run), fly(replace(run, rig=joining))
     for name in rig.controls:
         assert np.ptp(apart[f"{name}_hand_force_N"]) > 10.0
     assert np.ptp(apart["column_deflection_m"]) == pytest.approx(0.02, rel=1e-9)
     assert together.channels == apart.channels
-    np.testing.assert_array_equal(together.data, apart.data)
+    np.testing.assert_allclose(together.data, apart.data, rtol=0.0, atol=1e-24)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +122,7 @@ def test_the_host_adds_the_force_as_it_reads_it() -> None:
 
 
 def test_the_host_adds_the_force_that_the_gauge_has() -> None:
-    """Before its slow amplifier has answered, the wheel's gauge knows nothing of the force."""
+    """The wheel's gauge has a slow amplifier, so the host adds its force late."""
     slow = {"gauge_frequency_Hz": 0.01, "gauge_order": "first"}
     changes = {f"controls.wheel.sensing.{key}": value for key, value in slow.items()}
     column, wheel = settled(joined(changes, assumed=FULL), 150.0, 60.0)
@@ -189,7 +182,7 @@ def test_the_static_line_holds_with_forces_on_the_others() -> None:
 
 @pytest.mark.parametrize("stiffness", [1e4, 1e7, 1e10])
 def test_two_stiff_clamps_on_one_structure_are_stable(stiffness: float) -> None:
-    """Between loaders that stand still, at 0.95 of what positive definiteness allows: F = K⁻¹·δ."""
+    """Between loaders at rest, at 0.95 of what positive definiteness allows: F = K⁻¹·δ."""
     most = 0.95 * float(np.sqrt(K_REPORT * 8e-4 * RADIUS))
     between = {
         "column_by_wheel_m_per_N": most,

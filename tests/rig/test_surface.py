@@ -24,7 +24,7 @@ def command(changes: dict[str, Any], estimated: np.ndarray, q: float = 1000.0) -
     return replay_surface(rig, "column", estimated, np.full_like(estimated, q))
 
 
-def test_surface_command_sign_travel_and_clip() -> None:
+def test_the_command_has_the_surface_s_sign_and_is_clipped_at_full_travel() -> None:
     estimated = np.array([0.0, 0.0889, -0.1778, 0.5])
     assert command({}, estimated) == pytest.approx([0.0, -0.5, 1.0, -1.0])
 
@@ -41,7 +41,7 @@ def test_a_surface_has_jsbsims_sign_and_is_clipped_both_ways(
 
 
 def test_the_command_is_clipped_before_the_cable_yields() -> None:
-    """A host asks for no more than full travel, of which the air load takes its share."""
+    """The command is at most full travel; cable stretch under air load reduces it."""
     twice = np.full(3, 2 * 0.1778)
     assert command({"stretch_loss_per_Pa": 2e-4}, twice) == pytest.approx(-1.0 / 1.2)
 
@@ -73,7 +73,7 @@ def test_the_rate_limit_follows_the_lag_and_the_play_follows_both() -> None:
     assert loose == pytest.approx(np.maximum(moved - 0.05, 0.0) + 0.03, rel=1e-9)
 
 
-def test_cable_stretch_lag_rate_play_and_offset() -> None:
+def test_stretch_lag_rate_limit_play_and_offset_act_in_turn() -> None:
     frames = np.arange(300)
     step = np.where(frames > 0, -0.1778, 0.0)
     stretched = command({"stretch_loss_per_Pa": 1e-4}, step)

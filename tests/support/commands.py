@@ -1,4 +1,4 @@
-"""Commands given as a user gives them: in a folder, with words, on a terminal of 80 columns."""
+"""Runs commands as a user does: in a folder, with arguments, on a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _without_progress(text: str) -> str:
 
 
 def coupled_anew(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """Give a command to a Python of its own, as from a shell; return what came."""
+    """Run a command in a new Python process, as from a shell."""
     done = subprocess.run(
         [sys.executable, "-m", "coupled", *words],
         check=False,

@@ -23,11 +23,9 @@ import tomllib
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
-from unittest.mock import patch
 
 import h5py
 import numpy as np
@@ -40,11 +38,9 @@ from scipy import io as scipy_io
 
 from coupled.errors import InputError
 from coupled.parallel import limit_memory
-from coupled.record.importing import reading, separate
 from coupled.record.importing.convert import import_log
-from coupled.record.importing.formats.columns import Found, unpack
-from coupled.record.importing.mapping import Layout
 from coupled.record.importing.suggest.propose import propose
+from tests.support.readhere import in_process
 
 Floats = NDArray[np.float64]
 RIGHT, EITHER, ANY = "right", "either", "any"
@@ -106,7 +102,7 @@ def _signals(time_s: Floats) -> tuple[Floats, Floats]:
 
 
 def with_a_fault(rng: np.random.Generator, motion: Motion) -> Motion:
-    """Return rows with a fault as loggers make them, with or without the map's word for it."""
+    """Return rows with a typical fault of loggers, with or without the map's key for it."""
     fault = FAULTS[int(rng.integers(len(FAULTS)))]
     return fault(rng, motion)
 
@@ -614,46 +610,6 @@ def make_table(seed: int, number: int) -> tuple[str, bytes]:
 
 
 # What came of a case.
-
-
-def _here(path: Path, content: bytes, kind: str, layout: Layout) -> tuple[Any, tuple[str, ...]]:
-    """Read a log in this process; what its reader raises ends another process in an import."""
-    if kind == "mat" and separate._is_hdf5(content):
-        kind = "hdf5"
-    task = separate.Task(kind, str(path), layout.matrix, layout.names, layout.missing)
-    notes: list[str] = []
-    try:
-        with warnings.catch_warnings():
-            table = separate.read_here(task, content, notes)
-    except InputError:
-        raise
-    except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
-            raise
-        raise InputError(path, "", "is damaged") from None
-    return table, tuple(separate._shortened(notes, kind))
-
-
-def _found_here(
-    path: Path, content: bytes, kind: str, layout: Layout
-) -> tuple[list[Found], tuple[str, ...]]:
-    table, notes = _here(path, content, kind, layout)
-    return unpack(table), notes
-
-
-def _parquet_here(path: Path, content: bytes) -> tuple[dict[str, pl.Series], tuple[str, ...]]:
-    table, notes = _here(path, content, "parquet", Layout())
-    return {name: table[name] for name in table.columns}, notes
-
-
-@contextmanager
-def in_process() -> Iterator[None]:
-    """Let imports read every format in this process: a process a case would take a day."""
-    with (
-        patch.object(reading, "read_separately", _found_here),
-        patch.object(reading, "read_parquet_separately", _parquet_here),
-    ):
-        yield
 
 
 def outcome(reader: str, seed: int, number: int, folder: Path) -> str:

@@ -1,6 +1,6 @@
-"""Machines that are not ours: simulated by scipy, by other laws and another integrator.
+"""Stand-ins for measured machines: simulated by SciPy, by other laws and another integrator.
 
-Stand-ins for measured machines. None of them uses a stage of the package; each is simulated far
+None of them uses a stage of the package; each is simulated far
 finer than it is recorded. Records are in the channels of a column; forces in N, deflections in m.
 """
 

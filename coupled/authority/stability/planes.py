@@ -50,7 +50,7 @@ FIRM = 1.0  # K·k_h of a hand as stiff as the structure
 HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
 
 _SIMULATED_s = 4.0
-_COARSE, _FINE = (31, 25), (61, 49)  # cells of the simulation, points of the theory
+CELLS, POINTS = (31, 25), (61, 49)  # cells of the simulation, points of the theory
 _LEFT, _RIGHT = 0.02, 1.2  # of K·G_T
 _HALVINGS = 9
 _VALUES: dict[Kind, tuple[float, float]] = {
@@ -252,9 +252,9 @@ def axis(kind: Kind, points: int) -> Floats:
 def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
     """Return one plane of a control, whose structure must bend."""
     bend = rig.controls[name].loader.bend
-    shares, values = np.linspace(_LEFT, _RIGHT, _COARSE[0]), axis(kind, _COARSE[1])
-    fine_shares, fine_values = np.linspace(_LEFT, _RIGHT, _FINE[0]), axis(kind, _FINE[1])
-    simulated, found = np.empty(_COARSE), list[Crossing]()
+    shares, values = np.linspace(_LEFT, _RIGHT, CELLS[0]), axis(kind, CELLS[1])
+    fine_shares, fine_values = np.linspace(_LEFT, _RIGHT, POINTS[0]), axis(kind, POINTS[1])
+    simulated, found = np.empty(CELLS), list[Crossing]()
     for i, share in enumerate(shares.tolist()):
         simulated[i] = simulated_along(rig, name, kind, share / bend, values)
         found += crossings(rig, name, kind, share / bend, values, simulated[i])

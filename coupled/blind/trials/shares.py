@@ -35,21 +35,34 @@ def true_shares(
     """
     flown = "airframe" in stages
     outputs = {had: outputs_of(rig, record, flown) for had, record in records.items()}
+    return shares_of_outputs(rig, outputs, stages, apart=apart)
+
+
+def shares_of_outputs(
+    rig: Rig,
+    outputs: Mapping[Subset, Sequence[Output]],
+    stages: Sequence[str],
+    *,
+    apart: bool = False,
+) -> dict[str, dict[str, float]]:
+    """Return `true_shares` from the outputs of each record."""
     every = max(outputs, key=len)
     found = {}
     for stage in stages:
-        judged = _judged(stage, outputs[every], rig, every)
+        judged = judged_outputs(stage, outputs[every], rig, every)
         if judged:
             powers = {had: _power(judged, made, rig) for had, made in outputs.items()}
-            shown = _shown(judged, every) if apart else every
+            shown = effects_shown(judged, every) if apart else every
             others = every - shown
-            found[stage] = _shared(
+            found[stage] = share_power(
                 shown, {had - others: power for had, power in powers.items() if others <= had}
             )
     return found
 
 
-def _judged(stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset) -> list[Output]:
+def judged_outputs(
+    stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset
+) -> list[Output]:
     """Return the outputs whose power is shared out: those that show a gap.
 
     They are the stage's own, or of a stage without any those in which its effects show.
@@ -62,7 +75,7 @@ def _judged(stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset) ->
     return wide or sorted(own, key=lambda output: -output.gap(rig))[:1]
 
 
-def _shown(judged: Sequence[Output], effects: Subset) -> Subset:
+def effects_shown(judged: Sequence[Output], effects: Subset) -> Subset:
     """Return the effects that show in some outputs, all of them where none does."""
     seen = {output.stage for output in judged}
     shown = {name for name in effects if name in BY_NAME and seen & {*BY_NAME[name].shows_in}}
@@ -79,7 +92,7 @@ def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:
     return total / len(judged)
 
 
-def _shared(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
+def share_power(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
     """Return each effect's share of the power with all of them, and of noise.
 
     Noise is what is left without any, at most one floor².

@@ -1,1 +1,1 @@
-"""The independent twin: another program's loader and effects, none of the rig's stages."""
+"""The independent twin: its own loader and effects, by other methods than the rig's stages."""

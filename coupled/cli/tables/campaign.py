@@ -11,11 +11,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from coupled.campaign.labels import parameter_label
 from coupled.campaign.verdict import figures as figures_of
 from coupled.campaign.verdict import wanted
 from coupled.cli.tables.whole import print_whole
-from coupled.display import System, shown, unit_in
+from coupled.display import System, parameter_label, shown, unit_in
 
 if TYPE_CHECKING:
     from coupled.campaign.sensitivity import SobolIndex

@@ -1,4 +1,4 @@
-"""The crossover model: what a pilot's gain and lead must be for a loop to be as set.
+"""The crossover model of a pilot, and the remnant.
 
 McRuer and Jex (1967): a pilot adapts so that, around the crossover frequency, pilot and
 controlled element together are ω_c/s with a delay. Here
@@ -8,6 +8,11 @@ controlled element together are ω_c/s with a delay. Here
 where lead T_L or lag T_I, never both, gives the phase margin, and K the frequency. All is
 computed in the discrete time of the frames, in which the pilot looks, so nothing is lost to
 them.
+
+The remnant is noise that the pilot adds. Kleinman, Baron and Levison (1970): white noise on what is
+seen, of covariance π·ρ·σ² with ρ = 0.01 (−20 dB) for a practised pilot and σ² the mean square of
+what is seen. Here a first-order lag, the muscle's, filters it, so that the pilot's lead does not
+amplify its high frequencies; σ² is the mean square of the last seconds.
 """
 
 from __future__ import annotations
@@ -17,7 +22,12 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+
+from coupled.rig.packing import first_order_gain
+
 _MOST_rad = math.radians(80.0)  # of lead or lag: T_L = 5.7/ω_c; a pilot gives no more
+_MEMORY_s = 5.0  # of the mean square that scales the remnant
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,23 @@ class Delay:
         """Return the value of so long ago."""
         self._past.append(value)
         return (1.0 - self._part) * self._past[1] + self._part * self._past[0]
+
+
+class Remnant:
+    """A pilot's remnant on one error, frame by frame."""
+
+    def __init__(self, ratio: float, lag_s: float, frame_s: float, seed: int) -> None:
+        self._rng = np.random.default_rng([seed, 61])
+        self._level = math.sqrt(math.pi * ratio / frame_s)
+        self._lag, self._memory = (first_order_gain(t, frame_s) for t in (lag_s, _MEMORY_s))
+        self._square = self._noise = 0.0
+
+    def __call__(self, error: float) -> float:
+        """Return the noise on an error, in its unit."""
+        self._square += self._memory * (error * error - self._square)
+        white = self._level * math.sqrt(self._square) * self._rng.standard_normal()
+        self._noise += self._lag * (white - self._noise)
+        return self._noise
 
 
 def delay_response(delay_s: float, frame_s: float, rate: float) -> complex:

@@ -38,11 +38,11 @@ from coupled.flight.pilot.crossover import (
     Acting,
     Compensation,
     Delay,
+    Remnant,
     adapt,
     compensation_response,
     delay_response,
 )
-from coupled.flight.pilot.remnant import Remnant
 from coupled.flight.response import Response, control_response, path_angle
 from coupled.record.channels import (
     ALTITUDE,

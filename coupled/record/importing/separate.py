@@ -90,7 +90,7 @@ def read_parquet_separately(
 def _answer(
     path: Path, content: bytes, kind: str, layout: Layout
 ) -> tuple[pl.DataFrame, tuple[str, ...]]:
-    if kind == "mat" and _is_hdf5(content):
+    if kind == "mat" and is_hdf5(content):
         kind = "hdf5"
     _check_installed(path, kind)
     task = Task(kind, str(path), layout.matrix, layout.names, layout.missing)
@@ -109,7 +109,7 @@ def _answer(
             timeout=LONGEST_s + LONGEST_s_per_MiB * len(content) / 2**20,
         )
     except subprocess.TimeoutExpired as late:
-        problem = f"was not read within {late.timeout:.0f} s: it is damaged, or leads in a circle"
+        problem = f"was not read within {late.timeout:.0f} s: it is damaged, or the machine is busy"
         raise InputError(path, "", problem) from None
     if done.returncode == REFUSED:
         said = json.loads(done.stdout)
@@ -120,7 +120,7 @@ def _answer(
     return pl.read_ipc(io.BytesIO(table)), tuple(json.loads(notes))
 
 
-def _is_hdf5(content: bytes) -> bool:
+def is_hdf5(content: bytes) -> bool:
     """Tell whether a MATLAB file is one of v7.3, which are HDF5 behind a block of MATLAB's."""
     return _HDF5 in (content[:8], content[512:520]) or content[:19] == b"MATLAB 7.3 MAT-file"
 
@@ -148,7 +148,7 @@ def read_here(task: Task, content: bytes, notes: list[str]) -> pl.DataFrame:
     return pack(found)
 
 
-def _shortened(notes: Sequence[str], kind: str) -> list[str]:
+def shortened(notes: Sequence[str], kind: str) -> list[str]:
     """Return a reader's warnings as lines for the user, each once, and not without end."""
     lines = list(dict.fromkeys(" ".join(note.split()) for note in notes if note.strip()))
     more = [f"… and {len(lines) - MOST_NOTES} more"] if len(lines) > MOST_NOTES else []
@@ -164,7 +164,7 @@ def _main() -> int:
     except InputError as error:
         sys.stdout.write(json.dumps({"key": error.key, "problem": error.problem}))
         return REFUSED
-    sys.stdout.buffer.write(json.dumps(_shortened(notes, task.kind)).encode() + b"\n")
+    sys.stdout.buffer.write(json.dumps(shortened(notes, task.kind)).encode() + b"\n")
     table.write_ipc(sys.stdout.buffer)
     return 0
 

@@ -27,8 +27,8 @@ from tests.support.rigs import K_REPORT, bench
 
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes, "_COARSE", (7, 9))
-    monkeypatch.setattr(planes, "_FINE", (15, 13))
+    monkeypatch.setattr(planes, "CELLS", (7, 9))
+    monkeypatch.setattr(planes, "POINTS", (15, 13))
 
 
 def test_a_plane_holds_cells_and_limits(coarse: None) -> None:

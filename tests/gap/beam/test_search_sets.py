@@ -33,10 +33,10 @@ def test_a_healthy_record_has_no_gap(tmp_path: Path, seed: int) -> None:
     ("name", "values"),
     [
         ("bend", {"bend_{d}_per_N": 1.8e-4}),
-        ("coulomb_friction", {"friction_N": 3.0}),
+        pytest.param("coulomb_friction", {"friction_N": 3.0}, marks=pytest.mark.slow),
         ("inertia", {"factor": 1.3}),
         ("deflection_zero", {"offset_{d}": 2e-3}),
-        ("transport_delay", {"delay_s": 0.02}),
+        pytest.param("transport_delay", {"delay_s": 0.02}, marks=pytest.mark.slow),
     ],
 )
 def test_a_known_effect_is_found_at_its_size(

@@ -1,4 +1,4 @@
-"""The command that imports: a record, what it thinks of it, and words that lead nowhere."""
+"""`coupled import`: the record, the doubts it prints, and wrong arguments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.support.logs import (
 )
 
 
-def test_the_command_writes_a_record_and_says_what_it_thinks(tmp_path: Path) -> None:
+def test_the_command_writes_a_record_and_prints_its_doubts(tmp_path: Path) -> None:
     imported(tmp_path)
     (tmp_path / "a").mkdir()
     done = coupled(tmp_path, "import", "log.csv", "--map", "map.toml", "-o", "a/r.csv")
@@ -60,7 +60,7 @@ def test_the_command_writes_a_record_and_says_what_it_thinks(tmp_path: Path) -> 
     ],
     ids=lambda words: " ".join(words)[:40],
 )
-def test_words_that_lead_nowhere_write_nothing(
+def test_wrong_arguments_write_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
 ) -> None:
     imported(tmp_path)

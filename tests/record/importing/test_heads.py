@@ -1,4 +1,4 @@
-"""Logs of JSBSim, FlightGear and X-Plane, known by their heads."""
+"""Logs of JSBSim, FlightGear and X-Plane, recognised by their headers."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def flown(folder: Path, blocks: str, properties: Sequence[str]) -> dict[str, np.
 
 
 @pytest.mark.parametrize("properties", [(), tuple(PROPERTIES.values())], ids=["blocks", "paths"])
-def test_jsbsims_own_csv_is_what_it_flew(tmp_path: Path, properties: tuple[str, ...]) -> None:
+def test_a_csv_file_of_jsbsim_is_imported_without_a_map(
+    tmp_path: Path, properties: tuple[str, ...]
+) -> None:
     truth = flown(tmp_path, "" if properties else BLOCKS, properties)
     record, account = import_log(next(tmp_path.glob("*.csv")))
     assert account.clock.frame_rate_Hz == 120.0
@@ -122,7 +124,7 @@ def test_the_command_says_whose_log_it_is_or_asks_for_a_map(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("content", [b"", bytes(99), b"Time,/a\n", b"Time\n1\n", b"\xff\xfe|,\n"])
-def test_a_head_that_is_none_is_one_line(tmp_path: Path, content: bytes) -> None:
+def test_an_unknown_header_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "log.csv").write_bytes(content)
     with pytest.raises(InputError, match=r"log\.csv"):
         import_log(tmp_path / "log.csv")

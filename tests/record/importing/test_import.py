@@ -66,7 +66,7 @@ def test_a_unit_of_another_dimension_is_refused(channel: str, name: str) -> None
         *[("lbf/ft^2", 47.88025898), ("N/mm", 1000.0), ("lbf / deg", 254.8643249), ("%", 0.01)],
     ],
 )
-def test_units_have_the_factors_of_the_books(name: str, factor: float) -> None:
+def test_units_have_their_published_factors(name: str, factor: float) -> None:
     unit = parse_unit(name)
     assert unit is not None
     assert unit.factor == pytest.approx(factor, rel=1e-9)
@@ -193,7 +193,7 @@ def test_a_clock_since_1970_keeps_its_digits(tmp_path: Path) -> None:
         assert len(record) == ROWS
 
 
-def test_missing_rows_and_empty_cells_are_led_over_and_counted(tmp_path: Path) -> None:
+def test_missing_rows_and_empty_cells_are_interpolated_and_counted(tmp_path: Path) -> None:
     lines = GOOD.splitlines()
     del lines[100]
     lines[200] = lines[200].rpartition(",")[0] + ","
@@ -213,7 +213,7 @@ def test_missing_rows_and_empty_cells_are_led_over_and_counted(tmp_path: Path) -
         imported(tmp_path, "\n".join(lines), strict)
 
 
-def test_a_heading_is_led_through_north(tmp_path: Path) -> None:
+def test_a_heading_is_interpolated_through_north(tmp_path: Path) -> None:
     heading = np.mod(350.0 + 5.0 * TIME_s, 360.0)
     log_map = MAP.replace("column_computed_m", "heading_rad").replace('"in"', '"deg"')
     log_map = log_map.replace('unit = "ms"', 'unit = "ms"\nframe_rate_Hz = 50')
@@ -383,7 +383,7 @@ def test_figures_on_white_noise_raise_no_doubt() -> None:
     )
 
 
-def test_an_even_log_without_stamps(tmp_path: Path) -> None:
+def test_an_evenly_sampled_log_needs_no_time_column(tmp_path: Path) -> None:
     rate = MAP.replace('from = "T"\nunit = "ms"', "rate_Hz = 60")
     record, account = imported(tmp_path, log_map=rate)
     np.testing.assert_allclose(record["column_force_N"], FORCE_N, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""A map proposed for an unknown log: what is certain is filled in, what is not is asked."""
+"""A map proposed for an unknown log: certain values are filled in, others are marked."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
         ("hand grip", "column_deflection_m", ""),
     ],
 )
-def test_a_name_says_what_it_says(name: str, channel: str, unit: str) -> None:
+def test_a_channel_and_its_unit_are_recognised_by_name(name: str, channel: str, unit: str) -> None:
     found = read_name(name)
     assert (found.channel, found.unit) == (channel, unit)
 
@@ -83,7 +83,9 @@ GERMAN = {"delimiter": ";", "decimal": ","}
         ),
     ],
 )
-def test_a_layout_is_seen(tmp_path: Path, name: str, made: str, layout: dict[str, Any]) -> None:
+def test_the_layout_of_a_file_is_detected(
+    tmp_path: Path, name: str, made: str, layout: dict[str, Any]
+) -> None:
     (tmp_path / name).write_text(made)
     found = guess_layout(tmp_path / name)
     plain = {"delimiter": ",", "decimal": ".", "comment": "", "skip_rows": 0, "header": True}
@@ -91,7 +93,7 @@ def test_a_layout_is_seen(tmp_path: Path, name: str, made: str, layout: dict[str
     assert {key: getattr(found, key) for key in plain} == {**plain, **layout}
 
 
-def test_utf_16_and_latin_1_are_seen(tmp_path: Path) -> None:
+def test_utf_16_and_latin_1_are_detected(tmp_path: Path) -> None:
     for encoding in ("utf-16", "latin-1"):
         (tmp_path / "log.csv").write_bytes(GOOD.replace("F", "F°", 1).encode(encoding))
         assert guess_layout(tmp_path / "log.csv").encoding == encoding
@@ -155,7 +157,7 @@ def test_signs_and_counts_are_asked_and_not_guessed(tmp_path: Path) -> None:
     assert any("moves against column encoder" in question for question in proposal.questions)
 
 
-def test_two_logs_of_an_arm_are_seen_through(tmp_path: Path) -> None:
+def test_two_logs_of_a_robot_arm_are_mapped(tmp_path: Path) -> None:
     files = [SHARED / "control.csv", SHARED / "state_motor.csv"]
     if not SHARED.exists():
         head = {"control.csv": "timestamp,positions", "state_motor.csv": "timestamp,positions"}
@@ -192,7 +194,7 @@ def test_dates_that_come_unevenly_are_counted_in_seconds(tmp_path: Path) -> None
     assert table["clock"] == {"from": "date", "date": "iso", "frame_rate_Hz": 50.0}
 
 
-def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_log_is_refused(tmp_path: Path) -> None:
     for content in ("", "a,b\n", "hello world of words\n" * 9, "x,y\n" + "1,2\n" * 9):
         (tmp_path / "log.csv").write_text(content)
         with pytest.raises(InputError, match=r"log.csv"):
@@ -261,7 +263,7 @@ def test_a_place_alone_whose_end_is_open_is_asked(tmp_path: Path) -> None:
     assert "channels.column_computed_m" in proposal.questions[0]
 
 
-def test_columns_of_one_name_are_both_seen(tmp_path: Path) -> None:
+def test_two_columns_of_one_name_are_both_listed(tmp_path: Path) -> None:
     lines = GOOD.replace("T,F,D", "T,grip force [lbf],grip force [lbf]", 1)
     (tmp_path / "log.csv").write_text(lines)
     proposal, _ = proposed(tmp_path / "log.csv")

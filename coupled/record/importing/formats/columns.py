@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
+
+from coupled.errors import InputError
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 MOST_COLUMNS = 20_000
@@ -42,6 +46,26 @@ def as_numbers(values: object) -> Numbers | None:
     if array.dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
         return array.astype(np.float64)
     return array.astype(np.int64)
+
+
+def columns_of_matrix(
+    path: Path, matrix: str, table: Any, names: list[str] | str, words: list[str]
+) -> dict[str, Numbers]:
+    """Return the columns of the variable `matrix`, shape (rows, columns), named by `words`.
+
+    `names` is the map's own `log.names`. Raises InputError where they do not fit together.
+    """
+    if not isinstance(table, np.ndarray) or table.ndim != 2 or table.dtype.kind not in "biuf":
+        raise InputError(path, matrix, "is no matrix of numbers; log.matrix names one")
+    if not words:
+        problem = "holds no names; log.names is a list of them or the variable that holds them"
+        raise InputError(path, str(names), problem)
+    if len(words) != table.shape[1]:
+        problem = f"has {table.shape[1]} columns, and {len(words)} names"
+        raise InputError(path, matrix, problem)
+    if len(set(words)) < len(words):
+        raise InputError(path, matrix, "two of its columns have one name")
+    return {word: table[:, i].astype(np.float64) for i, word in enumerate(words)}
 
 
 def by_their_groups(columns: Sequence[Found]) -> list[Found]:

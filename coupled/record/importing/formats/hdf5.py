@@ -17,8 +17,13 @@ import h5py
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, Numbers, as_numbers
-from coupled.record.importing.formats.matrix import columns_of_matrix
+from coupled.record.importing.formats.columns import (
+    MOST_COLUMNS,
+    Found,
+    Numbers,
+    as_numbers,
+    columns_of_matrix,
+)
 from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # groups within groups

@@ -15,8 +15,7 @@ from scipy import io as scipy_io
 from scipy.io.matlab import MatlabOpaque, varmats_from_mat
 
 from coupled.errors import InputError
-from coupled.record.importing.formats.columns import Found
-from coupled.record.importing.formats.matrix import columns_of_matrix
+from coupled.record.importing.formats.columns import Found, columns_of_matrix
 from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # structs within structs
