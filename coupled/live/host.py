@@ -1,8 +1,8 @@
-"""The host computer of a live flight: what goes along with the frames of a batch flight.
+"""The companion of a live flight, which acts before and after each frame of a batch flight.
 
-Before frame k it waits for the frame's deadline, makes the changes that were asked for, and takes
-what the loader or the hand says. The batch flight's own kernel then does the host's part of the
-frame. After it the orders go to the loader, and what was flown to estimate, views and page.
+Before frame k it waits for the frame's deadline, executes requests of the user, and takes the
+measurement of the loader or the position of the hand. The batch flight's kernel then computes the
+frame. After it, the companion sends orders to the loader, and data to estimators, views and page.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from coupled.record.record import Record
 from coupled.rig.serving import check_led, lead, led, services_of
 
 STOPPED = "stopped"
-SAVE_EVERY_s = 5.0  # to write a record takes a part of the processor that frames need, too
+SAVE_EVERY_s = 5.0  # writing a record takes processor time from the frames
 Motion = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Word:
-    """A word of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
+    """A request of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
 
-    `text` names the switch or the service, of a `control`; it is also a mark's text.
+    `text` names the switch or the service of a `control`, or is the text of a mark.
     """
 
     what: str
@@ -49,16 +49,16 @@ class Word:
 
 
 class Watcher(Protocol):
-    """What looks on, a view or the page: it neither waits nor raises."""
+    """An observer of the flight, such as a view or the page: it neither waits nor raises."""
 
     def board(self, host: Host) -> None:
-        """Begin."""
+        """Start."""
 
     def look(self, host: Host, k: int) -> None:
-        """Take what frame k was."""
+        """Observe frame k."""
 
     def words(self) -> Sequence[Word]:
-        """Return what its user asked for since the last call."""
+        """Return the user's requests since the last call."""
 
     def close(self) -> None:
         """End."""
@@ -66,12 +66,12 @@ class Watcher(Protocol):
 
 @dataclass
 class Plan:
-    """What a live flight is flown with; without anything it is a batch flight in real time.
+    """The equipment of a live flight; by default a batch flight in real time.
 
-    `paced` is real time, else lock-step: as fast as the loader answers. `link` is a real loader;
-    without it `wishes` moves the hands on the simulated one. `adapt` gives K of service to the
-    compensation. `warn` hears what a pilot must know at once; `save` takes a record so far, in a
-    thread, and may raise InputError.
+    `paced` is real time; otherwise lock-step: as fast as the loader answers. `link` is a real
+    loader; without it `wishes` moves the hands on the simulated one. `adapt` sets the
+    compensation's K̂ to the estimated K. `warn` receives urgent messages for the pilot. `save`
+    writes a record so far, in a thread, and may raise InputError.
     """
 
     paced: bool = True
@@ -86,12 +86,12 @@ class Plan:
 
 @dataclass
 class Happened:
-    """What was done and found on a live flight; times in s."""
+    """The events of a live flight; times in s."""
 
     marks: list[tuple[float, str]] = field(default_factory=list)
     led: list[tuple[float, str, str, float]] = field(default_factory=list)  # control, service, to
-    alarms: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K
-    adapted: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K̂
+    alarms: list[tuple[float, str, float]] = field(default_factory=list)  # time, control, K
+    adapted: list[tuple[float, str, float]] = field(default_factory=list)  # time, control, K̂
 
 
 class Host:
@@ -110,7 +110,7 @@ class Host:
         self._next_save_s = 0.0
 
     def board(self, aboard: Aboard) -> None:
-        """Begin, with the aircraft in trim: meet the loader and let its forces in."""
+        """Start with the aircraft in trim: connect to the loader and fade its forces in."""
         plan, rig = self.plan, aboard.manoeuvre.rig
         self.aboard, self.frame_s = aboard, 1.0 / rig.frame_rate
         self.names = [str(name) for name in rig.controls]
@@ -139,7 +139,7 @@ class Host:
             watcher.board(self)
 
     def before(self, k: int, motion: Motion) -> str:
-        """Wait for the frame, and take what user, loader and hand say."""
+        """Wait for the frame's deadline, and take requests, measurements and hand positions."""
         self.time_s = k * self.frame_s
         if self.plan.paced:
             self.pacer.wait()
@@ -168,7 +168,7 @@ class Host:
                 self.plan.warn(str(error))
 
     def _lead_service(self, word: Word) -> None:
-        """Lead a service of a simulated loader, as an event of a run does."""
+        """Set a service of a simulated loader, as an event of a run does."""
         assert self.aboard is not None
         control, service, value = word.control, word.text, word.value
         try:
@@ -182,7 +182,7 @@ class Host:
         self.happened.led.append((self.time_s, control, service, value))
 
     def services(self) -> dict[str, dict[str, float]]:
-        """Return what may be led of each simulated control, and how it stands."""
+        """Return the services of each simulated control that can be set, and their values."""
         if self.elsewhere or self.aboard is None:
             return {}
         found: dict[str, dict[str, float]] = {}
@@ -195,7 +195,7 @@ class Host:
         return found
 
     def _save(self) -> None:
-        """Let the record so far be written, beside the flight; one at a time."""
+        """Write the record so far in a thread; one at a time."""
         rows, save = round(self.time_s / self.frame_s), self.plan.save
         busy = self._saving is not None and self._saving.is_alive()
         if save is None or rows < 2 or busy or self.time_s < self._next_save_s:
@@ -212,14 +212,14 @@ class Host:
         self._saving.start()
 
     def so_far(self, first: int, last: int) -> Record:
-        """Return the record from frame `first` to before `last` of the flight that goes on."""
+        """Return the record from frame `first` to before `last` of the current flight."""
         assert self.aboard is not None
         return self.kept(self.aboard.so_far(first, last), True, first)
 
     def kept(self, record: Record, stopped: bool, first: int = 0) -> Record:
-        """Return a record, which begins with frame `first`, with what is known of the live flight.
+        """Return a record that begins with frame `first`, with the data of the live flight.
 
-        A flight that was `stopped` by its user has not ended early.
+        A flight `stopped` by its user does not count as ended early.
         """
         manifest: dict[str, Any] = {**record.manifest, "live": self.as_dict()}
         manifest["live"]["stopped"] = stopped
@@ -231,7 +231,7 @@ class Host:
         return self.rows.beside(kept, first)
 
     def _lead(self, wishes: Wishes, k: int) -> None:
-        """Write the hands' way over the frame to come."""
+        """Write the hands' positions over the next frame."""
         assert self.aboard is not None
         first, last = k * self.substeps, (k + 1) * self.substeps
         for i, (name, follower) in enumerate(zip(self.names, self._followers, strict=True)):
@@ -240,7 +240,7 @@ class Host:
             self.aboard.script[i, 1, first + 1 : last + 1] = way[1:]
 
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
-        """Send the orders; take the frame into account."""
+        """Send the orders, and pass the frame to estimators and watchers."""
         assert self.aboard is not None
         row, attached = self.aboard.data[k], self.attached
         validity = FRESH
@@ -273,7 +273,7 @@ class Host:
                 self.happened.adapted.append((self.time_s, name, assumed))
 
     def farewell(self) -> None:
-        """Fade the loader's forces out, and end what looks on; called however a flight ended."""
+        """Fade the loader's forces out, and close all devices; called at every end of a flight."""
         try:
             if self._saving is not None:
                 self._saving.join()
@@ -288,7 +288,7 @@ class Host:
                 self.plan.wishes.close()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what the manifest holds of the live flight beside a batch flight's."""
+        """Return the section `live` of the manifest."""
         link, attached = self.plan.link, self.attached
         found: dict[str, Any] = {
             "paced": self.plan.paced,

@@ -1,4 +1,4 @@
-"""What a rig is to a host whose loader is real: its readings are measured, not simulated."""
+"""The rig of a host with a real loader: its readings are measured, not simulated."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from coupled.rig.rig import Rig
 
 
 def as_measured(manoeuvre: Manoeuvre) -> Manoeuvre:
-    """Return the manoeuvre as a host flies it whose loader is real.
+    """Return the manoeuvre as flown by a host with a real loader.
 
-    What simulates the loader's electronics, its gauge and its noise, is left out: the readings
-    have their own.
+    The simulation of the loader's electronics, gauge and noise is left out, since the real readings
+    contain them.
     """
     rig = manoeuvre.rig
     neutral: dict[str, Any] = {"noise": {}}
@@ -36,10 +36,10 @@ _MULTIPLIER = ("multiplier_offset_N", "multiplier_drift_N_per_s")
 
 
 def only_measured(record: Record, link: Link, rig: Rig) -> Record:
-    """Return a record without what its loader did not measure.
+    """Return a record without channels that its loader did not measure.
 
-    F_mod of a hybrid loader is among it: the loader's own multiplier makes it of δc as it is, and
-    what the host would make of its reading would pass for a product that is held over the frame.
+    They include F_mod of a hybrid loader, whose own multiplier uses the true δc. The host's product
+    of δc as read would be diagnosed as a product that is held over the frame.
     """
     lacking: set[str] = set()
     for name, control in rig.controls.items():

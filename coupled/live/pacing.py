@@ -1,9 +1,9 @@
-"""Real time: frames at absolute deadlines, and by how much each was late.
+"""Real time: frames at absolute deadlines, and their lateness.
 
 Frame k is due at t₀ + k·T. A late frame is flown at once, and the next keeps its own deadline, so
-lateness does not add up. A frame that is late by more than a whole frame moves t₀ by the frames
-that were missed: they are counted, and not made up for by frames in a rush, which a pilot would
-feel as a burst of speed.
+lateness does not accumulate. A frame that is late by more than a whole frame moves t₀ by the
+missed frames. They are counted and not made up for, since a burst of frames would be a burst of
+speed for the pilot.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 Clock = Callable[[], float]  # s, from any origin
 Sleep = Callable[[float], object]
-# Edges of the histogram, ms; what is later than the last is counted with `over`.
+# Edges of the histogram, ms; the last bin has no upper edge.
 EDGES_ms = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late the frames of a flight began, and how long their work took.
+    """The lateness of a flight's frames, and their computing times.
 
     `late_ms` and `work_ms` have shape (frames,); `missed` counts the deadlines that passed
     without a frame; `frame_ms` is the time between two deadlines.
@@ -37,7 +37,7 @@ class Lateness:
     frame_ms: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures for manifest and page; None where no frame was paced."""
+        """Return the figures for manifest and page; None if no frame was paced."""
         late, edges = self.late_ms, np.array([*EDGES_ms, math.inf])
         counts = np.histogram(late, edges)[0].tolist()
         return {
@@ -71,7 +71,7 @@ def _percentile(values: NDArray[np.float32], share: float) -> float | None:
 
 
 class Pacer:
-    """Waits for each frame's deadline; `frames` is how many there can be."""
+    """Waits for each frame's deadline; `frames` is their largest number."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class Pacer:
         return Lateness(late, work, self.missed, 1e3 * self._frame_s).as_dict()
 
     def result(self) -> Lateness:
-        """Return how late the frames were so far."""
+        """Return the lateness of the frames so far."""
         done = self._frames
-        work = self._work[: max(done - 1, 0)]  # the last frame's has no end
+        work = self._work[: max(done - 1, 0)]  # the last frame's is not complete
         return Lateness(self._late[:done], work, self.missed, 1e3 * self._frame_s)

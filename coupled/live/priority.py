@@ -1,7 +1,7 @@
-"""The first place on the machine for the thread that flies, where the system grants it.
+"""Real-time priority for the flight's thread, if the system grants it.
 
-Other work at a deadline is what makes a frame late. Under Linux a thread of the class SCHED_FIFO
-runs before all ordinary ones; root may ask for it, and whoever has a limit `rtprio`.
+Other work of the machine delays frames. Under Linux a thread of the class SCHED_FIFO runs before
+all ordinary ones; root and users with a limit `rtprio` may request it.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-PRIORITY = 40  # of 1 to 99: before all ordinary work, after the kernel's own interrupts at 50
+PRIORITY = 40  # of 1 to 99: above all ordinary work, below the kernel's interrupts at 50
 
 
 @contextmanager
 def first_place(wanted: bool = True) -> Iterator[bool]:
-    """Give this thread real-time priority within, and tell whether the system granted it.
+    """Give this thread real-time priority in the context; yield whether the system granted it.
 
-    Threads that it starts meanwhile, as the page's, run as ordinary ones.
+    Threads started in the context, such as the page's, run with ordinary priority.
     """
     if sys.platform != "linux" or not wanted:
         yield False

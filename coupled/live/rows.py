@@ -1,4 +1,4 @@
-"""What a live flight records beside a batch flight's channels, one value a frame."""
+"""The channels of a live flight in addition to a batch flight's, one value a frame."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from coupled.record.record import Record
 
 
 class Rows:
-    """How far each row can be used, and the time of its sample by the loader's clock.
+    """The validity of each row, and the time of its sample by the loader's clock.
 
-    `always` records the validity even where every row is fresh; `timed` records the loader's time,
-    which means nothing in lock-step.
+    `always` records the validity even if every row is fresh; `timed` records the loader's time,
+    which has no meaning in lock-step.
     """
 
     def __init__(self, frames: int, always: bool, timed: bool) -> None:
@@ -24,9 +24,9 @@ class Rows:
         self.loader_time_s = np.full(frames, math.nan)
 
     def beside(self, record: Record, first: int) -> Record:
-        """Return a record with these channels behind; its first row is frame `first`.
+        """Return a record with these channels appended; its first row is frame `first`.
 
-        A simulated loader's validity is left out while no row differs from fresh.
+        A simulated loader's validity is left out if all rows are fresh.
         """
         rows = slice(first, first + len(record))
         added: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""The host's end of the page: it shows each frame, and hears what its user asks for."""
+"""The host's side of the page: it shows each frame, and receives the user's requests."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from coupled.record.channels import (
 )
 
 STATE_EVERY_s = 0.2
-START_s = 30.0  # how long the page's process may take to start
-MOST_WORDS = 64  # taken in one look, each some 10 µs of the frame
+START_s = 30.0  # time limit for the start of the page's process
+MOST_WORDS = 64  # requests taken in a frame, each some 10 µs
 SHOWN = ("force", "computed", "deflection", "estimate", "gradient", "modifying_force")
 
 
 class Page:
-    """The page of one flight; a watcher of the host, and the hand of one without a stick.
+    """The page of one flight: a watcher of the host, and a source of hand positions.
 
-    `address` and `port` are where it is served, 0 for a free port; `controls` those of the rig.
-    Raises InputError where it cannot be.
+    `address` and `port` are those of the server, 0 for a free port; `controls` those of the rig.
+    Raises InputError if it cannot be served.
     """
 
     name = "page"
@@ -70,7 +70,7 @@ class Page:
         return answer["url"]
 
     def board(self, host: Host) -> None:
-        """Begin."""
+        """Start: write the constants of the flight."""
         assert host.aboard is not None
         aboard, rig = host.aboard, host.aboard.manoeuvre.rig
         at = aboard.channels.index
@@ -101,7 +101,7 @@ class Page:
         self._show(host)
 
     def look(self, host: Host, k: int) -> None:
-        """Show frame k."""
+        """Write frame k to the shared memory."""
         assert host.aboard is not None
         data, row, m = host.aboard.data[k], self._row, self._motion
         row[0], row[1], row[2] = k, 1e3 * host.pacer.late_s, data[m + PRESSURE]
@@ -117,7 +117,7 @@ class Page:
             self._show(host)
 
     def _show(self, host: Host) -> None:
-        """Write how things stand."""
+        """Write the current state."""
         attached, link = host.attached, host.plan.link
         trips = None if link is None else link.round_trips
         self._state |= {
@@ -140,10 +140,10 @@ class Page:
         self._state["warnings"] = [*self._state["warnings"][-4:], text]
 
     def words(self) -> Sequence[Word]:
-        """Return what was asked for since the last call; a page that has gone lets go.
+        """Return the requests since the last call; if the page has closed, hands return to 0.
 
-        Of a hand's words the last counts. Of others there is one at most: to change a switch takes
-        a part of the frame.
+        Of positions of a hand the last one counts. At most one other request is returned, since
+        changing a switch takes a part of the frame.
         """
         found: list[Word] = []
         try:
@@ -163,19 +163,19 @@ class Page:
         return found
 
     def read(self, control: str) -> float:
-        """Return where the page's user wants a control, −1 to 1."""
+        """Return the position that the user gives a control, −1 to 1."""
         return self._wanted[control]
 
     def close(self) -> None:
-        """Keep the page open at the end of the flight: what was found is shown on it."""
+        """Keep the page open at the end of the flight, for the results."""
 
     def finish(self, **state: Any) -> None:
-        """Show what came of the flight: `phase`, `record`, `diagnosis`."""
+        """Show the results of the flight: `phase`, `record`, `diagnosis`."""
         self._state |= state
         self.board_memory.say(self._state)
 
     def wait(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Wait until the user leaves the page, or `until` is true."""
+        """Wait until the user leaves the page or `until` is true."""
         while not self.gone and self._process.is_alive() and not until():
             if self._wire.poll(0.2) and any(word.what == "leave" for word in self.words()):
                 return
@@ -191,5 +191,5 @@ class Page:
 
 
 def _run(*words: Any) -> None:
-    """Be the page's process; the server is loaded there alone."""
+    """Run the page's process; the server is imported only there."""
     importlib.import_module("coupled.live.dashboard.server").serve(*words)
