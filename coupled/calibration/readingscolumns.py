@@ -1,4 +1,4 @@
-"""The columns of readings: what each is, in which unit, and which of them go together."""
+"""The columns of a readings file: their quantities and units, and valid combinations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from coupled.units import POUND_N, DEGREE_rad, INCH_m
 LABEL, APPROACH, REMARK = "gradient_set", "approach", "remark"
 LENGTHS = {"deflection_m": 1.0, "deflection_mm": 1e-3, "deflection_in": INCH_m}
 ANGLES = {"deflection_rad": 1.0, "deflection_deg": DEGREE_rad}
-ON = "on "  # before the name of another control that a force is held on
+ON = "on "  # before the name of another control with a force
 FORCES = {"force_N": 1.0, "force_lb": POUND_N}
 
 
 def units_of(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, float]]:
-    """Return {quantity: (column, factor to SI)} once the columns are known and of one system."""
+    """Return {quantity: (column, factor to SI)} of valid columns in one system of units."""
     ours, other = (ANGLES, LENGTHS) if control == "wheel" else (LENGTHS, ANGLES)
     known = [LABEL, APPROACH, REMARK, *ours, *FORCES, "v1_V", "v2_V", "v3_V"]
     known += [after(head) for head in [*ours, *FORCES]]
@@ -77,7 +77,7 @@ def _crossed(
 
 
 def after(column: str) -> str:
-    """Return the column of a second look, after the voltmeter's."""
+    """Return the column of a second reading, after the voltmeter's."""
     return column.replace("_", "_after_", 1)
 
 
