@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def parameter_label(key: str) -> str:
-    """Return a key for people: `column loader bend, m/N` for that of a rig."""
+    """Return a readable key: `column loader bend, m/N` for that of a rig."""
     parts = key.split(".")
     last, unit = _unit(parts[-1])
     passed = ("rig", "controls", "flight", "properties", "event")
@@ -13,7 +13,7 @@ def parameter_label(key: str) -> str:
 
 
 def _unit(word: str) -> tuple[str, str]:
-    """Return a key's name and its unit: after the first part that is one."""
+    """Return a key's name and its unit, which follows the first part that is a unit."""
     parts = word.split("_")
     units = ("m", "rad", "s", "N", "Pa", "kg", "Hz", "V", "bits", "norm", "J")
     for i, part in enumerate(parts[1:], 1):

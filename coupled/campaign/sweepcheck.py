@@ -1,4 +1,4 @@
-"""A sweep file's tables, checked by themselves, before the run that they vary is looked at."""
+"""Checks of a sweep file's tables by themselves, before its run is read."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_pro
 
 
 def read_sections(given: Mapping[str, Any], file: Path) -> SweepFile:
-    """Return a sweep file's tables; all their faults are raised together."""
+    """Return a sweep file's tables; all faults are raised together."""
     sweep = _sections(given, file)
     if faults := list(_faults(sweep, file)):
         raise together(faults)
@@ -24,7 +24,7 @@ def read_sections(given: Mapping[str, Any], file: Path) -> SweepFile:
 
 
 def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
-    """Return a sweep file's tables, each value by itself as it should be."""
+    """Return a sweep file's tables, with each value checked by itself."""
     table, faults = dict(given), list[InputError]()
     with collected(faults):
         known_keys(table, file_keys(SweepFile, "m"), file, "")
@@ -48,13 +48,13 @@ def _sections(given: Mapping[str, Any], file: Path) -> SweepFile:
     with collected(faults):
         sweep = build(SweepFile, known, file, "")
     if faults or sweep is None:
-        there = [key for key in kinds if key in given]  # but with faults of their own
+        there = [key for key in kinds if key in given]  # present, with faults of their own
         raise together([f for f in faults if f.problem != MISSING or f.key not in there])
     return sweep
 
 
 def _faults(sweep: SweepFile, file: Path) -> Iterator[InputError]:
-    """Yield what of a sweep's values does not go together."""
+    """Yield the contradictions between a sweep's values."""
     keys: list[Any] = [key for vary in sweep.vary for key in (vary.key, *vary.also)]
     lists: dict[str, list[Any]] = {"vary": keys, "keep": sweep.keep, "extremes": sweep.extremes}
     lists["configurations"] = sweep.configurations
@@ -89,7 +89,7 @@ def _size_faults(sweep: SweepFile, file: Path, countable: bool) -> Iterator[Inpu
 
 
 def flight_count(sweep: SweepFile) -> int:
-    """Return how many flights a sweep has."""
+    """Return the number of flights of a sweep."""
     flights = (sweep.samples or grid_size(sweep)) * max(1, len(sweep.configurations))
     return flights * (len(sweep.vary) + 2) if sweep.method == "sensitivity" else flights
 

@@ -14,7 +14,7 @@ FIGURES: tuple[Figure, ...] = ("loss", "felt_ratio", "force_N", "peak_rate_rad_p
 
 
 class Vary(Section):
-    """A parameter and its values: a list, or a range. `also` are keys that go with it."""
+    """A parameter and its values: a list, or a range. `also` are further keys with its value."""
 
     key: str = quantity("", min_length=1, max_length=200)
     also: list[str] = []
@@ -26,7 +26,7 @@ class Vary(Section):
 
 
 class Survive(Section):
-    """What a flight has to keep to be survived: a channel within bounds, in every row."""
+    """A condition of survival: a channel within bounds, in every row."""
 
     channel: str = quantity("", min_length=1)
     least: float | None = None

@@ -1,7 +1,7 @@
-"""What is raised where an expectation cannot be judged."""
+"""The error of an expectation that cannot be judged."""
 
 from __future__ import annotations
 
 
 class UnjudgedError(Exception):
-    """Why a figure could not be had."""
+    """Why a figure is not available."""
