@@ -1,4 +1,4 @@
-"""A matrix in which each column is a channel, of whichever file it is from."""
+"""A matrix in which each column is a channel, in a file of any format."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def columns_of_matrix(
 ) -> dict[str, Numbers]:
     """Return the columns of the variable `matrix`, shape (rows, columns), by their `words`.
 
-    `names` is the map's own `log.names`. Raises InputError where they do not fit together.
+    `names` is the map's own `log.names`. Raises InputError if they do not match.
     """
     if not isinstance(table, np.ndarray) or table.ndim != 2 or table.dtype.kind not in "biuf":
         raise InputError(path, matrix, "is no matrix of numbers; log.matrix names one")
