@@ -1,7 +1,7 @@
-"""Wind in a run: how the air moves after the start, along the aircraft's heading and upwards.
+"""Wind in a run: the velocity of the air after the start, along the initial heading and upwards.
 
-The aircraft is trimmed in still air, so a steady wind is no different from none; what matters is
-the change, as through a shear. Hence a run's wind starts at zero.
+The aircraft is trimmed in still air, where a steady wind has no effect; only changes matter, such
+as a shear. Hence a run's wind starts at zero.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _STRONGEST = 100.0  # m/s
 
 
 class Wind(Section):
-    """Velocity of the air over time, straight between: tail wind and updraught positive."""
+    """Velocity of the air over time, linear between points: tail wind and updraught positive."""
 
     time: list[float] = quantity("s", min_length=1)
     along: list[float] = quantity("m_per_s")
@@ -28,7 +28,7 @@ class Wind(Section):
 
 
 def check_wind(wind: Wind, file: object) -> None:
-    """Refuse a wind whose times do not rise, or whose speeds cannot be flown."""
+    """Refuse a wind whose times do not rise, or whose speeds are invalid."""
     if any(b <= a for a, b in pairwise(wind.time)):
         raise InputError(file, "wind.time_s", "must rise from value to value")
     speeds = {"along_m_per_s": wind.along, "up_m_per_s": wind.up}
@@ -50,7 +50,7 @@ class MovingAir(Wrapper):
         self._wind, self._frame_s = wind, frame_s
 
     def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Let the air move, frame by frame from the start."""
+        """Return a hook that moves the air, frame by frame from the start."""
         wind, frame_s, frame = self._wind, self._frame_s, 0
         north, down = (aircraft.lever(name).set for name in _WINDS)
         rising = [0.0] * len(wind.time) if wind.up is None else wind.up

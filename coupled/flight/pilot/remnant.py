@@ -1,9 +1,9 @@
-"""What a pilot adds that no target asks for: the remnant.
+"""The remnant: a pilot's noise.
 
-Kleinman, Baron and Levison (1970): noise on what is seen, white, of covariance π·ρ·σ² with
-ρ = 0.01 (−20 dB) for a practised pilot and σ² the mean square of what is seen. Here it goes
-through a first-order lag, the muscle's, so that a pilot's lead does not make a hiss of it;
-σ² is the mean square of the last seconds.
+Kleinman, Baron and Levison (1970): white observation noise of covariance π·ρ·σ² with ρ = 0.01
+(−20 dB) for a practised pilot and σ² the mean square of the observed signal. Here it passes the
+muscle's first-order lag, so that a pilot's lead does not amplify it at high frequency; σ² is the
+mean square of the last seconds.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class Grid:
         return times
 
     def inside(self) -> NDArray[np.bool_]:
-        """The mask of the kept rows within the record."""
+        """Return the mask of the kept rows within the record."""
         end_s = (self.frames - 1) / self.frame_rate_Hz
         slack = 0.5 / self.frame_rate_Hz
         chosen: NDArray[np.bool_] = (self.time_s > -slack) & (self.time_s < end_s + slack)
