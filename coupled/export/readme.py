@@ -1,4 +1,4 @@
-"""The README of an exported folder: how to fly it, its properties, its errors, what it lacks."""
+"""The README of an exported folder: how to fly it, its properties, its errors, parts left out."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def readme_text(
 ) -> str:
     """Return the README's text.
 
-    `rate_Hz` is JSBSim's, `flights` are those held against our own, `left` is what of the rig is
-    left out, `scripted` what of it only the scripts set.
+    `rate_Hz` is JSBSim's, `flights` are the comparisons with our own, `left` are the parts of the
+    rig left out, `scripted` those set by the scripts only.
     """
     name = model_name(rig.flight)
     parts = [
@@ -59,7 +59,7 @@ def readme_text(
 
 
 def _changed(rig: Rig) -> str:
-    """Return what else of the model's files is changed, as it stands in a sentence."""
+    """Return the other changes of the model's files, for use in a sentence."""
     flight = rig.flight
     if flight is None:
         return ""

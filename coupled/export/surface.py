@@ -1,4 +1,4 @@
-"""The run to the surface as JSBSim's components (`rig/surface`), and the command it gives."""
+"""The surface's chain as JSBSim components (`rig/surface`), and its command."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from coupled.export.making import Made, stepping
 
 
 def add_surface(made: Made) -> None:
-    """Add the surface's command about trim, and give it to the aircraft on top of its trim."""
+    """Add the surface's command about trim, and add it to the aircraft's trim."""
     control, system, own = made.control, made.system, made.own
     rigging = control.rigging
     system.channel("surface", "the command about trim, ±1 the whole travel, then on top of it")

@@ -1,1 +1,1 @@
-"""The independent twin: another program's loader and effects, none of the rig's stages."""
+"""The independent twin: a second implementation of loader and effects, without the rig's stages."""
