@@ -58,9 +58,9 @@ def _add_inputs(made: Made) -> None:
     system, d, host = made.system, made.d, made.control.compensation
     travel, own = made.control.travel, made.own
     given = system.declare("force-N", 0.0, "the pilot's force on the grip, N")
-    system.declare("hand", 0.0, "1: a hand holds the grip where hand-deflection and axis say")
+    system.declare("hand", 0.0, "1: a hand holds the grip at hand-deflection plus axis")
     place = f"hand-deflection-{d}"
-    wanted = system.declare(place, 0.0, f"where the hand holds the grip, {d}")
+    wanted = system.declare(place, 0.0, f"position at which the hand holds the grip, {d}")
     gains = clamp_gains(made, max(made.control.schedule.total_gradient))
     for gain, unit, value in zip(
         ("stiffness", "damping", "integral"),
@@ -76,20 +76,20 @@ def _add_inputs(made: Made) -> None:
     ):
         system.declare(switch, float(on), what)
     if made.rig.flight is None:
-        system.declare(BENCH_PRESSURE, 0.0, "the dynamic pressure that the host is given, Pa")
-    system.channel("input", "The force given; or a hand, led by the axis that moves the command.")
+        system.declare(BENCH_PRESSURE, 0.0, "the host's dynamic pressure, Pa")
+    system.channel("input", "A given force, or a hand moved by the axis of the command.")
     command = prop(made.command)
     system.add(
         "trim-norm",
         either(stepping(), own("trim-norm"), command),
-        out="the command in trim, on top of which the loader's comes",
+        out="the command in trim, to which the loader's is added",
     )
     moved = within(made.sign * (command - own("trim-norm")), -1.0, 1.0)
     axis = either(equal(command, own("command-norm")), own("axis-norm"), moved)
     system.add(
         "axis-norm",
         either(stepping(), axis, 0.0),
-        f"Whoever else sets {made.command} is a joystick: pull, right and right foot positive.",
+        f"Any other value of {made.command} is a joystick's: pull, right, right foot positive.",
         out="the joystick's axis, ±1 the whole travel",
     )
     led: tuple[tuple[str, Expr], ...] = (
@@ -184,15 +184,15 @@ def _delayed(made: Made, start: Expr) -> list[Expr] | None:
 def _give(made: Made, now: Motion, grip: Grip, lagged: Expr | None) -> None:
     """Add the results of the run: positions of loader and grip, for the next run and as output."""
     system, d, add = made.system, made.d, made.system.add
-    system.channel("linkage", "δ = x + K·F, and what the next run goes on from")
-    add(f"loader-{d}", now.computed, out=f"δc as it is, {d}")
+    system.channel("linkage", "δ = x + K·F, and the state for the next run")
+    add(f"loader-{d}", now.computed, out=f"δc, {d}")
     add("rate", now.rate)
     if now.felt is not None:
         add("felt-N", now.felt)
     if lagged is not None:
         add("lead-N", lagged)
         add("led-N", made.own(f"step-{made.substeps}/led"))
-    add(f"servo-{d}", grip.position, out=f"the servo's place, {d}")
+    add(f"servo-{d}", grip.position, out=f"the servo's position, {d}")
     add("servo-rate", grip.rate)
     if made.control.loader.play > 0.0:
         add(f"grip-{d}", grip.grip)

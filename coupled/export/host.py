@@ -43,7 +43,7 @@ def converted(value: Expr, step: float, full_scale: float) -> Expr:
 def add_schedule(made: Made) -> None:
     """Add the schedule's q̄, and G_T of its table."""
     schedule, d = made.control.schedule, made.d
-    made.system.channel("schedule", "G_T(q̄), straight between the table's rows, held at its ends")
+    made.system.channel("schedule", "G_T(q̄), linear between the table's rows, constant beyond")
     got = schedule.pressure_scale * pressure(made)
     if schedule.pressure_lag > 0.0:
         before = made.own("schedule/pressure-Pa")
@@ -56,7 +56,7 @@ def add_schedule(made: Made) -> None:
     for name, table in tables.items():
         rest = _at_rest(schedule.dynamic_pressure, table)
         sloped = [rest + schedule.slope * (value - rest) for value in table]
-        says = f"G_T, the gradient asked for, N/{d}"
+        says = f"G_T, the specified gradient, N/{d}"
         looked = looked_up(at, schedule.dynamic_pressure, sloped)
         made.once_a_frame(name, looked, out=says if name.startswith("gradient") else "")
 
@@ -136,7 +136,7 @@ def add_inertia(made: Made) -> None:
 def add_reading(made: Made, steps: dict[str, tuple[float, float]]) -> None:
     """Add the host's readings of δc and F, and the product of a digital host."""
     sensing, d = made.control.sensing, made.d
-    made.system.channel("reading", "δc and F as the host has them, eq. (2)")
+    made.system.channel("reading", "δc and F as the host reads them, eq. (2)")
     read = converted(sensing.read_scale * made.own(f"loader-{d}"), *steps["computed"])
     made.once_a_frame(f"computed-{d}", read, out=f"δc as the host reads it, {d}")
     force = converted(sensing.force_scale * made.own("force-held-N"), *steps["force"])
@@ -147,7 +147,7 @@ def add_reading(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         given = made.own("host/held")
     else:
         given = modifying(made, made.own(f"loader-{d}"), smooth=False)
-    made.once_a_frame("modifying-force-N", given, out="F_mod that the host asks for, N")
+    made.once_a_frame("modifying-force-N", given, out="F_mod of the host, N")
 
 
 def add_estimate(made: Made, others: Expr | None) -> None:
@@ -158,7 +158,7 @@ def add_estimate(made: Made, others: Expr | None) -> None:
     if others is not None:
         bent = bent + others
     estimate = made.own(f"computed-{d}") + made.own("deflection-correction") * bent
-    made.once_a_frame(f"estimate-{d}", estimate, out=f"δ̂, what the surface is given, {d}")
+    made.once_a_frame(f"estimate-{d}", estimate, out=f"δ̂, the input of the surface, {d}")
 
 
 def add_external(made: Made) -> None:

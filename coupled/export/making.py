@@ -83,7 +83,7 @@ class Made:
 def add_clock(made: Made) -> None:
     """Add the time steps: whether JSBSim steps, the loader's step, the host's frame."""
     system = made.system
-    system.channel("time", "A run that takes no time (JSBSim's start and trim) sets all back.")
+    system.channel("time", "A run of zero time (JSBSim's start and trim) resets all.")
     system.add("live", either(stepping(), own_started(made), 0.0), "1 from the second step on")
     system.add("started", stepping(), "1 from the first step on")
     step = either(made.own("live"), DT / float(made.substeps), STILL_s)

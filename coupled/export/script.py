@@ -153,7 +153,7 @@ def lead_pilots(script: Script, manoeuvre: Manoeuvre, record: Record) -> None:
             _lead(script, f"coupled/{name}/force-N", record.time_s, force)
             script.notes.append(
                 f"{name}: the force that the pilot ({pilot.kind}) gave in coupled's own flight,"
-                " played back: JSBSim has no pilot who looks."
+                " played back: JSBSim has no pilot who observes the motion."
             )
             continue
         pressure_Pa = float(record["dynamic_pressure_Pa"][0])

@@ -11,7 +11,9 @@ def add_surface(made: Made) -> None:
     """Add the surface's command about trim, and add it to the aircraft's trim."""
     control, system, own = made.control, made.system, made.own
     rigging = control.rigging
-    system.channel("surface", "the command about trim, ±1 the whole travel, then on top of it")
+    system.channel(
+        "surface", "the command about trim, ±1 the whole travel, and its sum with the trim"
+    )
     asked = within((made.sign / control.travel) * own(f"estimate-{made.d}"), -1.0, 1.0)
     if rigging.stretch_loss > 0.0:
         asked = asked / (1.0 + rigging.stretch_loss * pressure(made))

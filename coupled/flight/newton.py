@@ -61,7 +61,7 @@ def _search(fdm: Any, flight: Flight, found: Floats) -> str:
             down = _accelerations(fdm, flight, found - step)
             slopes[:, i] = (up - down) / (2.0 * _STEPS[i])
         if not np.all(np.isfinite(slopes)) or abs(np.linalg.det(slopes)) < 1e-12:
-            return "angle of attack, throttle and elevator do not tell apart"
+            return "angle of attack, throttle and elevator are not separable"
         move = np.linalg.solve(slopes, -left)
         move *= min(1.0, 0.1 / float(np.max(np.abs(move))))
         found = np.clip(found + move, _LOW, _HIGH)

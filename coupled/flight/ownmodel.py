@@ -114,8 +114,8 @@ def _tried(home: str, state: object, asked: str, request: _Request) -> str:
     last = next((line for line in reversed(lines) if line), "")[-200:]
     if done.returncode == REFUSED:
         return f"cannot be loaded: {last}"
-    why = f"ends JSBSim as it is loaded ({_how(done.returncode)}): a fault of its files"
-    return f"{why}; JSBSim's last words: {last}" if last else why
+    why = f"crashes JSBSim when loaded ({_how(done.returncode)}): a fault of its files"
+    return f"{why}; JSBSim's last message: {last}" if last else why
 
 
 def _how(code: int) -> str:

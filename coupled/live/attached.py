@@ -102,7 +102,7 @@ class Attached:
             self._wait_frame()
             self.listen(0.0)
             if time.monotonic() - self._seen > ANSWER_s:
-                problem = "has stopped answering while its forces came in"
+                problem = "stopped answering while its forces were faded in"
                 raise InputError(self.link.name, "", problem)
 
     def _check_rest(self) -> None:
@@ -110,9 +110,7 @@ class Attached:
         for (name, control), now in zip(self._rig.controls.items(), self._measured, strict=True):
             if abs(now.computed) > AT_REST * control.travel:
                 share = 100.0 * now.computed / control.travel
-                problem = (
-                    f"the {name} stands at {share:.0f} % of its travel; let it rest at neutral"
-                )
+                problem = f"the {name} is at {share:.0f} % of its travel; let it rest at neutral"
                 raise InputError(self.link.name, "", problem)
 
     def _wait_frame(self) -> None:
@@ -130,7 +128,7 @@ class Attached:
             if self.lost:
                 self.lost = False
                 self.losses.spells[-1][1] = time_s
-                self._warn("the loader answers again: its forces come back")
+                self._warn("the loader answers again: its forces return")
         else:
             self.losses.stale_frames += 1
             for plausible in self._plausible:
@@ -138,7 +136,7 @@ class Attached:
             if not self.lost and now - self._seen > WATCHDOG_s:
                 self.lost = True
                 self.losses.spells.append([time_s, None])
-                self._warn("the loader does not answer: its forces go, the surface is held")
+                self._warn("the loader does not answer: its forces fade out, the surface is held")
             if now - self._seen > GONE_s:
                 return GONE
         self._put(self._aboard.controls)
@@ -168,10 +166,10 @@ class Attached:
                 spell = {"control": str(name), "why": found, "from_s": time_s, "to_s": None}
                 self._faults[i] = spell
                 self.losses.implausible.append(spell)
-                self._warn(f"all forces go: the {name} cannot be trusted, since {found}")
+                self._warn(f"all forces fade out: implausible measurement of the {name}: {found}")
             else:
                 self._faults[i] = None
-                self._warn(f"what the {name} measures agrees again: the forces come back")
+                self._warn(f"the measurements of the {name} are plausible again: the forces return")
 
     def measured_now(self, i: int) -> bool:
         """Tell whether the last call of `listen` received a new sample of control i, with δ."""

@@ -173,7 +173,7 @@ class Host:
         control, service, value = word.control, word.text, word.value
         try:
             if self.elsewhere:
-                raise InputError("service", service, "is done by the real loader itself; ask it")
+                raise InputError("service", service, "belongs to the real loader; set it there")
             check_led(self.switches.rig, control, service, value, "service", service)
         except InputError as error:
             self.plan.warn(str(error))
@@ -265,7 +265,7 @@ class Host:
         found = estimator.look(force, computed, deflection, fresh=new)
         if found.alarm and not alarmed and found.bend is not None:
             self.happened.alarms.append((self.time_s, name, found.bend))
-            self.plan.warn(f"K of the {name} is no longer the calibrated one")
+            self.plan.warn(f"K of the {name} differs from the calibrated one")
         if name in self._adaptations:
             assumed = self._adaptations[name].look(self.time_s, found)
             if assumed is not None:

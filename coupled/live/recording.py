@@ -113,7 +113,7 @@ class Recording:
                 os.truncate(self.path, self._bytes)
         self.problem = why
         kept = f"{self.path} keeps its first {self.recorded_s:.0f} s" if self._rows else "none"
-        self._warn(f"the recording ended: {why}; {kept}; the flight goes on")
+        self._warn(f"the recording ended: {why}; {kept}; the flight continues")
 
     def _append(self, due: int) -> None:
         """Write the rows before frame `due` that are not in the file yet, and the manifest."""

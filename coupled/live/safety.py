@@ -177,7 +177,7 @@ class Plausibility:
             self._stuck = self._stuck and same
         elif max(self._places) - min(self._places) > MOVED * self._travel:
             self._stuck = True
-        return "its force gauge reads the same while the control moves" if self._stuck else ""
+        return "the force gauge is constant while the control moves" if self._stuck else ""
 
     def _apart(self, measured: Measured) -> str:
         position = self._servo.move(measured.computed)

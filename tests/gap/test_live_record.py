@@ -68,7 +68,7 @@ def test_samples_are_brought_to_equal_steps_of_the_loader_s_clock() -> None:
     assert np.abs(record[FORCE] - signal(usual)).max() > 0.05
     assert np.sqrt(np.mean(wrong**2)) < 5e-4
     assert live.judged.all()
-    assert "samples did not come" in live.left_out[0]
+    assert "samples are missing" in live.left_out[0]
 
 
 def test_a_record_as_it_should_be_is_taken_as_it_is() -> None:

@@ -115,7 +115,7 @@ def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> 
 def needs_aircraft(rig: Rig, control: ControlName, file: object) -> None:
     """Refuse a pilot who observes the motion, on a rig without aircraft."""
     if rig.flight is None:
-        problem = "looks at the aircraft's motion, and the rig has no aircraft; give one that flies"
+        problem = "uses the aircraft's motion, and the rig has no aircraft; give one that flies"
         raise InputError(file, f"pilot.{control}", problem)
 
 

@@ -136,7 +136,7 @@ class Track(Pilot):
         for inner in ("pitch", "roll"):
             for key in (f"{inner}_crossover_rad_per_s", f"{inner}_phase_margin_rad"):
                 if key in self.model_fields_set and (inner != through or inner == what):
-                    problem = f"has no part in following {what} with the {control}; leave it out"
+                    problem = f"is not used for {what} with the {control}; leave it out"
                     raise InputError(file, f"pilot.{control}.{key}", problem)
         wrong = "rad" if what == "airspeed" else "m_per_s"
         for key in (f"change_{wrong}", f"sine_{wrong}"):

@@ -88,7 +88,7 @@ def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
 def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
     """Return the source of a channel's noise floor if its log was filtered, in words."""
     if heard(signal).rms > given_noise(rig, channel, signal).rms:
-        return "what is left at its highest frequencies"
+        return "the level at its highest frequencies"
     if rig.noise.get(channel, 0.0) > 0.0:
         return "the rig file"
-    return f"1/{1.0 / LEAST_NOISE:g} of the signal, since the rig file says nothing of it"
+    return f"1/{1.0 / LEAST_NOISE:g} of the signal's RMS, since the rig file does not give it"

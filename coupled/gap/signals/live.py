@@ -366,11 +366,11 @@ def _words(
 
     if bridged.any():
         share = 100.0 * float(np.mean(bridged))
-        yield f"{share:.2g} % of the loader's samples did not come: they are interpolated."
+        yield f"{share:.2g} % of the loader's samples are missing: they are interpolated."
     if (silent := ~sampled & ~bridged).any():
         yield f"Left out: {seconds(silent)} in which the loader sent no new sample."
     if (faded := validity == FADED).any():
-        yield f"Left out: {seconds(faded)} in which forces faded or a limit held them."
+        yield f"Left out: {seconds(faded)} in which forces were faded or limited."
     if other.any():
         yield f"Left out: {seconds(other)} flown with other settings, as switched in flight."
     if clock.jumps.any():

@@ -65,8 +65,8 @@ class Hides:
         share = f"{100 * self.share:.0f} %"
         if self.misses:
             missed = f"the rig misses the healthy record there by {self.misses:.3g} times the noise"
-            return f"{missed}, {share} of what the stage does"
-        return f"noise of {self.noisiest} is {share} of what {self.channel} does"
+            return f"{missed}, {share} of the stage's motion"
+        return f"noise of {self.noisiest} is {share} of the motion of {self.channel}"
 
     @property
     def wanted(self) -> str:
@@ -74,7 +74,7 @@ class Hides:
         if self.misses:
             return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
         if self.still:
-            return f"Record a push that moves {self.channel}, or {self.noisiest} with less noise."
+            return f"Record a force that moves {self.channel}, or {self.noisiest} with less noise."
         times = math.ceil(self.share / FLOOR_SHARE)
         return f"Record a motion {times} times as large, or {self.noisiest} with less noise."
 

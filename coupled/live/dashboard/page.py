@@ -159,7 +159,7 @@ class Page:
         except (EOFError, OSError):
             self.gone = True
             self._wanted = dict.fromkeys(self._wanted, 0.0)
-            self.warn("the page has gone; the flight goes on")
+            self.warn("the page was closed; the flight continues")
         return found
 
     def read(self, control: str) -> float:

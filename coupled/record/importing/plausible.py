@@ -185,7 +185,7 @@ def unit_doubt(ratio: float, turned: bool) -> str | None:
         return "was N already, not lbf?"
     if 1.0 / FAR_RATIO < size < FAR_RATIO:
         return None
-    says = f"is {size:.2g} of what gradient and deflection say"
+    says = f"is {size:.2g} of gradient times deflection"
     for units, kind in ((_FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
         for word, factor in units.items():
             wrong = size * factor if kind == "force" else size / factor
@@ -272,4 +272,4 @@ def pressure_doubt(pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Fl
         return None
     if 0.7 < ratio * PSF_Pa < 1.4:
         return "looks like psf"
-    return f"is {ratio:.3g} of what airspeed and altitude say"
+    return f"is {ratio:.3g} of ½ρV² by airspeed and altitude"

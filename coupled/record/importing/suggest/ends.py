@@ -42,7 +42,7 @@ def settle_ends(chosen: Mapping[str, Column]) -> tuple[dict[str, Column], dict[s
         if sign < 0 and unsure:
             settled[ends[0]], settled[ends[1]] = deflection, computed
         elif sign < 0 or (sign == 0 and unsure and not _named(computed, deflection)):
-            says = "its name and the force do not agree" if sign else "the names leave that open"
+            says = "its name contradicts the force" if sign else "the names do not show it"
             both = f"{computed.name!r} or {deflection.name!r}"
             asked[ends[0]] = f"{both}: which is on the actuator's side? {says}"
             asked[ends[1]] = f"{both}: which is at the grip? {says}"

@@ -202,7 +202,7 @@ def _control(channel: str, rig: Rig | None) -> Control | None:
 def _channel_lines(
     channel: str, column: Column, control: Control | None, main: str, asked: Mapping[str, str]
 ) -> list[Line]:
-    remark = "" if column.reading.sure else "is it this? its name leaves that open"
+    remark = "" if column.reading.sure else "is it this? its name is ambiguous"
     lines: list[Line] = [("from", column.name, remark)]
     if channel in asked:
         lines = [("from", "?", asked[channel])]
