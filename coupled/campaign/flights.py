@@ -24,7 +24,7 @@ from coupled.campaign.journal import Journal
 from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, planned_flights
 from coupled.campaign.sweepfile import Survive
 from coupled.errors import InputError
-from coupled.flight.kept import Hangar
+from coupled.flight.kept import AircraftCache
 from coupled.flight.loop import fly
 from coupled.parallel import as_done
 from coupled.record.record import Record
@@ -36,11 +36,11 @@ _SHARE = 16  # a block has at most 1/16 of the remaining flights, so that all wo
 
 
 def fly_planned(
-    plan: SweepPlan, flight: PlannedFlight, hangar: Hangar | None = None
+    plan: SweepPlan, flight: PlannedFlight, cache: AircraftCache | None = None
 ) -> JournalEntry:
     """Return the results of one flight, with the reason if it ended early or could not be flown.
 
-    A `hangar` keeps its aircraft for the next flight.
+    A `cache` keeps its aircraft for the next flight.
     """
     sweep, columns = plan.sweep, plan.columns
     entry = JournalEntry(
@@ -59,7 +59,7 @@ def fly_planned(
         entry = replace(entry, seed=scenario.seed)
         if flight.configuration:
             scenario = scenario.configured(flight.configuration)
-        record = fly(scenario, hangar=hangar, stops=True)
+        record = fly(scenario, cache=cache, stops=True)
     except InputError as error:
         return replace(entry, ended_early=f"not flown: {error.problem}")
     ended = record.manifest["ended_early"]
@@ -109,15 +109,15 @@ def _fly_block(packed: bytes, flights: Sequence[PlannedFlight]) -> tuple[list[Jo
     Return the entries, and the time they took, s.
     """
     start = time.perf_counter()
-    plan, hangar = _unpacked(packed)
-    entries = [fly_planned(plan, flight, hangar) for flight in flights]
+    plan, cache = _unpacked(packed)
+    entries = [fly_planned(plan, flight, cache) for flight in flights]
     return entries, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)
-def _unpacked(packed: bytes) -> tuple[SweepPlan, Hangar]:
+def _unpacked(packed: bytes) -> tuple[SweepPlan, AircraftCache]:
     """Return a plan, and this worker's cache of aircraft."""
-    return pickle.loads(packed), Hangar()
+    return pickle.loads(packed), AircraftCache()
 
 
 def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:

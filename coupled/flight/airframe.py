@@ -132,7 +132,7 @@ class JSBSimAirframe:
         nodes = [self._node(_COMMANDS[SURFACES[control]]) for control in controls]
         writes = [(node.set_double_value, node.get_double_value()) for node in nodes]
         plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
-        hooks = [hook for wrapper in wrappers if (hook := wrapper.meet(self)) is not None]
+        hooks = [hook for wrapper in wrappers if (hook := wrapper.attach(self)) is not None]
         self.step = led_by(hooks, plain)
         self._unled = plain
         # Above this altitude no wheel is near the ground, and the height need not be checked.

@@ -100,7 +100,7 @@ class Alterations(Wrapper):
         """Set the factors with reference zero, which act in the trim."""
         self._set(aircraft, about_trim=False)
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Set the factors with reference trim, and follow a moved trim."""
         held = [
             (name, aircraft.lever(alteration.part.held(name)).set)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Aboard:
+class FlightAccess:
     """A flight's arrays, which a companion may read and change between frames.
 
     controls  the rig's controls in the kernels' arrays, shape (n,)
@@ -45,7 +45,7 @@ class Companion(Protocol):
     elsewhere: bool  # hand and loader are real and not simulated
     leads: bool  # it may set services of any control, between frames
 
-    def board(self, aboard: Aboard) -> None:
+    def begin(self, access: FlightAccess) -> None:
         """Start, with the aircraft in trim."""
 
     def before(self, k: int, motion: tuple[float, ...]) -> str:

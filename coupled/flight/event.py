@@ -70,7 +70,7 @@ class Events(Wrapper):
     def __init__(self, events: Mapping[str, Event], file: object, frame_s: float) -> None:
         self._events, self._file, self._frame_s = events, file, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Return a hook that moves all events begun by the start of each frame."""
         makers = (_trim, _engine, _property)
         moves = [

@@ -69,7 +69,7 @@ class Gusts(Wrapper):
         self._flight, self._frame_s, self._seed = flight, frame_s, seed
         self._air = air_m_per_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Return a hook that sets the gust of each frame: as given, or from the spectrum."""
         flight, air = self._flight, self._air
         if air is None and flight.gust_rms > 0.0:

@@ -33,7 +33,7 @@ _HARMLESS = frozenset(
 
 
 @dataclass(frozen=True)
-class Lent:
+class CachedAircraft:
     """An aircraft for one flight; `kind` is None if it is not kept afterwards.
 
     `reads` are all its properties, `trimmed` their values in its first trim.
@@ -58,21 +58,21 @@ class Lent:
         return self.state() == self.trimmed
 
 
-def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> Lent:
+def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> CachedAircraft:
     """Return an aircraft in its first trim, with its state."""
     found = (airframe.reader(name) for name in airframe.names() if tells(name))
-    lent = Lent(airframe, kind, tuple(read for read in found if read is not None))
-    return replace(lent, trimmed=lent.state())
+    cached = CachedAircraft(airframe, kind, tuple(read for read in found if read is not None))
+    return replace(cached, trimmed=cached.state())
 
 
-class Hangar:
+class AircraftCache:
     """A cache of the last flight's aircraft, for another flight of the same kind."""
 
     def __init__(self) -> None:
         self._asked: Hashable = None
-        self._waiting: dict[Hashable, Lent] = {}
+        self._waiting: dict[Hashable, CachedAircraft] = {}
 
-    def lend(self, manoeuvre: Manoeuvre, make: Callable[[], Airframe]) -> Lent:
+    def take(self, manoeuvre: Manoeuvre, make: Callable[[], Airframe]) -> CachedAircraft:
         """Return an aircraft for a manoeuvre: the cached one, reset, or a new one."""
         kind = _kind(manoeuvre)
         # Removed from the cache, so that no two threads fly one aircraft.
@@ -83,13 +83,13 @@ class Hangar:
         # Collecting the properties is slow, so it is done only for a kind that is repeated.
         again, self._asked = kind is not None and kind == self._asked, kind
         if not again or not isinstance(airframe, JSBSimAirframe):
-            return Lent(airframe)
+            return CachedAircraft(airframe)
         return in_trim(airframe, kind)
 
-    def take_back(self, lent: Lent) -> None:
+    def keep(self, cached: CachedAircraft) -> None:
         """Keep an aircraft after a complete flight, in place of any other."""
-        if lent.kind is not None:
-            self._waiting = {lent.kind: lent}
+        if cached.kind is not None:
+            self._waiting = {cached.kind: cached}
 
 
 def _kind(manoeuvre: Manoeuvre) -> Hashable:

@@ -21,12 +21,12 @@ from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
-from coupled.flight.companion import Aboard, Companion
+from coupled.flight.companion import Companion, FlightAccess
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.frames import Frames, Progress
 from coupled.flight.gusts import Gusts
-from coupled.flight.kept import Hangar, Lent
+from coupled.flight.kept import AircraftCache, CachedAircraft
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
@@ -55,7 +55,7 @@ def fly(
     progress: Progress | None = None,
     air_m_per_s: Sequence[float] | None = None,
     companion: Companion | None = None,
-    hangar: Hangar | None = None,
+    cache: AircraftCache | None = None,
     stops: bool = False,
 ) -> Record:
     """Fly a manoeuvre and return its record, SI, one row a frame.
@@ -63,16 +63,16 @@ def fly(
     `progress` is called repeatedly with frames done and frames in all. The manifest has the inputs,
     and under `ended_early` why and when a flight ended early. `air_m_per_s` is the upward speed of
     the air at each frame, in place of the rig's gusts. A `companion` is called before and after
-    each frame. A `hangar` keeps the aircraft for the next flight, unless its air is given. With
+    each frame. A `cache` keeps the aircraft for the next flight, unless its air is given. With
     `stops` the manifest has the stops of the compared control's surface, for an aircraft with
     direct controls.
     """
     rig = manoeuvre.rig
-    hangar = hangar if air_m_per_s is None else None
+    cache = cache if air_m_per_s is None else None
     make = partial(make_airframe, manoeuvre, air_m_per_s)
     with timed("trim"):
-        lent = Lent(make()) if hangar is None else hangar.lend(manoeuvre, make)
-    airframe = lent.airframe
+        cached = CachedAircraft(make()) if cache is None else cache.take(manoeuvre, make)
+    airframe = cached.airframe
     frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
     actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
@@ -91,14 +91,14 @@ def fly(
     beside = (served, flight.extra)
     if companion is not None:
         so_far = partial(_so_far, manoeuvre, channels, (data, noise), beside)
-        companion.board(
-            Aboard(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
+        companion.begin(
+            FlightAccess(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
         )
     with timed("fly"):
         flight.fly()
     found = _surface_stops(manoeuvre, airframe) if stops and flight.ended is None else {}
-    if hangar is not None and flight.ended is None:
-        hangar.take_back(lent)
+    if cache is not None and flight.ended is None:
+        cache.keep(cached)
     flown = (data[: flight.done], noise)
     return _flown(manoeuvre, channels, flown, beside, flight.ended, noted=found)
 

@@ -56,7 +56,7 @@ class DiscreteGust(Wrapper):
     def __init__(self, gust: Gust, file: object, frame_s: float) -> None:
         self._gust, self._file, self._frame_s = gust, file, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Set the gust in JSBSim, and return a hook that starts it in its frame."""
         gust, file = self._gust, self._file
         velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
@@ -88,7 +88,7 @@ class TurbulentAir(Wrapper):
     def __init__(self, turbulence: Turbulence, file: object, seed: int) -> None:
         self._turbulence, self._file, self._seed = turbulence, file, seed
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Switch on JSBSim's turbulence."""
         values = {
             "atmosphere/randomseed": float(self._seed % 2**31),

@@ -49,7 +49,7 @@ class MovingAir(Wrapper):
     def __init__(self, wind: Wind, frame_s: float) -> None:
         self._wind, self._frame_s = wind, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Return a hook that moves the air, frame by frame from the start."""
         wind, frame_s, frame = self._wind, self._frame_s, 0
         north, down = (aircraft.lever(name).set for name in _WINDS)

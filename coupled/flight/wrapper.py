@@ -63,7 +63,7 @@ class Wrapper:
     def weigh(self, aircraft: Aircraft) -> None:
         """Act on the aircraft once JSBSim knows its weight, before it is trimmed."""
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
+    def attach(self, aircraft: Aircraft) -> Hook | None:
         """Act on the aircraft in trim; return a hook for each frame, if any."""
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, Sample, WATCHDOG_s
 from coupled.live.safety import Fade, Limiter, Limits, Plausibility
 from coupled.record.channels import FADED, FRESH, LOST, REPEATED, channel
@@ -44,12 +44,12 @@ class Attached:
         self,
         link: Link,
         limits: Limits,
-        aboard: Aboard,
+        access: FlightAccess,
         paced: bool,
         warn: Callable[[str], None],
     ) -> None:
-        self._rig = rig = aboard.manoeuvre.rig
-        self.link, self._aboard, self._paced, self._warn = link, aboard, paced, warn
+        self._rig = rig = access.manoeuvre.rig
+        self.link, self._aboard, self._paced, self._warn = link, access, paced, warn
         self.frame_s = 1.0 / rig.frame_rate
         controls = list(rig.controls.values())
         self._limiters = [
@@ -59,7 +59,7 @@ class Attached:
         self._plausible = [Plausibility(c, self.frame_s, link.measures_force) for c in controls]
         self._faults: list[dict[str, Any] | None] = [None] * len(controls)
         self._fade = Fade(limits.fade_s, self.frame_s)
-        names, at = list(rig.controls), aboard.channels.index
+        names, at = list(rig.controls), access.channels.index
         self._force_at = [at(channel(name, "modifying_force")) for name in names]
         self._gradient_at = [at(channel(name, "gradient")) for name in names]
         self._deflection_at = [at(channel(name, "deflection")) for name in names]
@@ -77,7 +77,7 @@ class Attached:
         """Return the number of frames in which the limits reduced an order."""
         return sum(limiter.limited for limiter in self._limiters)
 
-    def meet(self) -> None:
+    def connect(self) -> None:
         """Wait for the loader's first answer, and fade its forces in with the aircraft in trim."""
         begun = time.monotonic()
         while (sample := self.link.receive(0.02)) is None:
@@ -157,7 +157,7 @@ class Attached:
         """Find implausible measurements, which fade the forces, and warn once of each."""
         for i, (name, now) in enumerate(zip(self._rig.controls, sample.controls, strict=True)):
             known = now if self.link.measures_deflection else now._replace(deflection=math.nan)
-            before, found = self._faults[i], self._plausible[i].look(known)
+            before, found = self._faults[i], self._plausible[i].update(known)
             if found == ("" if before is None else before["why"]):
                 continue
             if before is not None:
@@ -211,7 +211,7 @@ class Attached:
         self._orders = tuple(orders)
         self.link.send(self._orders, RUN if share == 1.0 else FADING if share > 0.0 else OFF)
 
-    def farewell(self) -> None:
+    def shut_down(self) -> None:
         """Fade the loader's forces out, send that they are off, and close the link."""
         asked = self._orders
         while self._fade.share > 0.0:

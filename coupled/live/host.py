@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.live.attached import Attached
 from coupled.live.hands import Follower, Wishes
 from coupled.live.link import Link
@@ -36,7 +36,7 @@ Motion = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Word:
+class Request:
     """A request of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
 
     `text` names the switch or the service of a `control`, or is the text of a mark.
@@ -51,13 +51,13 @@ class Word:
 class Watcher(Protocol):
     """An observer of the flight, such as a view or the page: it neither waits nor raises."""
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Start."""
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Observe frame k."""
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         """Return the user's requests since the last call."""
 
     def close(self) -> None:
@@ -85,7 +85,7 @@ class Plan:
 
 
 @dataclass
-class Happened:
+class FlightEvents:
     """The events of a live flight; times in s."""
 
     marks: list[tuple[float, str]] = field(default_factory=list)
@@ -101,26 +101,26 @@ class Host:
         self.plan = plan
         self.elsewhere = plan.link is not None
         self.leads = plan.link is None and bool(plan.watchers)
-        self.happened = Happened()
+        self.events = FlightEvents()
         self.attached: Attached | None = None
         self.time_s = 0.0
-        self.first_place = False  # whether the system granted real-time priority
-        self.aboard: Aboard | None = None
+        self.real_time_priority = False  # whether the system granted real-time priority
+        self.access: FlightAccess | None = None
         self._saving: threading.Thread | None = None
         self._next_save_s = 0.0
 
-    def board(self, aboard: Aboard) -> None:
+    def begin(self, access: FlightAccess) -> None:
         """Start with the aircraft in trim: connect to the loader and fade its forces in."""
-        plan, rig = self.plan, aboard.manoeuvre.rig
-        self.aboard, self.frame_s = aboard, 1.0 / rig.frame_rate
+        plan, rig = self.plan, access.manoeuvre.rig
+        self.access, self.frame_s = access, 1.0 / rig.frame_rate
         self.names = [str(name) for name in rig.controls]
         self.substeps, controls = rig.substeps, list(rig.controls.values())
-        self.switches = Switches(rig, aboard.controls, aboard.hands, self.elsewhere)
-        self.pacer = Pacer(self.frame_s, len(aboard.data))
-        self.rows = Rows(len(aboard.data), plan.link is not None, plan.paced)
+        self.switches = Switches(rig, access.controls, access.hands, self.elsewhere)
+        self.pacer = Pacer(self.frame_s, len(access.data))
+        self.rows = Rows(len(access.data), plan.link is not None, plan.paced)
         self._followers = [Follower(control.travel, self.frame_s) for control in controls]
         self._columns = [
-            [aboard.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
+            [access.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
             for name in self.names
         ]
         measured = plan.link is None or plan.link.measures_deflection
@@ -133,10 +133,10 @@ class Host:
             if plan.adapt
         }
         if plan.link is not None:
-            self.attached = Attached(plan.link, plan.limits, aboard, plan.paced, plan.warn)
-            self.attached.meet()
+            self.attached = Attached(plan.link, plan.limits, access, plan.paced, plan.warn)
+            self.attached.connect()
         for watcher in plan.watchers:
-            watcher.board(self)
+            watcher.begin(self)
 
     def before(self, k: int, motion: Motion) -> str:
         """Wait for the frame's deadline, and take requests, measurements and hand positions."""
@@ -144,7 +144,7 @@ class Host:
         if self.plan.paced:
             self.pacer.wait()
         for watcher in self.plan.watchers:
-            for word in watcher.words():
+            for word in watcher.requests():
                 if word.what == "stop":
                     return STOPPED
                 self._obey(word)
@@ -154,11 +154,11 @@ class Host:
             self._lead(self.plan.wishes, k)
         return ""
 
-    def _obey(self, word: Word) -> None:
+    def _obey(self, word: Request) -> None:
         if word.what == "save":
             self._save()
         elif word.what == "mark":
-            self.happened.marks.append((self.time_s, word.text[:200]))
+            self.events.marks.append((self.time_s, word.text[:200]))
         elif word.what == "lead":
             self._lead_service(word)
         elif word.what == "set":
@@ -167,9 +167,9 @@ class Host:
             except InputError as error:
                 self.plan.warn(str(error))
 
-    def _lead_service(self, word: Word) -> None:
+    def _lead_service(self, word: Request) -> None:
         """Set a service of a simulated loader, as an event of a run does."""
-        assert self.aboard is not None
+        assert self.access is not None
         control, service, value = word.control, word.text, word.value
         try:
             if self.elsewhere:
@@ -178,19 +178,19 @@ class Host:
         except InputError as error:
             self.plan.warn(str(error))
             return
-        lead(self.aboard.controls, self.names, control, service, value)
-        self.happened.led.append((self.time_s, control, service, value))
+        lead(self.access.controls, self.names, control, service, value)
+        self.events.led.append((self.time_s, control, service, value))
 
     def services(self) -> dict[str, dict[str, float]]:
         """Return the services of each simulated control that can be set, and their values."""
-        if self.elsewhere or self.aboard is None:
+        if self.elsewhere or self.access is None:
             return {}
         found: dict[str, dict[str, float]] = {}
         for name in self.names:
             for service in services_of(name):
                 with contextlib.suppress(InputError):
                     check_led(self.switches.rig, name, service, 0.0, "service", service)
-                    stands = led(self.aboard.controls, self.names, name, service)
+                    stands = led(self.access.controls, self.names, name, service)
                     found.setdefault(name, {})[service] = stands
         return found
 
@@ -213,8 +213,8 @@ class Host:
 
     def so_far(self, first: int, last: int) -> Record:
         """Return the record from frame `first` to before `last` of the current flight."""
-        assert self.aboard is not None
-        return self.kept(self.aboard.so_far(first, last), True, first)
+        assert self.access is not None
+        return self.kept(self.access.so_far(first, last), True, first)
 
     def kept(self, record: Record, stopped: bool, first: int = 0) -> Record:
         """Return a record that begins with frame `first`, with the data of the live flight.
@@ -232,20 +232,20 @@ class Host:
 
     def _lead(self, wishes: Wishes, k: int) -> None:
         """Write the hands' positions over the next frame."""
-        assert self.aboard is not None
+        assert self.access is not None
         first, last = k * self.substeps, (k + 1) * self.substeps
         for i, (name, follower) in enumerate(zip(self.names, self._followers, strict=True)):
             before = follower.at
             way = np.linspace(before, follower.move(wishes.read(name)), last - first + 1)
-            self.aboard.script[i, 1, first + 1 : last + 1] = way[1:]
+            self.access.script[i, 1, first + 1 : last + 1] = way[1:]
 
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
         """Send the orders, and pass the frame to estimators and watchers."""
-        assert self.aboard is not None
-        row, attached = self.aboard.data[k], self.attached
+        assert self.access is not None
+        row, attached = self.access.data[k], self.attached
         validity = FRESH
         if attached is not None:
-            attached.order(self.aboard.controls, row)
+            attached.order(self.access.controls, row)
             validity = attached.validity()
             self.rows.loader_time_s[k] = attached.time_s
         switched = validity == FRESH and self.switches.differs
@@ -255,30 +255,30 @@ class Host:
                 new = attached is None or attached.measured_now(i)
                 self._serve(name, new, *(float(row[column]) for column in at))
         for watcher in self.plan.watchers:
-            watcher.look(self, k)
+            watcher.observe(self, k)
 
     def _serve(
         self, name: str, new: bool, force: float, computed: float, deflection: float
     ) -> None:
         estimator = self.service[name]
         alarmed = estimator.now.alarm
-        found = estimator.look(force, computed, deflection, fresh=new)
+        found = estimator.update(force, computed, deflection, fresh=new)
         if found.alarm and not alarmed and found.bend is not None:
-            self.happened.alarms.append((self.time_s, name, found.bend))
+            self.events.alarms.append((self.time_s, name, found.bend))
             self.plan.warn(f"K of the {name} differs from the calibrated one")
         if name in self._adaptations:
-            assumed = self._adaptations[name].look(self.time_s, found)
+            assumed = self._adaptations[name].update(self.time_s, found)
             if assumed is not None:
                 self.switches.put(name, "assumed_bend", assumed)
-                self.happened.adapted.append((self.time_s, name, assumed))
+                self.events.adapted.append((self.time_s, name, assumed))
 
-    def farewell(self) -> None:
+    def shut_down(self) -> None:
         """Fade the loader's forces out, and close all devices; called at every end of a flight."""
         try:
             if self._saving is not None:
                 self._saving.join()
             if self.attached is not None:
-                self.attached.farewell()
+                self.attached.shut_down()
             elif self.plan.link is not None:
                 self.plan.link.close()
         finally:
@@ -292,13 +292,13 @@ class Host:
         link, attached = self.plan.link, self.attached
         found: dict[str, Any] = {
             "paced": self.plan.paced,
-            "real_time_priority": self.first_place,
+            "real_time_priority": self.real_time_priority,
             "loader": "sim" if link is None else link.name,
             "lateness": self.pacer.result().as_dict() if self.plan.paced else None,
             "switched": [asdict(change) for change in self.switches.changes],
             "bend_in_service": {n: e.now.as_dict() for n, e in self.service.items()},
             "adapt": self.plan.adapt,
-            **{what: list(events) for what, events in vars(self.happened).items()},
+            **{what: list(events) for what, events in vars(self.events).items()},
         }
         if link is not None and attached is not None:
             found |= {

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from coupled.live.host import Word
+from coupled.live.host import Request
 
 if TYPE_CHECKING:
     from coupled.live.host import Host
@@ -33,13 +33,13 @@ class Keys:
         except (ImportError, OSError):
             return  # no such terminal: Ctrl-C still works
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Start."""
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing at a frame."""
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         """Return the requests typed since the last call."""
         self._count += 1
         if self._before is None or self._count % EVERY:
@@ -48,8 +48,8 @@ class Keys:
             return ()
         typed = os.read(sys.stdin.fileno(), 64)
         if not typed or any(key in STOP for key in typed):
-            return (Word("stop"),)
-        return [Word("mark") for key in typed if key in b"mM"]
+            return (Request("stop"),)
+        return [Request("mark") for key in typed if key in b"mM"]
 
     def close(self) -> None:
         """Restore the terminal's settings."""

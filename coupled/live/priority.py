@@ -15,7 +15,7 @@ PRIORITY = 40  # of 1 to 99: above all ordinary work, below the kernel's interru
 
 
 @contextmanager
-def first_place(wanted: bool = True) -> Iterator[bool]:
+def real_time_priority(wanted: bool = True) -> Iterator[bool]:
     """Give this thread real-time priority in the context; yield whether the system granted it.
 
     Threads started in the context, such as the page's, run with ordinary priority.

@@ -21,7 +21,7 @@ from coupled.files import json_text, unfinished_name
 from coupled.record.record import FORMAT, Record, manifest_path
 
 if TYPE_CHECKING:
-    from coupled.live.host import Host, Word
+    from coupled.live.host import Host, Request
 
 EVERY_s = 1.0
 UNFINISHED = "the host, or its recording, was stopped before the flight was over"
@@ -52,20 +52,20 @@ class Recording:
         self._wake, self._ended = threading.Condition(), False
         self._thread: threading.Thread | None = None
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Start the thread."""
         self._host, self._every = host, max(2, round(EVERY_s / host.frame_s))
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Write the rows before frame k, once a second."""
         if k and k % self._every == 0:
             with self._wake:
                 self._due = k
                 self._wake.notify()
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         """Return no requests."""
         return ()
 

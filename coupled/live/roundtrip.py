@@ -31,13 +31,13 @@ class RoundTrips:
         self._taken_ms: array[float] = array("f")
         self.stamped = False  # times of arrival are stamps of the system
 
-    def send(self, sequence: int, at_ns: int) -> None:
+    def record_order(self, sequence: int, at_ns: int) -> None:
         """Store the time of an order."""
         self._sent[sequence] = at_ns
         if len(self._sent) > KEPT:
             del self._sent[next(iter(self._sent))]
 
-    def hear(self, echo: int, at_ns: int) -> None:
+    def record_answer(self, echo: int, at_ns: int) -> None:
         """Store the round trip of an order that is answered, by its sequence number; once."""
         sent_ns = self._sent.pop(echo, None)
         if sent_ns is not None and at_ns >= sent_ns:  # the system's clock may have been set

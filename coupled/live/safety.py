@@ -159,7 +159,7 @@ class Plausibility:
         """Take a frame without a new sample."""
         self._servo.miss()
 
-    def look(self, measured: Measured) -> str:
+    def update(self, measured: Measured) -> str:
         """Take a new sample; return its fault, or an empty text."""
         found = self._stuck_gauge(measured) or self._apart(measured)
         self._well_s = 0.0 if found else self._well_s + self._frame_s

@@ -77,7 +77,7 @@ class BendEstimator:
         self._started = self._alarm = False
         self.now = ServiceBend(None, None, 0.0, True, False)
 
-    def look(
+    def update(
         self, force: float, computed: float, deflection: float, *, fresh: bool = True
     ) -> ServiceBend:
         """Take a frame's F in N, δc and δ in d, and return the estimate.
@@ -156,7 +156,7 @@ class Adaptation:
         self._low, self._high = low * calibrated, min(high * calibrated, STABLE / stiffest)
         self._due_s = 0.0
 
-    def look(self, time_s: float, found: ServiceBend) -> float | None:
+    def update(self, time_s: float, found: ServiceBend) -> float | None:
         """Return the new K̂, d/N; None if it does not change."""
         if time_s < self._due_s:
             return None

@@ -13,7 +13,7 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.live.host import STOPPED, Host, Plan
 from coupled.live.measured import as_measured
 from coupled.live.pacing import Lateness
-from coupled.live.priority import first_place
+from coupled.live.priority import real_time_priority
 from coupled.live.roundtrip import RoundTrips
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -43,11 +43,14 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
     host = Host(plan)
     real = manoeuvre if plan.link is None else as_measured(manoeuvre)
     try:
-        with undisturbed(), first_place(plan.paced) as host.first_place:
+        with (
+            without_garbage_collection(),
+            real_time_priority(plan.paced) as host.real_time_priority,
+        ):
             record = fly(real, progress, companion=host)
     finally:
-        host.farewell()
-    if host.aboard is None:
+        host.shut_down()
+    if host.access is None:
         raise InputError(manoeuvre.file, "", "was not flown")
     ended = record.ended_early
     stopped = ended is not None and ended.reason in (STOPPED, INTERRUPTED)
@@ -64,7 +67,7 @@ def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None)
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def without_garbage_collection() -> Iterator[None]:
     """Disable garbage collection in the context, since a collection would delay frames."""
     was = gc.isenabled()
     gc.collect()

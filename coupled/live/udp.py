@@ -107,7 +107,7 @@ class UdpLink:
         if not counts_on and not self._restarted(header, now_s):
             raise BadPacketError("replayed or late")
         self._last, self._echo, self._came_s = header.sequence, header.echo, now_s
-        self.round_trips.hear(header.echo, came_ns)
+        self.round_trips.record_answer(header.echo, came_ns)
         if self._lockstep and header.echo != self._sequence:
             raise BadPacketError("answers older orders")
         return sample
@@ -138,7 +138,7 @@ class UdpLink:
         numbers = (self._session, self._sequence, self._last or 0, now)
         header = Header(ORDER, len(orders), mode, *numbers)
         packet = pack_orders(header, orders)
-        self.round_trips.send(self._sequence, time.time_ns())
+        self.round_trips.record_order(self._sequence, time.time_ns())
         with contextlib.suppress(OSError):
             self._socket.sendto(packet, self._address)
 

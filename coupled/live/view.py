@@ -12,7 +12,7 @@ from coupled.live.udp import resolved
 from coupled.units import FOOT_m
 
 if TYPE_CHECKING:
-    from coupled.live.host import Host, Word
+    from coupled.live.host import Host, Request
 
 RATE_Hz = 60.0  # at most; a view draws no faster
 
@@ -87,9 +87,9 @@ class Pictures:
     """Reads the pictures of a host's aircraft; properties that its model lacks are 0."""
 
     def __init__(self, host: Host) -> None:
-        assert host.aboard is not None
+        assert host.access is not None
         read: Callable[[str], Callable[[], float] | None]
-        read = getattr(host.aboard.airframe, "reader", lambda name: None)
+        read = getattr(host.access.airframe, "reader", lambda name: None)
         found = [(read(name), factor) for name, factor in PROPERTIES]
         self._reads = [(one, factor) for one, factor in found if one is not None]
         self._at = [i for i, (one, _) in enumerate(found) if one is not None]
@@ -111,18 +111,18 @@ class View:
         self._socket.setblocking(False)
         self._packet = packet
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Start."""
         self._pictures = Pictures(host)
         self._every = max(1, round(1.0 / (host.frame_s * RATE_Hz)))
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Send the picture; errors of the network are ignored."""
         if k % self._every == 0:
             with contextlib.suppress(OSError, OverflowError, struct.error):
                 self._socket.sendto(self._packet(self._pictures.now()), self._address)
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         """Return no requests."""
         return ()
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.flight import loop
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.runfile import read_run
@@ -130,7 +130,7 @@ class Onlooker:
 
     elsewhere = leads = False
 
-    def board(self, aboard: Aboard) -> None:
+    def begin(self, access: FlightAccess) -> None:
         pass
 
     def before(self, k: int, motion: tuple[float, ...]) -> str:

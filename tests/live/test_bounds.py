@@ -14,7 +14,7 @@ import pytest
 
 from coupled.flight.runfile import read_run
 from coupled.live.dashboard.page import Page
-from coupled.live.host import Host, Plan, SAVE_EVERY_s, Word
+from coupled.live.host import Host, Plan, Request, SAVE_EVERY_s
 from coupled.live.session import fly_live
 from coupled.record.record import Record
 
@@ -83,7 +83,7 @@ def test_who_asks_for_too_much_is_sent_away(page: Any) -> None:
     words = []
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline and page._wire.poll(0.5):
-        words += page.words()
+        words += page.requests()
     assert server.MOST_WORDS <= len(words) <= server.MOST_WORDS + 15
 
 
@@ -93,7 +93,7 @@ def test_of_a_hand_that_moves_fast_the_last_place_counts(page: Any) -> None:
             viewer.send(f'{{"what": "hand", "control": "column", "value": {n / 2000}}}')
         deadline = time.monotonic() + 5.0
         while page.read("column") != 1999 / 2000 and time.monotonic() < deadline:
-            page.words()
+            page.requests()
             time.sleep(0.005)
         assert page.read("column") == 1999 / 2000
 
@@ -109,15 +109,15 @@ def test_an_allowance_fills_again_with_time() -> None:
 class Saver:
     """A watcher that asks for a save at each frame."""
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Begin."""
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing."""
 
-    def words(self) -> list[Word]:
+    def requests(self) -> list[Request]:
         """Ask."""
-        return [Word("save")]
+        return [Request("save")]
 
     def close(self) -> None:
         """End."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.live.pacing import EDGES_ms, Pacer
-from coupled.live.priority import first_place
+from coupled.live.priority import real_time_priority
 
 FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
 
@@ -122,7 +122,7 @@ def test_the_histogram_counts_every_frame() -> None:
 def test_only_the_thread_that_flies_goes_first_and_only_while_it_flies() -> None:
     before = os.sched_getscheduler(0)
     seen: list[int] = []
-    with first_place() as granted:
+    with real_time_priority() as granted:
         mine = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
         assert mine == (os.SCHED_FIFO if granted else before)
         other = threading.Thread(target=lambda: seen.append(os.sched_getscheduler(0)))
@@ -137,7 +137,7 @@ def test_a_flight_goes_on_where_the_system_refuses(monkeypatch: pytest.MonkeyPat
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse, raising=False)
-    with first_place() as granted:
+    with real_time_priority() as granted:
         assert not granted
-    with first_place(wanted=False) as granted:
+    with real_time_priority(wanted=False) as granted:
         assert not granted

@@ -61,7 +61,7 @@ class Board:
         places = np.arange(first, count) % ROWS
         return count, self._ring[places, :width]
 
-    def say(self, state: dict[str, Any]) -> None:
+    def write_state(self, state: dict[str, Any]) -> None:
         """Write the state; a state that is too long is skipped."""
         text = json.dumps(state).encode()
         if len(text) > STATE_bytes:

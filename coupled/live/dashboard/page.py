@@ -14,7 +14,7 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.live.dashboard.board import FLIGHT, Board, columns, shared_memory
-from coupled.live.host import Host, Word
+from coupled.live.host import Host, Request
 from coupled.live.roundtrip import RECENT
 from coupled.record.channels import (
     ALTITUDE,
@@ -69,19 +69,19 @@ class Page:
             raise InputError("--dashboard", place, answer.get("problem", "does not start"))
         return answer["url"]
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Start: write the constants of the flight."""
-        assert host.aboard is not None
-        aboard, rig = host.aboard, host.aboard.manoeuvre.rig
-        at = aboard.channels.index
+        assert host.access is not None
+        access, rig = host.access, host.access.manoeuvre.rig
+        at = access.channels.index
         first = at(control_channels(host.names[-1])[-1]) + 1
-        self._lateral = len(aboard.channels) - first > HEADING
+        self._lateral = len(access.channels) - first > HEADING
         self._flown = rig.flight is not None
         self._motion = first
         self._places = [at(channel(name, quantity)) for name in host.names for quantity in SHOWN]
         self._row = np.zeros(self._width)
         setup = {
-            "run": aboard.manoeuvre.name,
+            "run": access.manoeuvre.name,
             "frame_s": host.frame_s,
             "loader": "sim" if host.plan.link is None else host.plan.link.name,
             "hand": host.plan.wishes.name if host.plan.wishes is not None else "",
@@ -100,10 +100,10 @@ class Page:
         self._state |= {"phase": "flying", "setup": setup}
         self._show(host)
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Write frame k to the shared memory."""
-        assert host.aboard is not None
-        data, row, m = host.aboard.data[k], self._row, self._motion
+        assert host.access is not None
+        data, row, m = host.access.data[k], self._row, self._motion
         row[0], row[1], row[2] = k, 1e3 * host.pacer.late_s, data[m + PRESSURE]
         if self._flown:
             row[4], row[6], row[7] = data[m + PITCH], data[m + ALTITUDE], data[m + SPEED]
@@ -131,21 +131,21 @@ class Page:
             "calibrated": {name: one.calibrated for name, one in host.service.items()},
             "adapt": host.plan.adapt,
             "services": host.services(),
-            "happened": {key: value[-8:] for key, value in vars(host.happened).items()},
+            "happened": {key: value[-8:] for key, value in vars(host.events).items()},
         }
-        self.board_memory.say(self._state)
+        self.board_memory.write_state(self._state)
 
     def warn(self, text: str) -> None:
         """Show a warning."""
         self._state["warnings"] = [*self._state["warnings"][-4:], text]
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         """Return the requests since the last call; if the page has closed, hands return to 0.
 
         Of positions of a hand the last one counts. At most one other request is returned, since
         changing a switch takes a part of the frame.
         """
-        found: list[Word] = []
+        found: list[Request] = []
         try:
             for _ in range(MOST_WORDS):
                 if self.gone or found or not self._wire.poll():
@@ -155,7 +155,7 @@ class Page:
                     if word["control"] in self._wanted:
                         self._wanted[word["control"]] = word["value"]
                 else:
-                    found.append(Word(**word))
+                    found.append(Request(**word))
         except (EOFError, OSError):
             self.gone = True
             self._wanted = dict.fromkeys(self._wanted, 0.0)
@@ -172,12 +172,12 @@ class Page:
     def finish(self, **state: Any) -> None:
         """Show the results of the flight: `phase`, `record`, `diagnosis`."""
         self._state |= state
-        self.board_memory.say(self._state)
+        self.board_memory.write_state(self._state)
 
     def wait(self, until: Callable[[], bool] = lambda: False) -> None:
         """Wait until the user leaves the page or `until` is true."""
         while not self.gone and self._process.is_alive() and not until():
-            if self._wire.poll(0.2) and any(word.what == "leave" for word in self.words()):
+            if self._wire.poll(0.2) and any(word.what == "leave" for word in self.requests()):
                 return
 
     def end(self) -> None:

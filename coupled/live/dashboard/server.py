@@ -66,7 +66,7 @@ WORDS = ("stop", "mark", "set", "lead", "save", "hand", "leave")
 
 
 @dataclass(frozen=True)
-class Door:
+class PageAddress:
     """The address of the page, and the token that it requires."""
 
     address: str
@@ -80,7 +80,7 @@ class Door:
         return f"http://{shown}:{self.port}/?token={self.token}"
 
 
-def word_of(text: str) -> dict[str, Any] | None:
+def request_of(text: str) -> dict[str, Any] | None:
     """Return a browser's request, or None if it is invalid."""
     try:
         found = json.loads(text)
@@ -138,8 +138,8 @@ class Allowance:
 class Server:
     """The application: one flight's page."""
 
-    def __init__(self, door: Door, board: Board, host: Connection, width: int) -> None:
-        self._door, self._board, self._host, self._width = door, board, host, width
+    def __init__(self, served_at: PageAddress, board: Board, host: Connection, width: int) -> None:
+        self._served_at, self._board, self._host, self._width = served_at, board, host, width
         self._viewers = 0
         self._allowance = Allowance()
 
@@ -152,14 +152,14 @@ class Server:
         return Starlette(routes=list(reversed(routes)))
 
     def _known(self, token: str) -> bool:
-        return secrets.compare_digest(token.encode(), self._door.token.encode())
+        return secrets.compare_digest(token.encode(), self._served_at.token.encode())
 
     def _own_host(self, host: str) -> bool:
         """Tell whether the Host header names this server (protection from DNS rebinding)."""
         name = host.rpartition(":")[0].strip("[]")
-        if self._door.address in ("0.0.0.0", "::"):
+        if self._served_at.address in ("0.0.0.0", "::"):
             return bool(name)
-        return name in {self._door.address, "localhost", "127.0.0.1", "::1"}
+        return name in {self._served_at.address, "localhost", "127.0.0.1", "::1"}
 
     async def file(self, request: Request) -> Response:
         """Serve one of the page's files."""
@@ -174,7 +174,7 @@ class Server:
         file, kind = FILES[name]
         body = (STATIC / file).read_text(encoding="utf-8")
         if name == "":
-            body = body.replace("TOKEN", self._door.token)
+            body = body.replace("TOKEN", self._served_at.token)
         return Response(body, media_type=kind, headers=HEADERS)
 
     async def socket(self, socket: WebSocket) -> None:
@@ -194,7 +194,7 @@ class Server:
         held: set[str] = set()
         try:
             while True:
-                word = word_of(await socket.receive_text())
+                word = request_of(await socket.receive_text())
                 if word is None:
                     continue
                 if word["what"] == "hand":
@@ -253,8 +253,8 @@ def serve(address: str, port: int, token: str, memory: Any, host: Connection, wi
     except OSError as error:
         host.send_bytes(json.dumps({"problem": error.strerror or str(error)}).encode())
         return
-    door = Door(address, int(wire.getsockname()[1]), token)
-    app = Server(door, Board(memory), host, width).app()
+    served_at = PageAddress(address, int(wire.getsockname()[1]), token)
+    app = Server(served_at, Board(memory), host, width).app()
     config = uvicorn.Config(
         app,
         http=Bounded,
@@ -272,5 +272,5 @@ def serve(address: str, port: int, token: str, memory: Any, host: Connection, wi
         server.should_exit = True
 
     threading.Thread(target=watch, daemon=True).start()
-    host.send_bytes(json.dumps({"url": door.url}).encode())
+    host.send_bytes(json.dumps({"url": served_at.url}).encode())
     asyncio.run(server.serve(sockets=[wire]))
