@@ -1,1 +1,1 @@
-"""What control authority is lost: configurations compared, maps, and where a rig is stable."""
+"""Control authority: configurations compared, loss maps, and stability."""

@@ -1,14 +1,14 @@
-"""Authority: what the bend takes away in flight terms, and what each correction gives back.
+"""Authority: the loss by the bend in flight, and the effect of each correction.
 
-One manoeuvre is flown in several configurations; an `Outcome` holds the figures of one
-flight. Loss and feel are read while the control stands still, held at half or more of its
-greatest deflection, beside the closed form of the rig's statics there (which leaves friction
-out). Deflection and force are the hand's own, whatever its sensors read; breakout and bob weight
-are taken off before forces are compared.
+One manoeuvre is flown in several configurations; an `Outcome` has the figures of one flight. Loss
+and felt ratio are taken while the control is held still, at half or more of its largest deflection,
+beside the closed form of the rig's statics there (without friction). Deflection and force are the
+hand's own, not the readings of sensors; breakout and bob weight are subtracted before forces are
+compared.
 
-Authority is what the surface does: a command beyond the surface's stop gives nothing, and to fall
-short of it there loses nothing. A hand that stays within breakout and friction moves no loader, and
-has neither a loss nor a felt ratio.
+Authority is measured at the surface: a command beyond the surface's stop has no effect, and a
+shortfall beyond it is no loss. A hand force below breakout and friction moves no loader, and has
+neither a loss nor a felt ratio.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Progress = Callable[[str, int, int], None]
 
 __all__ = ["AS_THE_RIG", "Comparison", "Flight", "Outcome", "compare", "fly_and_judge", "judge"]
 
-AS_THE_RIG = "as the rig file says"  # a flight in none of the configurations
+AS_THE_RIG = "as the rig file says"  # configuration name of an unchanged rig
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,16 +72,16 @@ class Comparison(Sequence[Flight]):
         return "\n".join(["Comparison:", *lines])
 
     def remarks(self, system: System = "si") -> list[str]:
-        """Return what the figures alone do not show, a sentence each, in units of a system.
+        """Return explanations of the figures, a sentence each, in units of a system.
 
-        Surfaces at their stops, hands that stay within breakout and friction, a K̂ of 0, and why a
-        force that moves the surface as on the rigid rig loses authority.
+        They cover surfaces at their stops, hand forces below breakout and friction, a K̂ of 0, and
+        the loss of authority under a force that moves the surface as far as on the rigid rig.
         """
         return remarks(self.flights, system) if self.flights else []
 
     @public
     def flight(self, configuration: str, case: str | None = None) -> Flight:
-        """Return the flight in a configuration; `case` is needed where there are several.
+        """Return the flight in a configuration; `case` is necessary if there are several.
 
         Raises InputError for a configuration or case that was not flown.
         """
@@ -98,7 +98,7 @@ class Comparison(Sequence[Flight]):
 
     @public
     def loss(self, configuration: str, case: str | None = None) -> float:
-        """Return the share of the surface command that is lost, without unit; NaN if unmoved."""
+        """Return the lost share of the surface command, without unit; NaN if not moved."""
         return self.flight(configuration, case).outcome.loss
 
     @public
@@ -107,22 +107,22 @@ class Comparison(Sequence[Flight]):
         return self.flight(configuration, case).outcome.felt_ratio
 
     def as_dict(self) -> list[dict[str, Any]]:
-        """Return the figures of each flight, as JSON takes them."""
+        """Return the figures of each flight for JSON."""
         return [flight.outcome.as_dict() for flight in self.flights]
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the figures, a row a flight; units are in the columns' names, null for none."""
+        """Return the figures, a row for each flight, with units in the names, null for none."""
         return frame_of(self.as_dict())
 
     def to_pandas(self) -> Any:
-        """Return the figures as a pandas DataFrame; raises InputError where pandas lacks."""
+        """Return the figures as a pandas DataFrame; raises InputError without pandas."""
         return pandas_frame(self.to_polars())
 
 
 def compare(manoeuvres: Sequence[Manoeuvre], progress: Progress | None = None) -> Comparison:
-    """Fly every case in every configuration that it asks for.
+    """Fly every case in every configuration that it requests.
 
-    `progress` is called with what is flown, frames done and frames in all.
+    `progress` is called with a text, frames done and frames in all.
     """
     flights: list[Flight] = []
     jobs = [(m, configuration) for m in manoeuvres for configuration in m.configurations]
@@ -147,7 +147,7 @@ def fly_and_judge(
     configuration: str = AS_THE_RIG,
     progress: Callable[[int, int], None] | None = None,
 ) -> Flight:
-    """Fly a manoeuvre as it is, and return the flight; `configuration` is what to call it.
+    """Fly a manoeuvre unchanged, and return the flight with `configuration` as its name.
 
     `progress` is called with frames done and frames in all.
     """
@@ -179,7 +179,7 @@ def judge(
         known = closed_forms and not manoeuvre.served
         loss, ratio = by_the_statics(rig, control, record, held, stop) if known else (nan, nan)
         asked, reached = commands.asked, commands.reached
-        # Where a service holds the control in place of the hand, no gradient is felt.
+        # Where a service holds the control instead of the hand, no gradient is felt.
         holds = felt * specified > 0.0 if manoeuvre.served else specified != 0.0
         ratios = (felt / specified, ratio) if holds else (nan, nan)
         shares = (asked, reached, 1.0 - reached / asked, loss, *ratios)

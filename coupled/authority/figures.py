@@ -1,4 +1,4 @@
-"""The figures of an outcome for people: what each is called, its unit, and how it is written."""
+"""The figures of an outcome as text: their labels, units and formats, and remarks on them."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ if TYPE_CHECKING:
     from coupled.authority.outcome import Flight, Outcome
     from coupled.flight.manoeuvre import Configuration, Manoeuvre
 
-NONE = "–"  # in place of a figure that a flight does not have
-_NOTICED = 0.005  # of the hand's travel: what it moves further is said
-_ALIKE = 0.05  # of the rigid rig's surface: what goes about as far
+NONE = "–"  # in place of a missing figure
+_NOTICED = 0.005  # of the hand's travel: the least further motion that is reported
+_ALIKE = 0.05  # of the rigid rig's surface travel, within which two travels are alike
 _MOST_DIGITS = 4  # of a travel in mm, ° or in
-_LISTED = 3  # cases that a sentence names
-_FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that hold a force
+_LISTED = 3  # cases named in a sentence
+_FORCES = ("step", "ramp", "doublet", "3211", "sweep", "table")  # pilots that apply a force
 _WORDS = {"column": ("pitch", "pitch"), "wheel": ("roll", "bank"), "pedals": ("yaw", "heading")}
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of an outcome: its field, its label with the unit, and how its value is written."""
+    """A figure of an outcome: its field, its label with the unit, and its format."""
 
     field: str
     label: str
     form: Callable[[float], str]
 
     def written(self, outcome: Outcome, factor: float = 1.0) -> str:
-        """Return the figure of an outcome; a dash where there is none, no sign before a zero.
+        """Return the figure of an outcome as text; a dash if it has none, no sign before a zero.
 
-        `factor` takes it to the unit that it is written in.
+        `factor` converts it to the unit of the text.
         """
         value = getattr(outcome, self.field)
         if value is None or not math.isfinite(value):
@@ -64,7 +64,7 @@ FIGURES: tuple[Figure, ...] = (
 
 
 def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str, list[str]]]:
-    """Yield each figure that any of the flights has: its label, and how it is written of each."""
+    """Yield each figure that any of the flights has: its label, and its text for each flight."""
     manoeuvre = flights[0].manoeuvre
     rate, angle = _WORDS[manoeuvre.control]
     change = manoeuvre.measure.attitude_change / DEGREE_rad
@@ -84,7 +84,7 @@ def rows(flights: Sequence[Flight], system: System = "si") -> Iterator[tuple[str
 
 
 def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
-    """Return the travel of the control that is looked at, and the unit it is written in."""
+    """Return the travel of the compared control, and its unit."""
     travel = manoeuvre.rig.controls[manoeuvre.control].travel
     if unit_of(manoeuvre.control) == "rad":
         return travel / DEGREE_rad, "°"
@@ -92,7 +92,7 @@ def _travel(manoeuvre: Manoeuvre, system: System) -> tuple[float, str]:
 
 
 def corrects_nothing(flight: Flight) -> bool:
-    """Tell whether a flight's configuration corrects a bend by a K̂ of 0, and so not at all."""
+    """Tell whether a flight's configuration corrects a bend with K̂ = 0, which has no effect."""
     return _corrects_nothing(flight.manoeuvre)
 
 
@@ -107,15 +107,15 @@ def _bends(manoeuvre: Manoeuvre) -> bool:
 
 
 def named(flight: Flight) -> str:
-    """Return a flight's configuration as tables and figures head it."""
+    """Return a flight's configuration as a heading of tables and figures."""
     return f"{flight.configuration} (K̂ = 0)" if corrects_nothing(flight) else flight.configuration
 
 
 def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
-    """Return what a comparison's figures alone do not show, a sentence each; flights of all cases.
+    """Return explanations of a comparison's figures, a sentence each; flights of all cases.
 
-    A K̂ of 0, hands that move no loader, surfaces at their stops, and why a force that moves the
-    surface as on the rigid rig loses authority.
+    They cover a K̂ of 0, hand forces that move no loader, surfaces at their stops, and the loss of
+    authority under a force that moves the surface as far as on the rigid rig.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     held = next(filter(None, (further(case, system) for case in cases)), "")
@@ -126,7 +126,7 @@ def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
 def _where(
     cases: Sequence[Sequence[Flight]], case: Sequence[Flight], some: Sequence[Flight]
 ) -> str:
-    """Return in which case and configurations something is so, where not in all of them."""
+    """Return the case and configurations of some flights, unless they are all."""
     names = [case[0].outcome.case] if len(cases) > 1 else []
     if len(some) < len(case):
         names += [flight.configuration for flight in some]
@@ -134,7 +134,7 @@ def _where(
 
 
 def _some(places: Sequence[str]) -> str:
-    """Return places in a row, those of a long run cut short."""
+    """Return places as a list in prose, shortened if there are many."""
     more = len(places) - _LISTED
     return "; ".join(places[:_LISTED]) + (f"; and {more} more" if more > 0 else "")
 
@@ -150,7 +150,7 @@ def _without_correction(flights: Sequence[Flight]) -> str:
 def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
     control, d = manoeuvre.control, unit_of(manoeuvre.control)
     loader = manoeuvre.rig.controls[control].loader
-    bend = loader.bend or loader.bend_push or 0.0  # of a pull, or of a push where only that bends
+    bend = loader.bend or loader.bend_push or 0.0  # under a pull, or a push if only that bends
     return (
         f"In {listed(names)} nothing is corrected, since the host's K̂ is 0 while the structure's K"
         f" is {bend:.4g} {d}/N. Give controls.{control}.compensation.bend_{d}_per_N, which"
@@ -159,7 +159,7 @@ def _says_no_correction(manoeuvre: Manoeuvre, names: Sequence[str]) -> str:
 
 
 def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]:
-    """Yield that hands stay within breakout and friction, where any do."""
+    """Yield a sentence on hand forces below breakout and friction, if any."""
     unit = shown("force_N", system)
     found: dict[tuple[str, str], list[str]] = {}
     for case in cases:
@@ -186,14 +186,14 @@ def _resting(cases: Sequence[Sequence[Flight]], system: System) -> Iterator[str]
 
 
 def _raises_breakout(flight: Flight) -> bool:
-    """Tell whether a host adds K̂·G·F_BO to the breakout that it assumes, eq. (11)."""
+    """Tell whether a host adds K̂·G·F_BO to its assumed breakout, eq. (11)."""
     control = flight.manoeuvre.rig.controls[flight.manoeuvre.control]
     host = control.compensation
     return host.gradient and host.bend > 0.0 and control.assumed_breakout > 0.0
 
 
 def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
-    """Yield where the surface met its stop, where the hand asks for more than it gives."""
+    """Yield a sentence on surfaces at their stops, if the hand commands more."""
     manoeuvre, places = cases[0][0].manoeuvre, []
     surface = SURFACES[manoeuvre.control]
     for case in cases:
@@ -212,9 +212,9 @@ def _saturated(cases: Sequence[Sequence[Flight]]) -> Iterator[str]:
 
 
 def further(case: Sequence[Flight], system: System = "si") -> str:
-    """Return why authority is lost where a force moves the surface as on the rigid rig.
+    """Return why authority is lost under a force that moves the surface as on the rigid rig.
 
-    Nothing where the hand does not hold a force, or moves no further for it.
+    Empty if the hand does not hold a force, or moves no further for it.
     """
     manoeuvre = case[0].manoeuvre
     rigid = next((f.outcome for f in case if f.configuration == "rigid"), None)
@@ -251,7 +251,7 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
 
 
 def _digits_between(values: Sequence[float], other: float, least: int) -> int:
-    """Return the decimals, `least` or more, with which no value is written as the other one."""
+    """Return the decimals, at least `least`, with which no value has the other one's text."""
     digits = least
     while digits < _MOST_DIGITS and any(f"{x:.{digits}f}" == f"{other:.{digits}f}" for x in values):
         digits += 1
@@ -259,10 +259,10 @@ def _digits_between(values: Sequence[float], other: float, least: int) -> int:
 
 
 def sweep_remarks(manoeuvre: Manoeuvre, configurations: Sequence[Configuration]) -> list[str]:
-    """Return what losses in a table of flights alone do not show, a sentence each.
+    """Return explanations of the losses in a table of flights, a sentence each.
 
-    `manoeuvre` is one of the flights, its rig as filed, flown in `configurations`, or as filed
-    where there are none.
+    `manoeuvre` is one of the flights, its rig as filed, flown in `configurations`, or as filed if
+    there are none.
     """
     said = []
     flown = {str(each): manoeuvre.configured(each) for each in configurations}
@@ -286,11 +286,11 @@ def _feels_too_soft(manoeuvre: Manoeuvre) -> bool:
 
 
 def holds_force(manoeuvre: Manoeuvre) -> bool:
-    """Tell whether the pilot of the control that is looked at holds a force, not a deflection."""
+    """Tell whether the pilot of the compared control holds a force, not a deflection."""
     pilot = manoeuvre.pilots.get(manoeuvre.control)
     return pilot is not None and pilot.kind in _FORCES
 
 
 def goes_as_far(bent: Outcome, rigid: Outcome) -> bool:
-    """Tell whether a surface goes about as far as on the rigid rig."""
+    """Tell whether a surface moves about as far as on the rigid rig."""
     return abs(bent.reached_norm - rigid.reached_norm) <= _ALIKE * abs(rigid.reached_norm)

@@ -1,7 +1,7 @@
-"""What is read while a control is held: the surface reached, the force felt, beside the statics.
+"""Figures while a control is held: surface reached and force felt, beside the statics.
 
-Held is far out on the peak's side, and still. Deflection and force are the hand's own: a zero of
-the transducer at the grip and its arc are taken off, and the strain gauge is left out.
+A control is held if it is far out on the peak's side, and still. Deflection and force are the
+hand's own: zero and arc of the grip's transducer are removed, and the strain gauge is not used.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from coupled.rig.rig import Rig
 from coupled.rig.statics import static_point
 
 Floats = NDArray[np.float64]
-_AT_STOP_rad = 1e-6  # from its stop, within which a surface stands there
-_SIGMAS = 6.0  # of the noise, which a record's rows stay within: once in 5e8 rows it does not
+_AT_STOP_rad = 1e-6  # from its stop, within which a surface is at it
+_SIGMAS = 6.0  # of the noise; exceeded once in 5e8 rows
 _STILL = 1e-9  # of the travel: rounding of a loader at rest
 
 
@@ -31,8 +31,8 @@ _STILL = 1e-9  # of the travel: rounding of a loader at rest
 class Commands:
     """Mean surface commands about trim while a control is held, in ±1.
 
-    What the deflection asks for and what is reached, both no further than the surface goes;
-    `stop` is the command at which it meets its stop, where more is asked for, else None.
+    The command for the deflection and the command reached, both limited to the surface's travel;
+    `stop` is the command at the surface's stop if more is commanded, else None.
     """
 
     asked: float
@@ -41,7 +41,7 @@ class Commands:
 
 
 def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
-    """Return the deflection δ at the grip in d, which the record's transducer reads: eq. (15)."""
+    """Return the deflection δ at the grip in d, from the transducer's reading: eq. (15)."""
     data = rig.controls[control]
     read = record[channel(control, "deflection")] - data.sensing.deflection_zero
     if data.loader.arc_geometry:
@@ -50,9 +50,9 @@ def true_deflection(rig: Rig, control: ControlName, record: Record) -> Floats:
 
 
 def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
-    """Tell whether a loader never leaves neutral: the hand stays within breakout and friction.
+    """Tell whether a loader never leaves neutral, since the hand force is below the breakout.
 
-    By its δc. A friction whose contact yields lets it move a little before it slips: there the
+    Decided by δc. With presliding friction the loader moves slightly before it slips; then the
     forces decide. Not for a loader with services, which a jam may hold.
     """
     loader, name = rig.controls[control].loader, channel(control, "computed")
@@ -69,7 +69,7 @@ def loader_rests(rig: Rig, control: ControlName, record: Record) -> bool:
 
 
 def dry_friction(loader: Loader) -> float:
-    """Return the force at which a loader's dry friction gives way on either side, N."""
+    """Return the breakaway force of a loader's dry friction, N."""
     return max(loader.friction, loader.breakaway, loader.friction_pull, loader.friction_push)
 
 
@@ -80,9 +80,9 @@ def by_the_statics(
     held: NDArray[np.bool_],
     stop: float | None = None,
 ) -> tuple[float, float]:
-    """Return the share of the command that is lost, and force felt over specified, at rest.
+    """Return the lost share of the command, and force felt over specified, at rest.
 
-    `stop` is the command at which the surface meets its stop, if it does.
+    `stop` is the command at the surface's stop, if it is reached.
     """
 
     def mean(values: Floats) -> float:
@@ -110,9 +110,9 @@ def by_the_statics(
 
 
 def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> tuple[float, float]:
-    """Return the mean force felt and specified where a control is held, N; NaN if it never moves.
+    """Return the mean force felt and specified while a control is held, N; NaN if it never moves.
 
-    Breakout and bob weight are taken off both.
+    Breakout and bob weight are subtracted from both.
     """
     deflection = true_deflection(manoeuvre.rig, control, record)
     if len(record) < 2 or not np.any(deflection):
@@ -124,8 +124,8 @@ def held_forces(manoeuvre: Manoeuvre, control: ControlName, record: Record) -> t
 def where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
     """Return the rows at which the control is held: far out on the peak's side, and still.
 
-    Still is a speed under 5 % of the peak a second, over ±0.1 s, so that a noisy transducer
-    counts as still too. Where it never is, the rows within 2 % of the peak.
+    Still is a speed under 5 % of the peak a second, over ±0.1 s, which tolerates transducer noise.
+    If it is never still, the rows within 2 % of the peak.
     """
     peak = deflection[np.argmax(np.abs(deflection))]
     share = deflection / peak
@@ -139,13 +139,13 @@ def where_held(time_s: Floats, deflection: Floats) -> NDArray[np.bool_]:
 
 
 def _gain(rig: Rig, control: ControlName) -> float:
-    """Return the surface command, in ±1, that a deflection of 1 d asks for."""
+    """Return the surface command, in ±1, for a deflection of 1 d."""
     data = rig.controls[control]
     return COMMAND_SIGN[data.surface] / data.travel
 
 
 def _as_far_as(commands: Floats, stop: float | None) -> Floats:
-    """Return commands in ±1, no further than a surface goes that meets its stop at one of them."""
+    """Return commands in ±1, limited to the stop of the surface on its side."""
     low = stop if stop is not None and stop <= 0.0 else -1.0
     high = stop if stop is not None and stop > 0.0 else 1.0
     return np.asarray(np.clip(commands, low, high))
@@ -154,7 +154,7 @@ def _as_far_as(commands: Floats, stop: float | None) -> Floats:
 def asked_and_reached(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> Commands:
-    """Return the mean surface commands asked for by the deflection, and reached, of ±1."""
+    """Return the mean surface commands for the deflection, and reached, in ±1."""
     asked = _gain(rig, control) * true_deflection(rig, control, record)[held]
     reached = record[channel(control, "surface_norm")]
     stop = _surface_stop(rig, control, record, held, float(np.mean(asked)))
@@ -167,11 +167,11 @@ def asked_and_reached(
 def _surface_stop(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_], asked: float
 ) -> float | None:
-    """Return the command at which the surface met its stop on the side asked for; None if unknown.
+    """Return the command at the surface's stop on the commanded side; None if unknown.
 
-    The manifest has it as the aircraft stood at the flight's end. If the trim was moved after the
-    control was held, the surface's own position decides: at its stop it went no further than the
-    command of then, and elsewhere nothing is known of the stop.
+    The manifest has the stop at the end of the flight. If the trim has moved since the control was
+    held, the surface's own position decides: at its stop the command of that time is the limit;
+    elsewhere the stop is unknown.
     """
     data = rig.controls[control]
     surface = SURFACES[control]
@@ -199,9 +199,9 @@ def _surface_stop(
 def felt_and_specified(
     rig: Rig, control: ControlName, record: Record, held: NDArray[np.bool_]
 ) -> tuple[float, float]:
-    """Return the mean force felt and specified, breakout and bob weight taken off, N.
+    """Return the mean force felt and specified, without breakout and bob weight, N.
 
-    The specified force acts about the neutral, where a force trim has moved it.
+    The specified force acts about the neutral, which a force trim may have moved.
     """
     deflection = true_deflection(rig, control, record)[held]
     neutral = f"{control}_trim_{unit_of(control)}"

@@ -1,8 +1,8 @@
-"""Authority maps: what is lost against q̄ and deflection, and stick force per g and per knot.
+"""Authority maps: loss over q̄ and deflection, and stick force per g and per knot.
 
-The loss is the closed form of the rig's statics. Force per g and per knot join them to the
-aircraft: how much elevator a g and a knot take is found by flying it at speeds over the
-schedule, each trimmed in level flight at the rig's altitude.
+The loss is the closed form of the rig's statics. Force per g and per knot combine it with the
+aircraft: the elevator per g and per knot is found by flying it at speeds over the schedule, each
+trimmed in level flight at the rig's altitude.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ _SEA_LEVEL_kg_per_m3 = 1.225
 _LEAST_PRESSURE_Pa = 200.0
 _PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
 _STEPS, _BEYOND_STOP = 401, 17  # along δc, and along δ beyond the loader's stop
-_STEP, _PULL_s = 0.01, 3.0  # of the elevator command, and for how long: linear
-_TRIMS_kt = 8.0  # between the two trims whose force is compared
+_STEP, _PULL_s = 0.01, 3.0  # size of the elevator command, in the linear range, and its duration
+_TRIMS_kt = 8.0  # between the two trims whose forces are compared
 
 
 @dataclass(frozen=True)
 class LossMap:
-    """Share of the asked deflection that is lost, for one control and configuration.
+    """The lost share of the commanded deflection, for one control and configuration.
 
     `loss` has shape (pressures, deflections); `deflection` in d, all above zero.
     """
@@ -62,8 +62,9 @@ class LossMap:
 class Feel:
     """Stick forces at the speeds of level trim, shape (speeds,), for each of `FELT`.
 
-    Per g: that of 1 g, by the greatest load factor within 3 s of a small step. Per knot: of level
-    trims 4 kt to either side, pull positive per knot slower. Both are past the breakout.
+    Per g: for the largest load factor within 3 s of a small step, scaled to 1 g. Per knot: from
+    level trims 4 kt to either side, a pull per knot slower being positive. Both exclude the
+    breakout.
     """
 
     calibrated_airspeed_m_per_s: Floats
@@ -88,17 +89,17 @@ def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
 def _pulled(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[Floats, Floats, Floats]:
     """Return δ and δ̂ in d and F in N of a pull up to the travel, finely enough to draw.
 
-    Where the loader stops before the grip has gone so far, the structure bends on from there.
+    If the loader reaches its stop before the grip's travel, the structure bends on from there.
     """
     data = rig.controls[control]
     stop = stop_of(data.travel, data.loader.stop_aft)
     line = static_line(rig, control, pressure_Pa, stop * np.linspace(1e-6, 1.0, _STEPS))
     parts = [line]
     if line.deflection[-1] < data.travel:
-        full = data.travel * (1.0 + 1e-9)  # not short of it by rounding
+        full = data.travel * (1.0 + 1e-9)  # margin for rounding
         beyond = np.linspace(line.deflection[-1], full, _BEYOND_STOP)[1:]
         points = [static_point(rig, control, pressure_Pa, float(each)) for each in beyond]
-        # A rigid structure does not let the grip go on.
+        # The grip of a rigid structure stops there.
         parts += [each for each in points if each.deflection[0] > line.deflection[-1]]
     deflection, estimate, force = (
         np.concatenate([getattr(part, name) for part in parts])
@@ -109,7 +110,7 @@ def _pulled(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[Floats,
 
 def _loss(rig: Rig, control: ControlName, pressure_Pa: float, deflections: Floats) -> Floats:
     deflection, estimate, _ = _pulled(rig, control, pressure_Pa)
-    # Below the first point the loader rests in its breakout, and beyond the last the grip is held.
+    # Below the first point the loader rests in its breakout; beyond the last the grip is stopped.
     reached = np.interp(deflections, deflection, estimate, left=np.nan, right=np.nan)
     return np.asarray(1.0 - reached / deflections)
 
@@ -125,7 +126,7 @@ def envelope(records: Sequence[Record], control: ControlName) -> Floats:
 
 
 def shipped_flights(rig: Rig, progress: Progress) -> list[Record]:
-    """Return records of all cases of the shipped runs that fly this rig."""
+    """Return records of all cases of the shipped runs with this rig."""
     named = [n for n, path in shipped_runs().items() if load_toml(path)["rig"] == rig.name]
     scenarios = [case for name in named for case in read_run(name)]
     records = []
@@ -136,7 +137,7 @@ def shipped_flights(rig: Rig, progress: Progress) -> list[Record]:
 
 
 def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
-    """Return the stick forces; None on a bench, without a column, or where nothing trims."""
+    """Return the stick forces; None for a bench, without a column, or without any trim."""
     if rig.flight is None or "column" not in rig.controls:
         return None
     table = rig.controls["column"].schedule
@@ -149,7 +150,7 @@ def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
         try:
             found.append((speed, *_elevator_per(rig, file, speed)))
         except InputError:
-            continue  # beyond what the aircraft flies level
+            continue  # no level flight at this speed
     if not found:
         return None
     speed, pressure, per_g, per_knot = np.array(found).T
@@ -166,11 +167,11 @@ def feel(rig: Rig, file: Path, progress: Progress) -> Feel | None:
 
 
 def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
-    """Return the forces past breakout and offset, N, that so much elevator takes, by the statics.
+    """Return the forces beyond breakout and offset, N, for elevator commands, by the statics.
 
-    `commands` are shares of the travel, pull positive; the force of a command beyond the
-    travel is that of the whole travel, in proportion. NaN where the bend alone moves the
-    surface so far, the loader still resting in its breakout.
+    `commands` are shares of the travel, pull positive; the force of a command beyond the travel is
+    extrapolated from that of full travel. NaN if the bend alone moves the surface that far, while
+    the loader rests in its breakout.
     """
     control = rig.controls["column"]
     out = []
@@ -184,10 +185,10 @@ def _forces(rig: Rig, pressure: Floats, commands: Floats) -> Floats:
 
 
 def _bob_weight(rig: Rig, pressure: Floats) -> Floats:
-    """Return what the bob weight adds to the force of 1 g, N.
+    """Return the bob weight's part of the force of 1 g, N.
 
-    It bends the structure too; where the host corrects the deflection by K̂·F, that lifts
-    the elevator by K̂·b and spares G_T·K̂·b.
+    It bends the structure too; if the host corrects the deflection by K̂·F, that moves the elevator
+    by K̂·b and reduces the force by G_T·K̂·b.
     """
     control = rig.controls["column"]
     host = control.compensation
@@ -197,9 +198,9 @@ def _bob_weight(rig: Rig, pressure: Floats) -> Floats:
 
 
 def _elevator_per(rig: Rig, file: Path, speed: float) -> tuple[float, float, float]:
-    """Return q̄ in Pa of a level trim, and the elevator command that a g and a knot take.
+    """Return q̄ in Pa of a level trim, and the elevator command per g and per knot.
 
-    Both as shares of the travel in the column's sense, pull positive.
+    Both are shares of the travel in the column's sense, pull positive.
     """
     sign = COMMAND_SIGN["elevator"]
     middle = _trimmed(rig, file, speed)

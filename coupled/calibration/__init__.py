@@ -1,1 +1,1 @@
-"""The bench procedure: readings, their fit with errors, a virtual bench, the documentation."""
+"""Calibration: readings, their fit with errors, a simulated bench, and force documentation."""

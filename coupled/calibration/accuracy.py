@@ -1,13 +1,13 @@
-"""What a calibration is worth to those who fly: how far off deflection and feel may be.
+"""The accuracy of a compensated rig: errors of deflection and felt gradient after a calibration.
 
 Compensated with Ŝ₁, Ŝ₂, Ŝ₃ and K̂, at rest without breakout and at a gradient G:
 
     δ̂/δ = (S₁/Ŝ₁)·(1 − K·G) + K̂·G·S₃/Ŝ₃                      (the surface follows δ̂)
     felt/specified = (G_L/(1 + K·G_L))/G,
-    G_L = G_B + (G/(1 − K̂·G) − G_B)·(S₁/Ŝ₁)·(Ŝ₂/S₂)       (figure 5: v₂ is made of ΔG and v₁)
+    G_L = G_B + (G/(1 − K̂·G) − G_B)·(S₁/Ŝ₁)·(Ŝ₂/S₂)       (figure 5: v₂ is computed from ΔG and v₁)
 
-Errors of S₁ and K come together from a fit, and mostly cancel in δ̂: it knows best what was read.
-An S₂ that was made from S₁ by the gain S₁/S₂ errs with it, and both drop out of what is felt.
+The errors of S₁ and K from one fit are correlated and mostly cancel in δ̂. If S₂ is computed from
+S₁ by the gain S₁/S₂, their errors cancel in the felt gradient.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from coupled.calibration.estimate import Estimate, total
 from coupled.rig.equations import bend_loss, felt_gradient, modifying_gradient
 from coupled.rig.parameters import Control
 
-DEFLECTION_WITHIN, FELT_WITHIN = 0.005, 0.01  # what a compensated rig is to reach
+DEFLECTION_WITHIN, FELT_WITHIN = 0.005, 0.01  # required of a compensated rig, as shares
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far off δ̂ and the felt gradient may be, as shares, and at which gradient in N/d.
+    """Relative errors of δ̂ and of the felt gradient, at a gradient in N/d.
 
-    `felt` is None where S₂ was not found.
+    `felt` is None if S₂ was not found.
     """
 
     gradient: float
@@ -37,7 +37,7 @@ class Accuracy:
     felt: Estimate | None
 
     def as_dict(self, d: str) -> dict[str, float]:
-        """Return it as JSON takes it; `d` is the unit of deflection."""
+        """Return the JSON; `d` is the unit of deflection."""
         table = {f"gradient_N_per_{d}": self.gradient}
         table["deflection_half_width"] = self.deflection.half_width
         if self.felt is not None:
@@ -52,14 +52,14 @@ def deflection_off(found: Scales, bend: float, true: Scales, true_bend: float, g
 
 
 def made_of_asked(found: Scales, true: Scales) -> float:
-    """Return ΔF as made over ΔF as asked for, by scales assumed and true: figures 3 and 5."""
+    """Return ΔF over the ΔF ordered, by scales assumed and true: figures 3 and 5."""
     return true.s1 / found.s1 * found.s2 / true.s2
 
 
 def felt_off(made: float, bend: float, true_bend: float, gradients: tuple[float, float]) -> float:
     """Return felt over specified gradient less 1.
 
-    `made` is ΔF as made over ΔF as asked for (`made_of_asked`), `gradients` (G, G_B) in N/d.
+    `made` is ΔF over the ΔF ordered (`made_of_asked`), `gradients` (G, G_B) in N/d.
     """
     g, basic = gradients
     held = basic + modifying_gradient(g, bend, basic) * made
@@ -69,10 +69,10 @@ def felt_off(made: float, bend: float, true_bend: float, gradients: tuple[float,
 def expected(
     fit: JointFit, s2: Estimate | None, control: Control, tied: bool = False
 ) -> Accuracy | None:
-    """Return how far off deflection and feel may be at the gradient where that is most.
+    """Return the errors of deflection and felt gradient at the gradient where they are largest.
 
-    `tied`: S₂ was made from this fit's S₁ by the gain S₁/S₂.
-    None where the structure is no stiffer than the gradient, which no compensation can give.
+    `tied`: S₂ was computed from this fit's S₁ by the gain S₁/S₂. None if K·G ≥ 1, where no
+    compensation exists.
     """
     table = control.schedule.total_gradient
     bend = fit.line.bend.value

@@ -1,12 +1,13 @@
-"""The aircraft's own forces, as measured on it: the reference of the static checks.
+"""Forces measured on the aircraft itself: the reference of the static checks.
 
-A CSV that a person types, one row a reading of the aircraft's control, units in the columns' names:
+A CSV typed by a person, one row for each reading of the aircraft's control, units in the names of
+the columns:
 
-    deflection_…, force_…   and, where they were noted,   dynamic_pressure_…, direction, surface_…
+    deflection_…, force_…   and, if noted,   dynamic_pressure_…, direction, surface_…
 
-`direction` is `out` from neutral or `back` to it. Rows without it are the force between the two,
-and the friction is then what the specification says. Nothing is made up between rows: a check is
-of the places that were read, on the sides and legs that were read.
+`direction` is `out` from neutral or `back` to it. Rows without it are the mean force of both
+directions, and the friction is that of the specification. Nothing is interpolated between rows: a
+check uses the deflections, sides and directions that were read.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ SURFACES = {"surface_deg": DEGREE_rad, "surface_rad": 1.0}
 DIRECTION, REMARK = "direction", "remark"
 DIRECTIONS = {"out": 1.0, "back": -1.0}
 MOST_PRESSURES = 8
-BEYOND = 1.02  # of the travel: what a reading may be past the stop
+BEYOND = 1.02  # of the travel: the largest deflection of a reading
 NOTHING = SweepLeg(np.empty(0), np.empty(0), np.empty(0), read=True)
 
 
 @dataclass(frozen=True)
 class _Row:
-    """One reading, SI; `direction` is 0 for the force between both ways, `surface` may be NaN."""
+    """One reading, SI; `direction` is 0 for the mean of both, `surface` may be NaN."""
 
     number: int
     pressure: float
@@ -53,9 +54,9 @@ class _Row:
 
 @dataclass(frozen=True)
 class AircraftData:
-    """What was read of one control: four legs, in the order of `LEGS`, by q̄ in Pa, rising.
+    """The readings of one control: four legs, in the order of `LEGS`, by rising q̄ in Pa.
 
-    A leg's `surface` is a share of the surface's travel in size, NaN where it was not read.
+    A leg's `surface` is the absolute share of the surface's travel, NaN where it was not read.
     """
 
     legs: Mapping[float, tuple[SweepLeg, ...]]
@@ -64,9 +65,9 @@ class AircraftData:
 def read_aircraft_data(
     path: Path, control: ControlName, specified: Control, surface_rad: float | None = None
 ) -> AircraftData:
-    """Return a file's readings of a control; where none was read, its friction is as `specified`.
+    """Return a file's readings of a control; without directions the friction is as `specified`.
 
-    `surface_rad` is the surface's travel for the control's whole one. Raises InputError.
+    `surface_rad` is the surface's travel for full travel of the control. Raises InputError.
     """
     lines = rows_of(path)
     if len(lines) < 2:
@@ -142,7 +143,7 @@ def _row(
 def _legs(
     path: Path, rows: list[_Row], specified: Control, surface_rad: float
 ) -> tuple[SweepLeg, ...]:
-    """Return the four legs of one q̄, those without readings empty."""
+    """Return the four legs of one q̄; legs without readings are empty."""
     legs = []
     for side, motion in LEGS.values():
         on = [row for row in rows if row.deflection * side > 0.0 and row.direction in (0.0, motion)]
@@ -166,7 +167,7 @@ def _legs(
 
 
 def _check(path: Path, rows: list[_Row], travel: float) -> None:
-    """Refuse what no control does; rows are of one leg, by the size of their deflection."""
+    """Raise InputError for impossible rows; rows are of one leg, by absolute deflection."""
     for before, row in zip([None, *rows[:-1]], rows, strict=True):
         if abs(row.deflection) > BEYOND * travel:
             problem = f"is at {row.deflection:.4g}, beyond the rig's travel of ±{travel:.4g}"

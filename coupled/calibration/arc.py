@@ -2,8 +2,8 @@
 
     δ_ruler = L·sin θ    eq. (15)        δ = L·θ    eq. (16)        sin θ ≈ θ − θ³/6    eq. (17)
 
-The linkage turns with θ, so the arc is what v₁ follows. The correction is the exact
-L·arcsin(δ_ruler/L); eq. (17)'s θ²/6 says how much it is: 1 % at 14°, 2 % at 20°.
+The linkage turns with θ, so v₁ follows the arc. The correction is the exact L·arcsin(δ_ruler/L);
+eq. (17) gives its relative size, θ²/6: 1 % at 14°, 2 % at 20°.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def along_arc(level: Floats, length: float) -> Floats:
 
 
 def angle(level: Floats, length: float) -> Floats:
-    """Return the angle θ in rad at which a level ruler reads so many m on an arc of `length`."""
+    """Return the angle θ in rad for readings of a level ruler in m, on an arc of `length`."""
     return np.asarray(np.arcsin(level / length))
 
 
 def shortfall(theta_rad: Floats) -> Floats:
-    """Return the share by which a level ruler reads short of the arc: θ²/6, eq. (17)."""
+    """Return the relative error of a level ruler on the arc: θ²/6, eq. (17)."""
     return np.asarray(theta_rad**2 / 6.0)

@@ -1,4 +1,4 @@
-"""The scales that the host assumes, those that the hardware has, and a calibration gone stale."""
+"""The scales assumed by the host and those of the hardware, and whether a calibration is stale."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from coupled.record.channels import unit_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
-# What a calibration was made under, and its unit; another value makes it stale.
+# The gains of a calibration, with their units; another value makes it stale.
 GAINS = {"mechanical_advantage": "", "s1_over_s2": "N_per_{d}", "s3_over_s2": ""}
 
 
@@ -24,8 +24,8 @@ class Scales:
 def assumed_scales(control: Control) -> Scales:
     """Return the scales of the rig file, which the host assumes.
 
-    One that is left out puts the converters' full scale at full travel, or at the force that
-    full travel takes at the stiffest gradient (the report's 100-V scale factors).
+    By default a scale puts the converters' full scale at full travel, or at the force of full
+    travel at the stiffest gradient (the report's 100-V scale factors).
     """
     sensing = control.sensing
     most = max(control.schedule.total_gradient) * control.travel + control.loader.breakout
@@ -36,7 +36,7 @@ def assumed_scales(control: Control) -> Scales:
 
 
 def real_scales(control: Control) -> Scales:
-    """Return the scales that the hardware really has; S₁ as the host gets v₁."""
+    """Return the true scales of the hardware; S₁ is that of the host's v₁."""
     assumed, factor = assumed_scales(control), control.sensing
     return Scales(
         assumed.s1 * factor.read_scale,
@@ -46,7 +46,7 @@ def real_scales(control: Control) -> Scales:
 
 
 def stale(control: Control) -> list[str]:
-    """Return what has changed since a control's calibration, a phrase each; empty if nothing."""
+    """Return the changes since a control's calibration, a phrase each; empty if none."""
     then = control.calibration
     if then.readings == 0:
         return []
@@ -75,10 +75,10 @@ def stale(control: Control) -> list[str]:
 
 
 def outdated_bends(filed: Rig, found: Rig) -> list[str]:
-    """Return for which controls the host's K̂ is not the K that was found, a sentence each.
+    """Return a sentence for each control whose K̂ differs from the K found.
 
-    `filed` is the rig as its file has it, `found` with the K that records gave. What the host
-    assumes is kept there, since the records were made with it.
+    `filed` is the rig as filed, `found` with the K from records. The host's K̂ is not changed,
+    since the records were made with it.
     """
     said = []
     for name, control in found.controls.items():

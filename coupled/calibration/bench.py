@@ -1,16 +1,15 @@
-"""The virtual bench: a person with ruler, spring scale and voltmeter at a simulated rig.
+"""A simulated bench: a person with ruler, spring scale and voltmeter at a simulated rig.
 
-The rig is the one that flies, stage by stage. The hand holds a force that wanders; the
-person reads one instrument after the other, each with its error and rounding: ruler,
-scale, v₁, v₃, and then scale and ruler again, so that what drifts meanwhile cancels. The hand
-pulls a little past where it holds and eases back, so that friction, if there is any, keeps
-the control where it is; a hand that wanders would else work it outward from the ruler's
-look to the meter's.
+The rig is the one that flies, stage by stage. The hand holds a force with random variations. The
+person reads one instrument after the other, each with its error and rounding: ruler, scale, v₁, v₃,
+and then scale and ruler again, so that linear drift cancels. The hand pulls past the target and
+eases back, so that friction holds the control still; otherwise the variations of the hand would
+move it outward between the readings.
 
-For S₂ the null is really performed: the force of a held control is noted without the
-multiplier, then, hands off, the supply in its place is turned until v₁ is back. Every
-other null is approached from beyond, with the supply as with the hand: friction then keeps
-the hand's least force instead of its greatest, and the mean of both sides is free of it.
+The null for S₂ is simulated as well: the force of a held control is noted without the multiplier;
+then, hands off, a supply in place of v₂ is turned until v₁ is back. Every other null is approached
+from beyond, with supply and hand alike: friction then keeps the hand's smallest force instead of
+its largest, and the mean of both sides is free of this error.
 """
 
 from __future__ import annotations
@@ -33,21 +32,21 @@ from coupled.rig.rig import Rig
 from coupled.rig.standalone import nodes_of, run_control, smooth, under_supply
 
 Floats = NDArray[np.float64]
-PULL_s = 0.3  # the hand goes to its next force so quickly
-SLOW_s = 2.0  # and so slowly where friction must not matter
+PULL_s = 0.3  # time of the hand to its next force
+SLOW_s = 2.0  # the same where friction must not matter
 GLANCE_s = 0.6  # from one instrument to the next
-WANDER_s = 0.2  # over which a hand forgets where it was
-PAST = 5.0  # of a hand's wander: how far it pulls past where it holds
-BEYOND = 0.1  # of its force, and so far, with an allowance for friction, for a null from beyond
-ALLOWANCE = 3.0  # of the friction: 2 let the control come back
-TURNS = 40  # of the supply's knob at most
+WANDER_s = 0.2  # correlation time of the hand's variations
+PAST = 5.0  # standard deviations of the hand by which it pulls past the target
+BEYOND = 0.1  # of the force, plus an allowance for friction, for a null from beyond
+ALLOWANCE = 3.0  # times the friction; with 2 the control returns too far
+TURNS = 40  # largest number of settings of the supply
 MOST_VOLTS = 1e4
 NULLS = 6
 
 
 @dataclass(frozen=True)
 class CalibrationBench:
-    """A rig on the bench, without its converters: what to hold, when, and when to read it.
+    """A rig on the bench, without its converters, and the plan of its readings.
 
     `again`: ruler and scale are read a second time, after the voltmeter. `crossed`: {another
     control: the force held on it in N at each station}.
@@ -63,7 +62,7 @@ class CalibrationBench:
 
 
 def take_readings(bench: CalibrationBench, seed: int) -> Readings:
-    """Return the readings of one bench session; the same seed gives the same ones."""
+    """Return the readings of one simulated bench session, reproducible by its seed."""
     rng = np.random.default_rng(seed)
     rig, control = _without_converters(bench.rig, bench.control), bench.control
     pressures = np.array([station.pressure_Pa for station in bench.stations])
@@ -92,10 +91,9 @@ def take_readings(bench: CalibrationBench, seed: int) -> Readings:
 def _bend_by_others(
     bench: CalibrationBench, read: Floats, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """Add what the other hands' forces bend to δ at both looks; return their scales' readings.
+    """Add the bend by other hands' forces to both readings of δ; return readings of these forces.
 
-    Each other hand wanders from one look to the next, too; its scale is looked at with the first
-    scale's.
+    The other hands vary as well; their scales are read together with the first scale.
     """
     tools, structure = bench.instruments, bench.rig.structure
     found = {}
@@ -110,12 +108,12 @@ def _bend_by_others(
 
 
 def _without_converters(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig as a voltmeter meets it: v₁ and v₃ without converters."""
+    """Return the rig without converters, so that v₁ and v₃ are read by a voltmeter."""
     return rig.changed({f"controls.{control}.sensing.word_length_bits": 0})
 
 
 def _settling_s(rig: Rig, control: ControlName, precise: bool) -> float:
-    """Return how long the control needs to come to rest at its softest."""
+    """Return the settling time of the control at its softest gradient, s."""
     loader = rig.controls[control].loader
     table = rig.controls[control].schedule
     slopes = [*table.total_gradient, *(table.second_gradient or ()), loader.basic_gradient]
@@ -135,9 +133,9 @@ def _hold(
     rng: np.random.Generator,
     pull_s: float = PULL_s,
 ) -> Floats:
-    """Return δ, F, δc, F, F and δ as they were when each was looked at, shape (6, readings).
+    """Return δ, F, δc, F, F and δ at the times of their readings, shape (6, readings).
 
-    Each force is reached by way of a peak beyond it.
+    Each force is approached from a peak beyond it.
     """
     settle = _settling_s(rig, bench.control, bench.instruments.hand == 0.0)
     rate = rig.frame_rate
@@ -162,7 +160,7 @@ def _hold(
 
 
 def _wander(frames: int, rate: float, rng: np.random.Generator) -> Floats:
-    """Return a wander of unit variance that forgets exponentially (an Ornstein-Uhlenbeck one)."""
+    """Return an Ornstein-Uhlenbeck process of unit variance."""
     memory = math.exp(-1.0 / (WANDER_s * rate))
     pushes = rng.standard_normal(frames)
     pushes[1:] *= math.sqrt(1.0 - memory**2)
@@ -170,15 +168,15 @@ def _wander(frames: int, rate: float, rng: np.random.Generator) -> Floats:
 
 
 def _reading(true: Floats, error: float, step: float, rng: np.random.Generator) -> Floats:
-    """Return what is read of true values: with the instrument's error, rounded to its step."""
+    """Return readings of true values: with the instrument's error, rounded to its step."""
     seen = true + error * rng.standard_normal(np.shape(true))
     return np.asarray(step * np.round(seen / step) if step > 0.0 else seen)
 
 
 def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats:
-    """Return v₁ as noted, v₂ that brought it back, v₃ as noted and the side, shape (4, nulls).
+    """Return v₁ as noted, v₂ that restored it, v₃ as noted and the side, shape (4, nulls).
 
-    A null at which the voltmeter does not tell one of them from 0 V is left out.
+    A null with a voltage below the voltmeter's error is left out.
     """
     control = bench.control
     loader = rig.controls[control].loader
@@ -187,7 +185,7 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
     plain = _without_multiplier(rig, control)
     allowance = ALLOWANCE * max(loader.friction, loader.breakaway)
     forces, sides = _null_forces(rig, bench, allowance)
-    # From rest each time, and slowly, as the supply is: then friction is the same in both.
+    # From rest each time, and slowly, like the supply: then friction is the same in both.
     held = np.hstack(
         [
             _hold(plain, bench, force, _by_way_of(force, side, allowance), np.zeros(1), rng, SLOW_s)
@@ -204,41 +202,41 @@ def _null(rig: Rig, bench: CalibrationBench, rng: np.random.Generator) -> Floats
         rest = rests_at(float(_by_way_of(supply, side, allowance)), float(supply))
         return float(_reading(np.array(scales.s1 * rest), tools.meter, tools.meter_step, rng))
 
-    # A loader that rests in its friction or breakout shows 0 V: there is nothing to bring back.
+    # A loader held by friction or breakout shows 0 V: there is nothing to restore.
     least = tools.meter + tools.meter_step
     moved = v1 > least
     v2 = [
         _turn_until(partial(shown, side=side), wanted, tools)
         for side, wanted in zip(sides[moved], v1[moved], strict=True)
     ]
-    # What was turned is read as well.
+    # The supply's setting is read as well.
     turned = _reading(np.array(v2), tools.meter, tools.meter_step, rng)
     found = np.stack((v1[moved], turned, v3[moved], sides[moved]))
     return found[:, (np.abs(found[1:3]) > least).all(axis=0)]
 
 
 def _by_way_of(force: Floats, side: float, allowance: float) -> Floats:
-    """Return the force first gone to, N, before one that is approached from a side.
+    """Return the peak force, N, before a force that is approached from a side.
 
-    As much of a way outward as inward, so that the hand wanders as long on both.
+    The way is as long outward as inward, so that the hand varies for the same time on both.
     """
     return (1.0 - BEYOND * side) * force + (allowance if side < 0.0 else 0.0)
 
 
 def _null_forces(rig: Rig, bench: CalibrationBench, allowance: float) -> tuple[Floats, Floats]:
-    """Return the forces to hold for nulls in N and the sides, every other −1."""
+    """Return the forces of the nulls in N and the sides, −1 for every other one."""
     data = rig.controls[bench.control]
     loader = data.loader
     room = min(STRONGEST_N, loader.breakout + loader.basic_gradient * FULL_TRAVEL * data.travel)
     side = np.where(np.arange(bench.nulls) % 2 == 0, 1.0, -1.0)
     most = np.where(side > 0.0, room, (room - allowance) / (1.0 + BEYOND))
-    if np.min(most) <= loader.breakout:  # no room to come back from beyond
+    if np.min(most) <= loader.breakout:  # no room beyond
         side, most = np.ones(bench.nulls), np.full(bench.nulls, room)
     return np.linspace(0.5, 1.0, bench.nulls) * most, side
 
 
 def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig with v₂ = 0: asked for the gradient that the host takes for basic."""
+    """Return the rig with v₂ = 0: its total gradient is the basic gradient assumed by the host."""
     data, place, d = rig.controls[control], f"controls.{control}", unit_of(control)
     return rig.changed(
         {
@@ -254,8 +252,8 @@ def _without_multiplier(rig: Rig, control: ControlName) -> Rig:
 def _turn_until(shown: Callable[[float], float], wanted: float, tools: Instruments) -> float:
     """Return the supply's voltage at which the meter shows v₁ as wanted, as a person finds it.
 
-    Up until it is passed; then where two settings on either side say that it should be, or
-    half-way between them where that has not helped (within a breakout, or at a stop).
+    The voltage is raised beyond the target, then interpolated between two settings, or bisected if
+    interpolation does not help (within a breakout, or at a stop).
     """
     near = max(tools.meter + tools.meter_step, 1e-13 * wanted)
     low, high = (0.0, shown(0.0)), (wanted, shown(wanted))

@@ -1,4 +1,4 @@
-"""A calibration: from readings to S₁, S₂, S₃ and K, or the reason why they tell too little."""
+"""A calibration: S₁, S₂, S₃ and K from readings, or an error if they are insufficient."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from coupled.rig.rigfile import read_rig
 
 Floats = NDArray[np.float64]
 DEFAULT_RIG = "report-column"
-EXTREME = 3.0  # of a hand's wander: as far as friction takes a control with it
+EXTREME = 3.0  # standard deviations of the hand by which friction displaces a control
 
 
 @public
@@ -41,10 +41,10 @@ def calibrate(
 ) -> CalibrationResult:
     """Return S₁ in V/d, S₂ and S₃ in V/N and K in d/N of a control, with their errors.
 
-    `readings` are such, or a file of them; `rig` is one, a file, or the name of a shipped one:
-    its travel, arc, gains and schedule are used, not its scales. `instruments` are the usual
-    ones of a careful person unless given. d is m, or rad for a wheel; a pull is positive.
-    Raises InputError where the readings tell too little, naming file and row.
+    `readings` are an object or a file; `rig` is an object, a file, or the name of a shipped rig.
+    The rig's travel, arc, gains and schedule are used, not its scales. `instruments` are by
+    default those of a careful person. d is m, or rad for a wheel; a pull is positive. Raises
+    InputError, with file and row, if the readings are insufficient.
 
     >>> import coupled
     >>> from coupled.calibration.bench import CalibrationBench, take_readings
@@ -73,9 +73,9 @@ def calibrate(
 def calibrate_control(
     readings: Readings, control: Control, name: str, instruments: Instruments, file: Path | str
 ) -> CalibrationResult:
-    """Return what the readings of `file` tell of the control called `name`.
+    """Return the calibration of the control called `name` from the readings of `file`.
 
-    Raises InputError where they cannot: too few, all of one force, or of one gradient.
+    Raises InputError for insufficient readings: too few, all of one force, or of one gradient.
     """
     corrected, level, angles = _on_arc(readings, control, file)
     refuse_poor(corrected, control, name, instruments, file)
@@ -89,7 +89,7 @@ def calibrate_control(
             refuse_poor(used, control, name, instruments, file)
         except InputError as error:
             rows = ", ".join(str(suspect.row) for suspect in suspects)
-            problem = f"without the far-off rows {rows}: {error.problem}"
+            problem = f"without the outliers in rows {rows}: {error.problem}"
             raise InputError(file, error.key, problem) from None
     d, f = used.deflection, used.force
     plain = ordinary(used, instruments)
@@ -99,11 +99,11 @@ def calibrate_control(
         fit = errors_in_variables(used, instruments)
     except (FloatingPointError, np.linalg.LinAlgError):
         raise InputError(
-            file, "", "the fit does not settle; the readings tell too little"
+            file, "", "the fit does not converge; the readings are insufficient"
         ) from None
     if fit.line.bend.high < 0.0:
-        problem = "K comes out negative, and no structure bends against its force"
-        raise InputError(file, "", f"{problem}; check v1, and which readings are of which gradient")
+        problem = "K is negative, and no structure bends against its force"
+        raise InputError(file, "", f"{problem}; check v1, and the gradient set of each reading")
     there = f != 0.0
     s2 = scales.s2_from_gains(fit.line.s1, fit.s3, control.gains)
     loader, sides = control.loader, used.null_side
@@ -134,7 +134,7 @@ def calibrate_control(
 def _on_arc(
     readings: Readings, control: Control, file: Path | str
 ) -> tuple[Readings, Floats | None, Floats | None]:
-    """Return the readings along the arc, and where known the level ones and angles in rad."""
+    """Return the readings along the arc, and the level readings and angles in rad if known."""
     length = control.length
     if length <= 0.0 or control.surface == "aileron":
         return readings, None, None

@@ -1,15 +1,14 @@
 """A rig whose host uses a calibration.
 
-A calibration changes what the host assumes, not the hardware: S₁, S₂, S₃ and K̂ become what
-was found, and each scale's factor of real over assumed is kept true of the same hardware.
-v₁ is read where the host gets it: an S₁ that is off in the electronics is put right for reading
-and analog product alike. One that is off in the host's reading alone (`deflection_scale`) stays
-what it is: the S₁ found has it, the reading is right, and the analog product wrong by its inverse.
+A calibration changes the host's assumptions, not the hardware: S₁, S₂, S₃ and K̂ become the values
+found, and each factor of true over assumed scale is adjusted to the same hardware. v₁ is read at
+the host: an S₁ that is wrong in the electronics is corrected for reading and analog product alike.
+An error of the host's reading alone (`deflection_scale`) remains: the S₁ found includes it, the
+reading is right, and the analog product is wrong by its inverse.
 
-A scale that the rig file does not state is known by the readings alone, so the hardware has the
-one that was found, unless the readings are of the rig's own bench. Where the file does state it, or
-a K, readings of another loader contradict the file: flown, such a rig would not do what the
-calibration promises, and it is refused.
+A scale that the rig file does not state is known from the readings only, so the hardware gets the
+value found. If the file states a scale or K, and readings of another loader contradict it, the rig
+would not fly as the calibration promises, and it is refused.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from coupled.record.channels import ControlName, unit_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
-_ROUNDING = 1e-15  # of a figure: a smaller error is that of a computer alone
-_BEYOND = 3.0  # half widths of a 95 % interval: more is no chance, but other hardware
+_ROUNDING = 1e-15  # relative; a smaller error is rounding
+_BEYOND = 3.0  # half widths of a 95 % interval, beyond which the hardware differs
 
 
 def with_calibration(
@@ -44,10 +43,10 @@ def with_calibration(
 ) -> Rig:
     """Return the rig whose host uses a calibration of one of its controls.
 
-    `date` is noted as given. With `hardware` the rig's own structure and scales are taken to
-    be as found, too: for readings of a real loader, whose rig file is a model. A scale that the
-    file has not is as found in any case. Raises InputError where the figures make a rig
-    that cannot be.
+    `date` is stored as given. With `hardware` the rig's own structure and scales become those
+    found, too: for readings of a real loader, whose rig file is a model. A scale that the file does
+    not state becomes that found in any case. Raises InputError if the values give an impossible
+    rig.
     """
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing
@@ -94,9 +93,9 @@ def with_calibration(
 
 
 def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
-    """Tell whether the rig file has a scale: it states it, or the readings are of its own bench.
+    """Tell whether the rig file states a scale, or the readings are of its own bench.
 
-    A bench of a rig that states none takes the converters' full scale for it.
+    The bench of a rig that states none uses the converters' full scale.
     """
     if found is None or getattr(control.sensing, name) > 0.0:
         return True
@@ -105,7 +104,7 @@ def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
 
 
 def unstated_scales(control: Control, found: CalibrationResult) -> list[str]:
-    """Return the keys of the scales found that the rig file has not."""
+    """Return the keys of the scales found that the rig file does not state."""
     scales = (("s1", found.line.s1), ("s2", found.s2_chosen), ("s3", found.s3))
     units = {"s1": f"V_per_{unit_of(found.control)}"}
     missing = [name for name, each in scales if not _is_filed(control, name, each)]
@@ -115,10 +114,10 @@ def unstated_scales(control: Control, found: CalibrationResult) -> list[str]:
 def refuse_other_hardware(
     filed: Control, new: Control, found: CalibrationResult, file: object
 ) -> None:
-    """Raise InputError where a calibrated control, flown, would not do what is promised.
+    """Raise InputError if the calibrated rig would exceed the errors promised in flight.
 
-    `filed` is the control of the rig file, `new` with the calibration. The readings are then
-    of other hardware than the file has.
+    `filed` is the control of the rig file, `new` with the calibration. The readings are then of
+    other hardware than the file's.
     """
     promise = found.accuracy
     if promise is None:
@@ -146,7 +145,7 @@ def refuse_other_hardware(
 
 
 def _contradictions(filed: Control, found: CalibrationResult) -> str:
-    """Return the figures in which readings and file differ most, as words."""
+    """Return the values in which readings and file differ most, as words."""
     d, real, sensing = unit_of(found.control), real_scales(filed), filed.sensing
     figures = [("K", found.line.bend, filed.loader.bend, f"{d}/N")]
     if sensing.s1:

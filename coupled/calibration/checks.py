@@ -1,11 +1,11 @@
 """Static and dynamic control checks against 14 CFR Part 60, appendix A, table A2A.
 
-The rig as it is against what is specified (`specification`), which stands for the aircraft.
-The force is the hand's own, not what the strain gauge says. Where the rule gives two
-tolerances for a force, the wider one holds. Of a release the rule's P₀ is the time from 90 %
-of the displacement to the first zero crossing, or overdamped to 10 %, and may err by 10 %;
-P_n, the n-th full period after that crossing, by 10·(n + 1) %. Displacements are counted from
-where the control comes to rest.
+The rig is compared with its specification (`specification`), which represents the aircraft. The
+force is the hand's own, not the strain gauge's reading. If the rule gives two tolerances for a
+force, the wider one applies. In a release the rule's P₀ is the time from 90 % of the displacement
+to the first zero crossing, or if overdamped to 10 %, with a tolerance of 10 %; P_n, the n-th full
+period after that crossing, has a tolerance of 10·(n + 1) %. Displacements are relative to the final
+position.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from coupled.rig.standalone import History
 from coupled.units import DEGREE_rad
 
 Floats = NDArray[np.float64]
-INNER, OUTER = 0.03, 0.93  # of the travel: where a sweep's force is judged
-LINE = (0.06, 0.2)  # of the travel: the straight part whose start is the breakout
-STILL, STUCK = 1e-3, 0.8  # of the displacement: what has come to rest, and what never left
-RESTING = 10.0  # times what still moves, a resting place is no slow return to neutral
+INNER, OUTER = 0.03, 0.93  # of the travel, between which a sweep's force is checked
+LINE = (0.06, 0.2)  # of the travel: the line whose intercept is the breakout
+STILL, STUCK = 1e-3, 0.8  # of the displacement: a control at rest, and one that did not return
+RESTING = 10.0  # a final position is at rest if it exceeds the last motion by this factor
 
 
 @dataclass(frozen=True)
 class ControlCheck:
-    """One comparison: what, at which q̄ in Pa, measured and reference, allowed deviation, unit.
+    """One comparison: name, q̄ in Pa, measured and reference value, tolerance, unit.
 
-    `margin` is the share of the tolerance that is left, negative where it fails.
+    `margin` is the share of the tolerance that remains, negative for a failure.
     """
 
     name: str
@@ -64,7 +64,7 @@ class ControlCheck:
         return self.margin >= 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON takes it."""
+        """Return the JSON."""
         return {**self.__dict__, "margin": self.margin, "passed": self.passed}
 
 
@@ -86,7 +86,7 @@ def legs(response: History) -> tuple[SweepLeg, ...]:
 
 @dataclass(frozen=True)
 class JudgedLeg:
-    """Where a leg's force is judged: δ in d, F felt and specified there, N."""
+    """The points of a leg at which forces are compared: δ in d, F felt and specified, N."""
 
     deflection: Floats
     felt: Floats
@@ -96,7 +96,7 @@ class JudgedLeg:
 def judged(
     travel: float, felt: Sequence[SweepLeg], specified: Sequence[SweepLeg]
 ) -> tuple[JudgedLeg, ...]:
-    """Return what is felt and specified along each leg at the same δ."""
+    """Return the felt and the specified forces along each leg at the same δ."""
     found = []
     grid = np.linspace(INNER, OUTER, 181) * travel
     for now, wanted, (side, _) in zip(felt, specified, LEGS.values(), strict=True):
@@ -113,9 +113,9 @@ def judged(
 
 
 def breakout(leg: SweepLeg, travel: float, straight: float) -> float:
-    """Return the force in N at which a control leaves neutral: where its line starts.
+    """Return the force in N at which a control leaves neutral: the intercept of its first line.
 
-    `straight` is where its first segment ends, d.
+    `straight` is the end of its first segment, d.
     """
     share = np.abs(leg.deflection) / travel
     near = (share > LINE[0]) & (share < min(LINE[1], 0.9 * straight / travel))
@@ -131,16 +131,16 @@ def static_checks(
     felt: Sequence[SweepLeg],
     specified: Sequence[SweepLeg],
 ) -> list[ControlCheck]:
-    """Return breakout both ways, and the force where it is nearest to its limit on each leg.
+    """Return the breakout both ways, and the force with the least margin on each leg.
 
-    `data` is the control as specified.
+    `data` is the specified control.
     """
     found = []
     straight = data.schedule.break_deflection or data.travel
     for now, wanted, leg in list(zip(felt, specified, LEGS, strict=True))[::2]:
         near = np.abs(wanted.deflection) < LINE[1] * data.travel
         if np.count_nonzero(near) < 2:
-            continue  # too few were read there for a line
+            continue  # too few readings for a line
         forces = [breakout(each, data.travel, straight) for each in (now, wanted)]
         name = f"breakout, {leg.removeprefix('out, ')}"
         allowed = STATIC[control].breakout_N
@@ -164,11 +164,11 @@ def surface_checks(
     surface: str = "",
     read: Sequence[SweepLeg] = (),
 ) -> list[ControlCheck]:
-    """Return the surface's position where it is farthest off the deflection's, both ways.
+    """Return the surface's position where it differs most from the deflection's, both ways.
 
-    `surface_rad` is the surface's travel for the whole of the control's; `surface` its name
-    where it is not the control's own, as a spoiler that the wheel moves. Where the aircraft's own
-    was `read` on a leg, it is held against that.
+    `surface_rad` is the surface's travel for full travel of the control. `surface` is the surface's
+    name if it is not the control's own, such as a spoiler moved by the wheel. On legs `read` on
+    the aircraft, the reference is the aircraft's position.
     """
     found = []
     allowed = SURFACE_rad[surface or data.surface] / DEGREE_rad
@@ -195,9 +195,9 @@ def surface_checks(
 class Swing:
     """A release in the rule's terms, times in s from 90 % of the displacement.
 
-    `begin_s` is when it falls through that after the release; `crossings` of zero, `peaks` of
-    the overshoots over the displacement (signs left out, those above 5 %), and the time from
-    90 % to 10 %, NaN where it never gets there.
+    `begin_s` is when the displacement falls through 90 % after the release; `crossings` are those
+    of zero, `peaks` the absolute overshoots over the displacement (above 5 %), `fall_s` the time
+    from 90 % to 10 %, NaN if it does not get there.
     """
 
     begin_s: float
@@ -207,7 +207,7 @@ class Swing:
 
 
 def swing_of(let_go: Release) -> Swing:
-    """Return a release in the rule's terms."""
+    """Return a release's crossings, peaks and fall."""
     rest, time = _resting(let_go), let_go.time_s
     share = (let_go.deflection - rest) / (let_go.start - rest)
     begin = _falls_to(time, share, 0.9)
@@ -222,7 +222,7 @@ def swing_of(let_go: Release) -> Swing:
 
 
 def _resting(let_go: Release) -> float:
-    """Return where friction holds a release at its end, d; neutral where it still moves."""
+    """Return the position at which friction holds a release at its end, d; neutral if it moves."""
     tail = let_go.deflection[-max(len(let_go.deflection) // 10, 1) :]
     rest, moves, start = float(tail[-1]), float(np.ptp(tail)), abs(let_go.start)
     held = moves <= STILL * start and RESTING * moves <= abs(rest) < STUCK * start
@@ -243,7 +243,7 @@ def _falls_to(time: Floats, share: Floats, level: float) -> float:
 def dynamic_checks(
     pressure_Pa: float, side: str, felt: Release, specified: Release
 ) -> Iterator[ControlCheck]:
-    """Yield the checks of a release: of an underdamped control, or else its fall."""
+    """Yield the checks of a release: crossings and overshoots, or if overdamped its fall."""
     now, wanted = swing_of(felt), swing_of(specified)
     if not wanted.peaks.size:
         allowed = TIME_SHARE * wanted.fall_s

@@ -1,4 +1,4 @@
-"""How often the intervals hold what they should: many benches, each fitted, against the truth."""
+"""The coverage of the intervals: many simulated benches, each compared with the truth."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from coupled.rig.parameters import Control
 Progress = Callable[[str, int, int], None]
 NEAR = 0.05
 _BLOCK = 25
-_AHEAD = 64  # blocks that wait for a worker
+_AHEAD = 64  # blocks in the queue of the workers
 
 
 @dataclass(frozen=True)
 class Coverage:
     """Shares of benches, without unit.
 
-    `covered` of each figure's 95 % interval, `within` of K within 5 %; `bias` and `spread` of
-    K over its true value, errors in variables and ordinary; `accused` of benches in which a
-    good reading was taken for a mistyped one; `deflection` and `felt` of benches after which a
-    compensated rig's δ̂ is within 0.5 % and its felt gradient within 1 %, at the least, middle
-    and greatest gradient (`circle`: both).
+    `covered` of each value's 95 % interval, `within` of K within 5 %; `bias` and `spread` of K
+    over its true value, with errors in variables and ordinary; `accused` of benches with a good
+    reading excluded as mistyped; `deflection` and `felt` of benches with a compensated rig's δ̂
+    within 0.5 % and felt gradient within 1 %, at the least, middle and greatest gradient
+    (`circle`: both).
     """
 
     benches: int
@@ -53,17 +53,17 @@ class Coverage:
     circle: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON takes it."""
+        """Return the JSON."""
         return dict(self.__dict__)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One bench, fitted, against the truth; K, S1, S3 and S2 by name, and K by others' forces.
+    """One bench, fitted and compared with the truth: K, S1, S3, S2, and K by others' forces.
 
-    `held` whether each figure's interval holds the truth, None where it was not found;
-    `bend_off` and `ordinary_off` K's relative errors; `deflection_off` and `felt_off` how far
-    off δ̂ and the felt gradient are, as shares, where most so.
+    `held`: each value's interval contains the truth, None if it was not found. `bend_off` and
+    `ordinary_off` are K's relative errors, `deflection_off` and `felt_off` the largest relative
+    errors of δ̂ and of the felt gradient.
     """
 
     held: Mapping[str, bool | None]
@@ -82,7 +82,7 @@ def measure_coverage(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Coverage:
-    """Return how often intervals from benches with seeds `seed` and on hold the truth."""
+    """Return the coverage of the intervals from benches with seeds from `seed` on."""
     blocks = [
         range(first, min(first + _BLOCK, seed + benches))
         for first in range(seed, seed + benches, _BLOCK)
@@ -115,7 +115,7 @@ def measure_coverage(
 
 
 def _share(held: Iterable[bool | None]) -> float:
-    """Return the share that hold, of those that could be had; NaN for none."""
+    """Return the share of true values, without None; NaN if there are none."""
     had = [one for one in held if one is not None]
     return float(np.mean(had)) if had else float("nan")
 
@@ -150,7 +150,7 @@ def _trial(bench: CalibrationBench, seed: int) -> Trial:
 
 
 def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
-    """Return how far δ̂ and the felt gradient are off, as shares, where most so."""
+    """Return the largest relative errors of δ̂ and of the felt gradient."""
     true, bend = real_scales(data), data.loader.bend
     k, s2 = found.line.bend.value, found.s2_chosen
     assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)

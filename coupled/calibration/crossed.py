@@ -1,12 +1,12 @@
-"""Which forces to hold on other controls, and how well they tell what these bend here.
+"""Forces to hold on other controls, and the precision of the bend K_j that they cause.
 
-With K_j = −c_j/a of the fit, and c_j known by readings at which F_j is held with either sign
-while this control's own force is as it is: its error is nearly that of the ruler,
+K_j = −c_j/a of the fit. c_j is determined by readings with ±F_j held at unchanged force on this
+control. Its error is nearly that of the ruler,
 
     u(K_j) ≈ √(u_δ² + (u_v₁/S₁)²)/(F_j·√n),    n readings with ±F_j
 
-since a force that goes with no other is orthogonal to the rest of the design. So few readings
-with a strong force do what many with a weak one cannot.
+since F_j is orthogonal to the rest of the design. A few readings with a strong force are therefore
+better than many with a weak one.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from coupled.record.channels import ControlName
 from coupled.rig.equations import volts, volts_of_computed
 from coupled.rig.rig import Rig
 
-IN_TURN = (1.0, 0.0, -1.0, 0.0)  # of the force on another control, reading after reading
+IN_TURN = (1.0, 0.0, -1.0, 0.0)  # sequence of the force on another control, by reading
 
 
 def crossed_forces(
     rig: Rig, control: ControlName, stations: int, strongest_N: float
 ) -> dict[ControlName, list[float]]:
-    """Return the force on each other control at every station, N: each sign as often as none.
+    """Return the force on each other control at every station, N: +, − and mostly 0.
 
-    In turn +, 0, − and 0 on the first, and half as often on the second, so that no force goes
-    with this control's own or with another's. Nothing for 0 N.
+    In turn +, 0, − and 0 on the first, and half as often on the second, so that no force is
+    correlated with this control's own or with another's. Empty for 0 N.
     """
     if strongest_N == 0.0:
         return {}
@@ -54,9 +54,9 @@ def crossed_precision(
     instruments: Instruments,
     looks: int = 2,
 ) -> dict[str, float]:
-    """Return half of the 95 % interval of each K_j in d/N that a design gives, {control: it}.
+    """Return the half width of the 95 % interval of each K_j in d/N for a design, by control.
 
-    Readings at the design's stations, with `strongest_N` held on the others as `crossed_forces`.
+    Readings are at the design's stations, with the others held as by `crossed_forces`.
     """
     data, scales = rig.controls[control], real_scales(rig.controls[control])
     bend = data.compensation.bend or USUAL_LOSS / max(data.schedule.total_gradient)

@@ -30,7 +30,7 @@ SIDES = {"positive": 1.0, "negative": -1.0}
 
 @dataclass(frozen=True)
 class LetGo:
-    """A release of the rig as it is, and of the specified one."""
+    """A release of the rig as filed, and of the specified rig."""
 
     felt: Release
     specified: Release
@@ -38,7 +38,7 @@ class LetGo:
 
 @dataclass(frozen=True)
 class FeelCondition:
-    """One q̄: what is specified, sweeps without and with compensation, and of the rig as it is.
+    """One q̄: the specification, and sweeps without and with compensation and of the rig as filed.
 
     `let_go` are the releases by side.
     """
@@ -53,7 +53,7 @@ class FeelCondition:
 
 @dataclass(frozen=True)
 class Documentation:
-    """What documents one control; `surface_rad` is its surface's travel, None on a bench."""
+    """The documentation of one control; `surface_rad` is its surface's travel, None on a bench."""
 
     rig: Rig
     control: ControlName
@@ -63,7 +63,7 @@ class Documentation:
 
 
 def surface_travels(rig: Rig, file: Path) -> dict[str, float]:
-    """Return each surface's travel in rad by its control, found by flying it; none on a bench."""
+    """Return each surface's travel in rad by its control, found in flight; empty for a bench."""
     if rig.flight is None:
         return {}
     frame_s, controls = 1.0 / rig.frame_rate, list(rig.controls)
@@ -81,10 +81,10 @@ def document(
 ) -> Documentation:
     """Return a control's documentation at the least, middle and greatest gradient specified.
 
-    `specification` is a rig that says what is specified where this one's own file does not:
-    its schedule, breakout, friction, mass and damping count. `aircraft` are the aircraft's own
-    forces: the reference of the static checks then, at its dynamic pressures. Raises InputError
-    where the specification lacks the control.
+    `specification` is a rig that gives the specification instead of this one: its schedule,
+    breakout, friction, mass and damping. `aircraft` are forces measured on the aircraft, then the
+    reference of the static checks, at its dynamic pressures. Raises InputError if the
+    specification lacks the control.
     """
     specified = specified_rig((specification or rig).only(control))
     read = _legs_by_pressure(specified, control, aircraft)
@@ -113,7 +113,7 @@ def check_feel(
     specification: Rig | None = None,
     aircraft: AircraftData | None = None,
 ) -> tuple[ControlCheck, ...]:
-    """Return the checks of a control's documentation, without what is only drawn."""
+    """Return the checks of a control's documentation, without the data of its figures."""
     specified = specified_rig((specification or rig).only(control))
     checks = []
     for pressure, legs_there in _legs_by_pressure(specified, control, aircraft).items():
@@ -127,7 +127,7 @@ def check_feel(
 def _legs_by_pressure(
     specified: Rig, control: ControlName, aircraft: AircraftData | None
 ) -> Mapping[float, tuple[SweepLeg, ...]]:
-    """Return what a slow sweep is to show at each q̄ in Pa: the aircraft's own, or as specified."""
+    """Return the reference of a slow sweep at each q̄ in Pa: the aircraft's or the specified."""
     if aircraft is not None:
         return aircraft.legs
     return {

@@ -1,19 +1,18 @@
-"""The fit of v₁ = a·δ + b·F and v₃ = S₃·F together, where every instrument errs.
+"""The joint fit of v₁ = a·δ + b·F and v₃ = S₃·F with errors in all variables.
 
-Maximum likelihood for known error variances (a weighted total least squares): over the
-true δ and F of each reading as well as a, b and S₃. The force is measured twice, by the
-spring scale and by the strain gauge's v₃, and both tell of it. With r = (v₁ − a·δ − b·F,
-v₃ − S₃·F) of what was read, and J = ((a, b), (0, S₃)), it comes down to
+Maximum likelihood for known error variances (weighted total least squares), over the true δ and F
+of each reading as well as a, b and S₃. The force is measured twice, by the spring scale and by the
+strain gauge's v₃. With the residuals r = (v₁ − a·δ − b·F, v₃ − S₃·F) and J = ((a, b), (0, S₃)), the
+problem reduces to
 
     minimise  Σ rᵀ·W⁻¹·r,    W = J·diag(u_δ², u_F²)·Jᵀ + diag(u_v₁², u_v₃²)
 
-by Gauss-Newton; the derivative of r by (a, b, S₃) is made of the reading's own adjusted
-(δ̂, F̂), the best guess of what was true. Ordinary least squares has the measured ones
-there instead, whence its bias. Only the ratios of the variances matter for the figures;
-their errors come from the residuals.
+by Gauss-Newton. The derivative of r by (a, b, S₃) uses the adjusted (δ̂, F̂), the estimates of the
+true values. Ordinary least squares uses the measured ones instead, which causes its bias. The
+estimates depend only on the ratios of the variances; their errors are from the residuals.
 
-Where forces are held on other controls of the same structure, each is one more true value to
-adjust and one more figure: r₁ = v₁ − a·δ − b·F − Σ_j c_j·F_j, and K_j = −c_j/a.
+Each force held on another control of the same structure adds one true value and one parameter:
+r₁ = v₁ − a·δ − b·F − Σ_j c_j·F_j, and K_j = −c_j/a.
 """
 
 from __future__ import annotations
@@ -31,14 +30,14 @@ from coupled.calibration.sandwich import Sandwich, sandwich
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 100
-FINEST = 1e-6  # of the largest voltage: no meter is better, and W stays regular
+FINEST = 1e-6  # of the largest voltage: least error of a meter, which keeps W regular
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """S₁ and K (`line`) and S₃ in V/N, found together; `errors` are those of (a, b, S₃, c…).
+    """S₁ and K (`line`) and S₃ in V/N, fitted together; `errors` are those of (a, b, S₃, c…).
 
-    `others`: {another control: K_j in d/N that a force on it bends here}.
+    `others`: {another control: the bend K_j in d/N by a force on it}.
     """
 
     line: LineFit
@@ -47,7 +46,7 @@ class JointFit:
     others: Mapping[str, Estimate]
 
     def estimate(self, value: float, by_s1: float, by_bend: float, by_s3: float) -> Estimate:
-        """Return a figure made of S₁, K and S₃, whose derivatives by them are given."""
+        """Return a function of S₁, K and S₃ with its error, from its derivatives."""
         a, b = self.line.s1.value, -self.line.bend.value * self.line.s1.value
         slope = np.zeros(len(self.errors.back))
         slope[:3] = by_s1 + by_bend * b / a**2, -by_bend / a, by_s3
@@ -55,7 +54,7 @@ class JointFit:
 
     @property
     def correlation(self) -> Floats:
-        """The correlation of the errors of S₁, K and S₃, shape (3, 3); 0 where there are none."""
+        """The correlation of the errors of S₁, K and S₃, shape (3, 3); 0 for zero errors."""
         a, b = self.line.s1.value, -self.line.bend.value * self.line.s1.value
         slopes = np.array([[1.0, 0.0, 0.0], [b / a**2, -1.0 / a, 0.0], [0.0, 0.0, 1.0]])
         found = slopes @ self.errors.covariance[:3, :3] @ slopes.T
@@ -65,9 +64,9 @@ class JointFit:
 
 
 def errors_in_variables(readings: Readings, instruments: Instruments) -> JointFit:
-    """Return the fit that allows for errors of δ, F, v₁ and v₃.
+    """Return the fit with errors of δ, F, v₁ and v₃.
 
-    Raises FloatingPointError where it does not settle.
+    Raises FloatingPointError if it does not converge.
     """
     force, v3 = readings.force, readings.v3
     columns = np.column_stack((readings.deflection, force, readings.others))
@@ -94,7 +93,7 @@ def errors_in_variables(readings: Readings, instruments: Instruments) -> JointFi
 
 
 def _settled(figures: Floats, columns: Floats) -> Floats:
-    """Return the steps of the figures too small to matter; a c may truly be nought."""
+    """Return the step sizes at which the fit has converged; a c may truly be zero."""
     least = 1e-12 * np.abs(figures)
     size = np.max(np.abs(columns), axis=0, initial=1e-300)
     least[3:] = np.maximum(least[3:], 1e-12 * abs(figures[0]) * size[0] / size[2:])
@@ -145,5 +144,5 @@ def reading_variances(readings: Readings, instruments: Instruments) -> Floats:
 def expected_design(
     readings: Readings, instruments: Instruments, figures: Sequence[float]
 ) -> Floats:
-    """Return the whitened derivatives, shape (n, 2, p), at readings that are true: for a plan."""
+    """Return the whitened derivatives, shape (n, 2, p), at error-free readings: for a plan."""
     return _whitened(np.array(figures), readings, instruments)[0]

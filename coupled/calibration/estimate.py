@@ -1,4 +1,4 @@
-"""A figure with its standard error and 95 % interval, and the errors of the instruments."""
+"""An estimate with its standard error and 95 % interval, and the errors of the instruments."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COVERAGE = 0.95
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure, its standard error, the degrees of freedom of that, and a 95 % interval."""
+    """An estimate, its standard error with its degrees of freedom, and a 95 % interval."""
 
     value: float
     error: float
@@ -39,7 +39,7 @@ class Estimate:
         return self.value + self.half_width
 
     def holds(self, true: float) -> bool:
-        """Return whether the interval holds a value."""
+        """Return whether the interval contains a value."""
         return self.low <= true <= self.high
 
     def scaled(self, factor: float) -> Estimate:
@@ -47,13 +47,13 @@ class Estimate:
         return Estimate(factor * self.value, abs(factor) * self.error, self.freedom)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON takes it."""
+        """Return the JSON."""
         ends = {"low": self.low, "high": self.high}
         return {"value": self.value, "standard_error": self.error, **ends}
 
 
 def mean_of(values: Floats) -> Estimate:
-    """Return the mean of independent values, with the error that their scatter shows."""
+    """Return the mean of independent values, with the error from their scatter."""
     n = len(values)
     return Estimate(float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(n)), n - 1.0)
 
@@ -79,11 +79,11 @@ def _joined(value: float, first: Estimate, second: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class Instruments:
-    """What ruler, spring scale, voltmeter and hand err by.
+    """The errors of ruler, spring scale, voltmeter and hand.
 
-    `ruler` in d, `scale` in N and `meter` in V are standard deviations of a reading, apart
-    from rounding to the `_step`; `hand` is the share by which a held force wanders (standard
-    deviation) from one instrument's reading to the next.
+    `ruler` in d, `scale` in N and `meter` in V are standard deviations of a reading without the
+    rounding to the `_step`; `hand` is the relative standard deviation of a held force between two
+    readings.
     """
 
     ruler: float
@@ -95,15 +95,15 @@ class Instruments:
     meter_step: float
 
     def deflection_variance(self, deflection: Floats, looks: Floats | float = 1.0) -> Floats:
-        """Return the variance of the mean of so many looks at the ruler, d².
+        """Return the variance of the mean of `looks` readings of the ruler, d².
 
-        Own error, rounding, wander.
+        It includes error, rounding and the hand's variation.
         """
         own = self.ruler**2 + self.ruler_step**2 / 12.0
         return np.asarray((own + (self.hand * deflection) ** 2) / looks)
 
     def force_variance(self, force: Floats, looks: Floats | float = 1.0) -> Floats:
-        """Return the variance of the mean of so many looks at the spring scale, N²."""
+        """Return the variance of the mean of `looks` readings of the spring scale, N²."""
         own = self.scale**2 + self.scale_step**2 / 12.0
         return np.asarray((own + (self.hand * force) ** 2) / looks)
 
@@ -116,9 +116,9 @@ class Instruments:
 def usual_instruments(control: str) -> Instruments:
     """Return a careful person's instruments.
 
-    A ruler read to half a millimetre (a protractor to half a degree), a spring scale to half
-    a newton, a voltmeter to 10 mV of 100 V, and a hand that wanders by 0.3 %: chosen, no
-    source gives them.
+    A ruler read to half a millimetre (a protractor to half a degree), a spring scale to half a
+    newton, a voltmeter to 10 mV of 100 V, and a hand that varies by 0.3 %. The values are chosen,
+    not from a source.
     """
     ruler = 0.2 * DEGREE_rad if control == "wheel" else 0.3e-3
     ruler_step = 0.5 * DEGREE_rad if control == "wheel" else 0.5e-3

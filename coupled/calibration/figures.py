@@ -1,4 +1,4 @@
-"""The figures of a calibration for people: with units and intervals, and what to say of them."""
+"""The results of a calibration as text: values with units and intervals, and remarks."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from coupled.calibration.estimate import Estimate
     from coupled.calibration.result import CalibrationResult
 
-CREEP = 3.0  # standard errors of the mean rise that are no chance
-LARGE, SMALL = 2.0, 0.4  # residuals over the instruments' errors that call for a word
+CREEP = 3.0  # standard errors from which the mean rise is significant
+LARGE, SMALL = 2.0, 0.4  # residuals over the instruments' errors, beyond which a remark is printed
 
 
 HEADS = ("value", "std. error", "95 % interval")
@@ -24,9 +24,9 @@ Row = tuple[str, str, str, str]
 
 
 def rows(found: CalibrationResult, system: System = "si") -> Iterator[Row]:
-    """Yield each figure: its label with the unit, value, standard error and 95 % interval.
+    """Yield each result: its label with the unit, value, standard error and 95 % interval.
 
-    K is given in in/lb (°/lb), too, in which its formulas were printed.
+    K is given in in/lb (°/lb) as well, the unit of its printed formulas.
     """
     d, bend = unit_of(found.control), found.line.bend
     s1, s3, own = (in_system(text, system) for text in (f"V/{d}", "V/N", f"{d}/N"))
@@ -53,7 +53,7 @@ def rows(found: CalibrationResult, system: System = "si") -> Iterator[Row]:
 
 
 def basis(found: CalibrationResult) -> str:
-    """Return what the figures are of: how many readings, of what."""
+    """Return the number and kind of the readings."""
     sets, at = len(set(found.readings.label)), found.readings.row
     text = f"{found.count} readings of the {found.control} in {sets} gradient sets"
     return f"{text}, rows {at[0]} to {at[-1]}; S1 and K with errors in all variables"
@@ -66,7 +66,7 @@ def _row(name: str, estimate: Estimate) -> Row:
 
 
 def written(value: float, error: float) -> str:
-    """Return a number to a tenth of its standard error, nine figures at most."""
+    """Return a number to a tenth of its standard error, with nine digits at most."""
     if value == 0.0:
         return "0"
     figures = 9
@@ -76,7 +76,7 @@ def written(value: float, error: float) -> str:
 
 
 def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
-    """Return the sentences: residuals, which fit to use, what was left out, what it is worth."""
+    """Return remarks on residuals, the choice of the fit, excluded readings and accuracy."""
     line, plain = found.line, found.plain
     size = np.abs(line.residual)
     row = found.readings.row[int(np.argmax(size))]
@@ -96,12 +96,12 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
         off = (plain.bend.value - line.bend.value) / line.bend.error
         lines.append(
             f"Ordinary least squares takes ruler and scale as exact, which biases it: its K is"
-            f" {off:+.2f} standard errors off. Use the figures with errors in all variables;"
-            " the ordinary ones only where the voltmeter alone errs, or beside an old fit."
+            f" {off:+.2f} standard errors off. Use the fit with errors in all variables;"
+            " the ordinary one only if the voltmeter alone errs, or to compare with an old fit."
         )
     for s in found.suspects:
         lines.append(
-            f"row {s.row} is left out: {s.columns} is {s.deviations:.0f} standard deviations"
+            f"row {s.row} is excluded: {s.columns} is {s.deviations:.0f} standard deviations"
             " off, mistyped?"
         )
     lines += _creep_lines(found, system) + _accuracy_lines(found, system) + _arc_lines(found)
@@ -110,7 +110,7 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
 
 
 def _creep_lines(found: CalibrationResult, system: System) -> list[str]:
-    """Return what the second looks show of a control that crept, and a null from one side."""
+    """Return remarks on a control that creeps between readings, and on nulls from one side."""
     lines = []
     d, factor, unit = unit_of(found.control), 1000.0, "mm"
     if d == "rad":
@@ -122,30 +122,31 @@ def _creep_lines(found: CalibrationResult, system: System) -> list[str]:
     if len(rise) > 2:
         error = float(np.std(rise, ddof=1) / np.sqrt(len(rise)))
         mean = float(np.mean(rise))
-        text = f"ruler's second look less its first: {factor * mean:+.2g} {unit} on the mean"
+        text = f"ruler's second reading less its first: {factor * mean:+.2g} {unit} on average"
         text += f" (std. error {factor * error:.1g})"
         if abs(mean) > CREEP * error > 0.0:
-            text += "; the control creeps while it is read, their mean allows for it"
+            text += "; the control creeps between the readings, and their mean is used"
         lines.append(text)
     if found.one_sided:
         lines.append(
-            "The nulls are not four or more from both sides, and the control has friction: S2 is"
-            " widened for what a wandering hand does then. Take more from beyond (approach: in)."
+            "The control has friction, and there are fewer than four nulls, or nulls from one side"
+            " only: the interval of S2 includes the hand's variation. Add nulls from beyond"
+            " (approach: in)."
         )
     return lines
 
 
 def _accuracy_lines(found: CalibrationResult, system: System) -> list[str]:
-    """Return what the figures give to those who fly with them."""
+    """Return the accuracy of a rig compensated with these results."""
     if found.accuracy is None or found.accuracy.deflection.error == 0.0:
         return []
     off, felt = found.accuracy.deflection, found.accuracy.felt
     unit = in_system(f"N/{unit_of(found.control)}", system)
     gradient = f"{unit.written(found.accuracy.gradient)} {unit.unit}"
-    text = f"compensated with these, at {gradient} the aircraft gets the deflection to within"
+    text = f"compensated with these, at {gradient} the deflection is within"
     text += f" {100 * off.half_width:.2g} %"
     if felt is not None:
-        text += f" and the hand the gradient to within {100 * felt.half_width:.2g} %"
+        text += f" and the felt gradient within {100 * felt.half_width:.2g} %"
     return [f"{text} (95 %)"]
 
 

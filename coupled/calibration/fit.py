@@ -1,8 +1,8 @@
 """The report's fit, v₁ = a·δ + b·F: S₁ = a, K = −b/S₁ (eqs. (2) to (5), appendix A).
 
-Ordinary least squares by the printed normal equations and by a QR factorisation of
-scaled columns. It takes δ and F as exact, which they are not: see errors_in_variables.
-Forces held on other controls of the same structure are further columns,
+Ordinary least squares by the printed normal equations and by a QR factorisation of scaled columns.
+It neglects the errors of δ and F (see `errors_in_variables`). Forces held on other controls of the
+same structure are further columns,
 
     v₁ = S₁·(δ − K·F − Σ_j K_j·F_j) = a·δ + b·F + Σ_j c_j·F_j,    K_j = −c_j/a
 """
@@ -24,10 +24,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LineFit:
-    """S₁ in V/d and K in d/N, with what tells how far to trust them.
+    """S₁ in V/d and K in d/N, with measures of their quality.
 
     `residual` is v₁ read less v₁ fitted, V; `correlation` that of the errors of S₁ and K;
-    `excess` the residuals' size over what the instruments' errors explain.
+    `excess` the residuals over the instruments' errors.
     """
 
     s1: Estimate
@@ -59,7 +59,7 @@ def condition(deflection: Floats, force: Floats) -> float:
 
 
 def ordinary(readings: Readings, instruments: Instruments) -> LineFit:
-    """Return the ordinary least-squares fit; its standard errors come from its residuals."""
+    """Return the ordinary least-squares fit, with standard errors from its residuals."""
     deflection, force, v1 = readings.deflection, readings.force, readings.v1
     design = np.column_stack((deflection, force, readings.others))
     found = solve(design, v1)
@@ -72,7 +72,7 @@ def ordinary(readings: Readings, instruments: Instruments) -> LineFit:
 def error_variance(
     a: float, b: float, readings: Readings, instruments: Instruments, c: Sequence[float] = ()
 ) -> Floats:
-    """Return the variance of a·δ + b·F + Σ c·F_j − v₁ that the instruments give a reading, V²."""
+    """Return the variance of a·δ + b·F + Σ c·F_j − v₁ from the instruments' errors, V²."""
     crossed = 0.0
     if len(c):
         crossed = instruments.force_variance(readings.others) @ np.square(np.array(c))
@@ -85,9 +85,9 @@ def error_variance(
 
 
 def line_fit(a: float, b: float, errors: Sandwich, residual: Floats, variance: Floats) -> LineFit:
-    """Return S₁ and K = −b/a of a fit whose first two figures are a and b: eqs. (5a) and (5b).
+    """Return S₁ and K = −b/a of a fit whose first two parameters are a and b: eqs. (5a) and (5b).
 
-    `residual` of v₁ in V, and the `variance` that the instruments give it in V².
+    `residual` of v₁ in V, and its `variance` from the instruments' errors in V².
     """
     n, more = len(residual), len(errors.back) - 2
     slopes = np.array([[1.0, 0.0], [b / a**2, -1.0 / a]])

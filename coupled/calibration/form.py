@@ -1,4 +1,4 @@
-"""A plan as a form to be filled in at the bench."""
+"""A plan of readings as a form to be filled in at the bench."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ def form(
     looks: int = 2,
     crossed: Mapping[ControlName, Sequence[float]] | None = None,
 ) -> str:
-    """Return a plan as a CSV to be filled in: where to hold, and empty cells to write into.
+    """Return a plan as a CSV to be filled in: what to hold, and empty cells.
 
-    `crossed` is what to hold on other controls, N, reading after reading.
+    `crossed` is what to hold on other controls, N, by reading.
     """
     others = dict(crossed or {})
     unit = unit_of(control)
@@ -35,11 +35,11 @@ def form(
     return "\n".join(lines) + "\n"
 
 
-_STARTING_LOADS = (0.25, 0.5, 0.75, 1.0)  # of the most that is pulled, in each gradient set
+_STARTING_LOADS = (0.25, 0.5, 0.75, 1.0)  # of the largest pull, in each gradient set
 
 
 def starting_form(control: str, inches: bool = False) -> str:
-    """Return a form for a loader of which nothing is known yet, as a CSV with empty cells.
+    """Return a form for an unknown loader, as a CSV with empty cells.
 
     Two gradient sets, each pulled at four loads, and four nulls from both sides (eq. 14). A
     wheel's deflection is in degrees; otherwise it is in mm and newtons, or inches and pounds.

@@ -1,14 +1,14 @@
-"""Mass, damping and lead that go with the gradient, so that a release is as specified.
+"""Mass, damping and lead scheduled by the gradient, so that a release is as specified.
 
-Eq. (12) makes the loader swing faster than specified, and a control let go springs back by its
-structure's bend at once: to δ·(1 − K·G_T), from rest. The rigid one that is specified falls
-through 90 % of its displacement with some speed already, and Part 60 counts from there. So
+Eq. (12) makes the loader oscillate faster than specified, and a released control springs back by
+the bend of its structure at once: to δ·(1 − K·G_T), from rest. The specified, rigid control passes
+90 % of its displacement with some speed, and Part 60 counts from there. So
 
     f_m = f_c = 1/(1 − K̂·G_T)                   frequency and damping ratio as specified
     T ≈ √(2·K̂·G_T − (K̂·G_T)²)·√(m/G_T)         the speed that an undamped motion has there
 
-with T sought in simulation so that the first crossing of zero comes when specified: the servo's
-lag asks for more. A control that does not swing needs none.
+T is found in simulation such that the first zero crossing is at the specified time, since the
+servo's lag requires more. An overdamped control needs none.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ from coupled.rig.equations import specified_gradient, total_to_computed
 from coupled.rig.rig import Rig
 
 Row = tuple[float, float, float]  # G_T in N/d, the factor on m and c, T in s
-LATE = 0.06  # of the first crossing, within the rule's 10 %: less lead, less overshoot
+LATE = 0.06  # of the first crossing, within the rule's 10 %: a smaller lead overshoots less
 _LONGEST_s = 0.2
 
 
 def scheduled(rig: Rig, control: ControlName) -> Rig:
-    """Return a compensated rig whose mass, damping and lead go with the gradient specified.
+    """Return a compensated rig with mass, damping and lead scheduled by the specified gradient.
 
-    They stand at the least, middle and greatest gradient of its schedule, where the checks are
-    made.
+    The table has the least, middle and greatest gradient of its schedule, as the checks do.
     """
     specified = specified_rig(rig.only(control))
     rows = [_row(rig, control, q, specified) for q in feel_pressures(specified, control)]
@@ -41,7 +40,7 @@ def scheduled(rig: Rig, control: ControlName) -> Rig:
 
 
 def with_rows(rig: Rig, control: ControlName, rows: list[Row]) -> Rig:
-    """Return the rig with the table of those rows, rising; a single one holds everywhere."""
+    """Return the rig with a table of rows by rising gradient; a single row applies everywhere."""
     if len(rows) == 1:
         rows = [rows[0], (rows[0][0] + 1.0, *rows[0][1:])]
     key = f"controls.{control}.compensation"

@@ -1,10 +1,10 @@
-"""Which readings to take: at which gradients and deflections, and how many.
+"""A plan of readings: gradients, deflections and numbers.
 
-The error of K follows from the design before anything is read: with information
-M = Σ Xᵀ·X over the readings' whitened derivatives X by (a, b, S₃), its variance is
-cᵀ·M⁻¹·c, c the derivative of K = −b/a. Only two corners matter to it, the softest
-gradient at full travel and the stiffest at full force; what lies between shows whether the
-bend is straight. The interval has the degrees of freedom that a fit of the design has.
+The error of K follows from the design: with the information M = Σ Xᵀ·X over the readings' whitened
+derivatives X by (a, b, S₃), its variance is cᵀ·M⁻¹·c, c being the derivative of K = −b/a. Only two
+corners of the design matter: the softest gradient at full travel and the stiffest at full force.
+Readings in between show whether the bend is straight. The interval has the degrees of freedom of a
+fit to the design.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from coupled.rig.statics import static_line, static_point
 
 Floats = NDArray[np.float64]
 STRONGEST_N = 150.0  # two thirds of what 14 CFR 25.143(d) allows one hand for a short time
-NEAREST, FARTHEST = 0.4, 1.0  # deflections within what travel and force allow, as shares
+NEAREST, FARTHEST = 0.4, 1.0  # deflections, as shares of what travel and force allow
 FULL_TRAVEL = 0.95
-_LEAVES = 1e-6  # of that, δc of a loader that has just left its breakout
+_LEAVES = 1e-6  # of full travel, δc of a loader that has just left its breakout
 MOST_READINGS = 400
-FINEST = 100.0  # times an instrument may err less: 3 µm for 0.3 mm
+FINEST = 100.0  # largest factor by which an instrument may be better: 3 µm for 0.3 mm
 NORMAL_95 = 1.96
-USUAL_LOSS = 0.1  # K·G taken at the stiffest gradient where the host assumes no K yet
+USUAL_LOSS = 0.1  # K·G at the stiffest gradient, if the host assumes no K yet
 
 
 @dataclass(frozen=True)
 class Station:
-    """Where a reading is taken: gradient set, the q̄ that gives it, δ in d and F in N there."""
+    """A point of a plan: gradient set, the q̄ that gives it, δ in d and F in N."""
 
     label: str
     pressure_Pa: float
@@ -52,9 +52,9 @@ class Station:
 
 @dataclass(frozen=True)
 class Precision:
-    """What a design gives: readings, and K's standard error and half of its 95 % interval.
+    """The precision of a design: readings, and K's standard error and half 95 % interval.
 
-    Both as shares of `bend`, the K in d/N that was assumed.
+    Both are relative to `bend`, the K in d/N that was assumed.
     """
 
     readings: int
@@ -64,13 +64,13 @@ class Precision:
 
 
 def gradient_sets(rig: Rig, control: ControlName, count: int) -> list[tuple[float, float]]:
-    """Return (q̄ in Pa, G_T in N/d) of so many gradients, even from the schedule's least to most."""
+    """Return (q̄ in Pa, G_T in N/d) of evenly spaced gradients over the schedule's range."""
     table = rig.controls[control].schedule
     pressures, gradients = np.array(table.dynamic_pressure), np.array(table.total_gradient)
     low, high = int(np.argmin(gradients)), int(np.argmax(gradients))
     if gradients[high] <= gradients[low] * (1.0 + 1e-6):
         key = f"controls.{control}.schedule"
-        problem = "has one gradient only, and one cannot tell S1 from K; give it a second"
+        problem = "has one gradient only, which does not separate S1 from K; give a second"
         raise InputError(rig.name, key, problem)
     way = slice(low, high + 1) if low < high else slice(high, low + 1)
     fine = np.linspace(pressures[way][0], pressures[way][-1], 4001)
@@ -90,7 +90,7 @@ def stations(
     deflections: int,
     strongest_N: float = STRONGEST_N,
 ) -> list[Station]:
-    """Return a grid: so many gradients, each at as many deflections as hand and travel allow."""
+    """Return a grid of gradients and deflections, as far as hand and travel allow."""
     grid = []
     for number, (pressure, gradient) in enumerate(gradient_sets(rig, control, gradients), start=1):
         full = _reach(rig, control, pressure, strongest_N)
@@ -103,7 +103,7 @@ def stations(
 
 
 def _reach(rig: Rig, control: ControlName, pressure: float, strongest_N: float) -> float:
-    """Return how far out a control can be held with so many N, d."""
+    """Return how far a control can be held with this force, d."""
     full = FULL_TRAVEL * rig.controls[control].travel
 
     def excess(deflection: float) -> float:
@@ -125,9 +125,9 @@ def precision(
     instruments: Instruments,
     looks: int = 2,
 ) -> Precision:
-    """Return what a design gives, for the K that the host assumes or a usual one.
+    """Return the precision of a design, for the K that the host assumes or a usual one.
 
-    `looks`: how often ruler and scale are read.
+    `looks`: number of readings of ruler and scale.
     """
     rows, c, bend = _rows(rig, control, design, instruments, looks)
     return _precision(rows, c, bend)
@@ -141,9 +141,10 @@ def fewest(
     strongest_N: float = STRONGEST_N,
     looks: int = 2,
 ) -> list[tuple[Station, int]]:
-    """Return the fewest readings whose 95 % interval of K is ± this share of it, by station.
+    """Return the fewest readings for a 95 % interval of K of ± this share, by station.
 
-    Each in turn is the one that helps most. Raises InputError where very many do not do.
+    Readings are added one by one, each with the largest gain. Raises InputError if
+    `MOST_READINGS` are not enough.
     """
     grid = stations(rig, control, 5, 4, strongest_N)
     rows, c, bend = _rows(rig, control, grid, instruments, looks)
@@ -162,11 +163,11 @@ def fewest(
 
 
 def _ends(rows: Floats) -> list[int]:
-    """Return the two readings that tell most of a, b and S₃ together: far out, at full force."""
+    """Return the two readings that determine a, b and S₃ best: far out, and at full force."""
     ends = [int(np.argmax(rows[:, 0, 0])), int(np.argmax(rows[:, 1, 2]))]
     if ends[0] != ends[1]:
         return ends
-    # One place is both: the other is the one that makes the information's determinant largest.
+    # One station is both: the other one maximises the determinant of the information.
     own = np.einsum("nmp,nmq->npq", rows, rows)
     size = np.sqrt(np.diag(own[ends[0]])) + 1e-300
     together = np.linalg.det((own + own[ends[0]]) / np.outer(size, size))
@@ -174,7 +175,7 @@ def _ends(rows: Floats) -> list[int]:
 
 
 def _most_helpful(rows: Floats, information: Floats, c: Floats) -> int:
-    """Return which further reading makes K's variance least."""
+    """Return the further reading that reduces K's variance most."""
     lifted = rows @ np.linalg.inv(information)
     pull = lifted @ c
     inner = np.eye(rows.shape[1]) + lifted @ rows.transpose(0, 2, 1)
@@ -217,12 +218,12 @@ def _precision(rows: Floats, c: Floats, bend: float) -> Precision:
 
 @dataclass(frozen=True)
 class DeflectionNeeds:
-    """What it takes for a compensated rig's δ̂ to be within a share of δ, in 95 % of cases.
+    """Requirements for a compensated rig's δ̂ to be within a share of δ, in 95 % of cases.
 
-    `half_width` is what the design itself gives, at the gradient where that is most. Each of
-    the rest alone gets it to `wanted`: so many `readings`, spread as the design is; a ruler
-    that errs less by the factor `ruler`; or every instrument and the hand by `all`. None where
-    that alone does not do.
+    `half_width` is that of the design, at the gradient where it is largest. Each of the rest alone
+    reduces it to `wanted`: so many `readings`, distributed as in the design; a ruler with an error
+    smaller by the factor `ruler`; or all instruments and the hand by `all`. None if it does not
+    suffice.
     """
 
     wanted: float
@@ -240,7 +241,7 @@ def deflection_needs(
     looks: int = 2,
     wanted: float = DEFLECTION_WITHIN,
 ) -> DeflectionNeeds:
-    """Return what a design gives of δ̂, and what it would take to have it within `wanted`."""
+    """Return the precision of δ̂ with a design, and the requirements for `wanted`."""
     names = ("ruler", "ruler_step", "scale", "scale_step", "meter", "meter_step", "hand")
 
     def reached(times: int, factor: float = 1.0, finer: Sequence[str] = ()) -> float:
@@ -262,7 +263,7 @@ def deflection_needs(
 
 
 def _deflection_half_width(rig: Rig, control: ControlName, rows: Floats, bend: float) -> float:
-    """Return half of the 95 % interval of δ̂/δ, at the gradient where that is most."""
+    """Return half of the 95 % interval of δ̂/δ, at the gradient where it is largest."""
     if len(rows) < 3:
         return float("inf")
     errors, scales = sandwich(rows, np.zeros(rows.shape[:2])), real_scales(rig.controls[control])

@@ -1,8 +1,8 @@
-"""A control's checks as a qualification test guide has them.
+"""A control's checks in the form of a qualification test guide.
 
-A test is a row of the rule's table, a case of it a dynamic pressure; each has its conditions, its
-tolerances and its results. Numbers are those of 14 CFR Part 60, appendix A, table A2A: 2.a is
-static, 2.b let go.
+A test is a row of the rule's table, a case of it a dynamic pressure, with its conditions,
+tolerances and results. Numbers are those of 14 CFR Part 60, appendix A, table A2A: 2.a is static,
+2.b a release.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ Rows = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Issue:
-    """What a document is of, and which issue: all but the hash as its user gives it.
+    """The subject and issue of a document; all but the hash is given by the user.
 
-    A date is given, never taken from a clock: the same rig gives the same document.
+    The date is not taken from a clock, so that the same rig gives the same document.
     """
 
     rig_file: str
@@ -51,7 +51,7 @@ class Issue:
 
 @dataclass(frozen=True)
 class FeelTest:
-    """One case of one test: where it is taken, how, and what it gives."""
+    """One case of one test: its conditions, method and results."""
 
     number: str
     title: str
@@ -69,12 +69,12 @@ class FeelTest:
 
 
 def written(number: float) -> str:
-    """Return a number in three figures, or to a whole where it is large."""
+    """Return a number in three digits, or as an integer if it is large."""
     return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
 
 
 def cover_rows(documents: Sequence[Documentation], issue: Issue, version: str) -> Rows:
-    """Return what a document's cover says, in rows of name and value."""
+    """Return the content of a document's cover, in rows of name and value."""
     rig = documents[0].rig
     return (
         ("rig", rig.name),
@@ -91,9 +91,9 @@ def cover_rows(documents: Sequence[Documentation], issue: Issue, version: str) -
 
 
 def feel_tests(found: Documentation, reference: str) -> Iterator[FeelTest]:
-    """Yield a control's tests, the static ones first, a case a dynamic pressure.
+    """Yield a control's tests, the static ones first, a case for each dynamic pressure.
 
-    `reference` names what the results are held against.
+    `reference` names the reference of the results.
     """
     kinds: tuple[Kind, ...] = ("static", "release")
     for kind in kinds:
@@ -125,7 +125,7 @@ def _entry(control: ControlName, kind: Kind) -> str:
 
 
 def _conditions(found: Documentation, condition: FeelCondition) -> Iterator[tuple[str, str]]:
-    """Yield where the test is taken."""
+    """Yield the conditions of a test."""
     rig, data, d = found.rig, found.rig.controls[found.control], unit_of(found.control)
     pressure = condition.pressure_Pa
     airspeed = math.sqrt(2.0 * pressure / _SEA_LEVEL_kg_per_m3)
@@ -150,7 +150,7 @@ def _conditions(found: Documentation, condition: FeelCondition) -> Iterator[tupl
 
 
 def _method(kind: Kind, reference: str) -> Rows:
-    """Return how the test is taken, and what it is held against."""
+    """Return the method of a test, and its reference."""
     if kind == "static":
         how = f"from neutral to one stop, to the other and back in {SWEEP_s:g} s, at an even rate"
     else:
@@ -161,7 +161,7 @@ def _method(kind: Kind, reference: str) -> Rows:
 
 
 def _tolerances(found: Documentation, kind: Kind) -> Iterator[tuple[str, str]]:
-    """Yield what the rule allows."""
+    """Yield the tolerances of the rule."""
     if kind == "static":
         allowed = STATIC[found.control]
         yield "breakout", f"±{allowed.breakout_N:.1f} N ({allowed.breakout_N / POUND_N:g} lb)"

@@ -1,4 +1,4 @@
-"""Readings of one control in SI, as the fit takes them."""
+"""Readings of one control in SI, as input of the fit."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Readings:
-    """Readings in SI, a value a row: `deflection` in d, `force` in N, `v1` and `v3` in V.
+    """Readings in SI, a value for each row: `deflection` in d, `force` in N, `v1` and `v3` in V.
 
-    `row` is each one's row in its file, `label` its gradient set. `deflection` and `force`
-    are means where ruler and scale were read again after the meter; `…_rise` is by how much
-    the second look was more than the first, NaN where there was one. `null_…` are the rows of
-    the null: v1 and v3 are as noted with v2 = 0, v2 what brought v1 back, `null_side` +1 where
-    it was approached outward, −1 inward. `others` are the forces held on other controls of the
-    same structure meanwhile, N, shape (readings, len(`other_names`)), each looked at once.
+    `row` is the row in the file, `label` the gradient set. `deflection` and `force` are means if
+    ruler and scale were read again after the meter; `…_rise` is the second reading less the first,
+    NaN if there was one. `null_…` are the rows of the null: v1 and v3 as noted with v2 = 0, v2 that
+    restored v1, and `null_side`, +1 for an outward approach and −1 for an inward one. `others` are
+    the forces held on other controls of the same structure, N, shape (readings,
+    len(`other_names`)), each read once.
     """
 
     row: NDArray[np.int64]
@@ -41,16 +41,16 @@ class Readings:
 
     @property
     def deflection_looks(self) -> Floats:
-        """How many looks at the ruler are in each mean."""
+        """The number of readings of the ruler in each mean."""
         return np.where(np.isnan(self.deflection_rise), 1.0, 2.0)
 
     @property
     def force_looks(self) -> Floats:
-        """How many looks at the spring scale are in each mean."""
+        """The number of readings of the spring scale in each mean."""
         return np.where(np.isnan(self.force_rise), 1.0, 2.0)
 
     def without(self, rows: Sequence[int]) -> Readings:
-        """Return the readings that do not stand in these rows of the file."""
+        """Return the readings without these rows of the file."""
         keep, null = ~np.isin(self.row, rows), ~np.isin(self.null_row, rows)
         kept = {
             name: values[null if name.startswith("null_") else keep]

@@ -1,14 +1,13 @@
-"""Readings: a CSV that a person types, one row a reading, units in the columns' names.
+"""Readings files: a CSV typed by a person, one row for each reading, units in the columns' names.
 
     gradient_set, deflection_…, force_…, v1_V, v3_V    and, for the null of eq. (14), v2_V
 
-A ruler and a scale that were read again after the voltmeter have deflection_after_… and
-force_after_… as well; their means count. A row with v2_V was noted without the multiplier;
-v2 is the supply's voltage that then brought v1 back, `approach` the side it was approached
-from: out, or in, after going further. Its deflection and force may be left empty. Forces held
-on other controls of the same structure are further columns, force_on_wheel_N and the like, 0
-where nobody held it. Rows are
-numbered as a text editor does, the heads being row 1.
+If ruler and scale were read again after the voltmeter, there are deflection_after_… and
+force_after_… as well, and the means count. A row with v2_V was noted without the multiplier; v2 is
+the supply's voltage that restored v1, `approach` the side of the approach: out, or in, from
+beyond. Its deflection and force may be empty. Forces held on other controls of the same structure
+are further columns, force_on_wheel_N and the like, 0 if not held. Rows are numbered as in a text
+editor, the heads being row 1.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def _read_rows(
         same = seen.setdefault(tuple(cells.values()), number)
         with collected(faults):
             if same != number:
-                problem = f"is the same as row {same}; no two readings are, take one out"
+                problem = f"is the same as row {same}; no two readings are identical, remove one"
                 raise InputError(path, f"row {number}", problem)
             read.append(_read_row(path, number, cells, units, faults))
     return read
@@ -131,7 +130,7 @@ def _read_row(
                 value[quantity] = number_in(path, number, column, cells[column]) * factor
     whole = len(faults) == before
     if null and whole and 0.0 in (value["v2"], value["v3"]):
-        problem = "a null at 0 V tells nothing of S2; hold the control off neutral"
+        problem = "a null at 0 V does not determine S2; hold the control off neutral"
         raise InputError(path, f"row {number}", problem)
     side = _side(path, number, cells.get(APPROACH, "")) if null else None
     if "deflection" in value and "force" in value:
@@ -168,20 +167,20 @@ def _assembled(rows: list[_Row], others: list[str]) -> Readings:
 
 
 def _mean(value: Mapping[str, float], quantity: str) -> tuple[float, float]:
-    """Return the mean of the looks at an instrument, and the second less the first."""
+    """Return the mean of an instrument's readings, and the second less the first."""
     first, second = value[quantity], value.get(f"{quantity} after")
     return (first, math.nan) if second is None else (0.5 * (first + second), second - first)
 
 
 def _side(path: Path, row: int, word: str) -> float:
-    """Return from which side a null was approached: outward unless the file says in."""
+    """Return the side of a null's approach; outward by default."""
     if word not in ("", *SIDES):
         raise InputError(path, f"row {row}: {APPROACH}", f"{word!r} is neither out nor in")
     return SIDES.get(word, 1.0)
 
 
 def number_in(path: Path, row: int, column: str, cell: str) -> float:
-    """Return the number of a cell; raise InputError for what is none."""
+    """Return the number of a cell; raises InputError if it is not one."""
     place = f"row {row}: {column}"
     if not cell:
         raise InputError(path, place, "is empty; a reading has no gaps")
@@ -198,7 +197,7 @@ def number_in(path: Path, row: int, column: str, cell: str) -> float:
 
 
 def write_readings(path: Path, readings: Readings, control: str, inches: bool = False) -> None:
-    """Write readings, and those of the null below them, as `read_readings` takes them."""
+    """Write readings, and those of the null below them, in the format of `read_readings`."""
     if control == "wheel":
         columns = ("deflection_deg", "force_lb" if inches else "force_N")
     else:
@@ -230,7 +229,7 @@ def write_readings(path: Path, readings: Readings, control: str, inches: bool = 
 
 
 def _shown(number: float) -> str:
-    """Return a number as short as it reads back the same, tails of arithmetic cut off."""
+    """Return the shortest text of a number in 13 digits."""
     return repr(float(f"{number:.13g}"))
 
 

@@ -1,7 +1,7 @@
-"""Why a control's checks fail: what compensation cannot give back, and what is set otherwise.
+"""The reasons of failed checks: limits of the compensation, and wrong settings of the host.
 
-What a rig file says of its hardware and its host suffices for these; what it does not say, as a
-fault that nobody knows of, a record of the rig shows to a diagnosis.
+They are found from the rig file alone. A fault that the file does not state is found by a diagnosis
+of a record.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 _FORCE = ("force", "breakout")
 _SURFACE = "surface"
-_SAME = 0.02  # of K: a host's K̂ that is nearer is as good as right
+_SAME = 0.02  # relative error of K̂ that is negligible
 
 
 def reasons(
     rig: Rig, name: ControlName, checks: Sequence[ControlCheck], system: System = "si"
 ) -> list[str]:
-    """Return why checks of a rig's control fail, a sentence each; none where all pass."""
+    """Return why checks of a rig's control fail, a sentence each; empty if all pass."""
     failed = [check for check in checks if not check.passed]
     if not failed:
         return []
@@ -35,8 +35,8 @@ def reasons(
         sentences += _of_the_bend(control, failed, in_system("N", system))
     if not sentences:
         sentences = [
-            "The rig file does not say why; docs/calibration.md has a table of which fault fails"
-            " which check, and coupled diagnose finds it in a record."
+            "The rig file does not show the reason. docs/calibration.md has a table of faults by"
+            " failed check, and coupled diagnose finds them in a record."
         ]
     return sentences
 
@@ -46,14 +46,15 @@ def _of_the_host(control: Control, bent: Shown) -> list[str]:
     host, bend, sensing = control.compensation, control.loader.bend, control.sensing
     found = []
     if bend > 0.0 and not host.gradient:
-        found.append("The gradient's correction is off, so the bent structure makes the feel soft.")
+        found.append(
+            "The gradient's correction is off, so the bend of the structure softens the feel."
+        )
     if bend > 0.0 and not host.deflection:
         found.append("The deflection's correction is off, so the surface lacks the bend K·F.")
     if (host.gradient or host.deflection) and abs(host.bend - bend) > _SAME * max(bend, host.bend):
         found.append(
-            f"The host takes K for {bent.written(host.bend)} {bent.unit}, and the structure has"
-            f" {bent.written(bend)}:"
-            " coupled calibrate finds it."
+            f"The host assumes K = {bent.written(host.bend)} {bent.unit}, and the structure has"
+            f" {bent.written(bend)}: coupled calibrate finds it."
         )
     scales = {
         "computed_scale": sensing.computed_scale,
@@ -68,16 +69,16 @@ def _of_the_host(control: Control, bent: Shown) -> list[str]:
 
 
 def _of_the_bend(control: Control, failed: Sequence[ControlCheck], force: Shown) -> list[str]:
-    """Return what a bent structure does that eq. (12) does not give back."""
+    """Return effects of a bent structure that eq. (12) does not correct."""
     found = []
     timed = any(not check.name.startswith((*_FORCE, _SURFACE)) for check in failed)
     if timed and control.compensation.gradient and not control.compensation.force_lead:
         found.append(
-            "A release: let go, the grip springs back by the structure's bend K·F at once, and"
-            " starts from there at rest, so what is counted from 90 % of the displacement comes"
-            " late; then it swings faster than specified, since eq. (12) makes the loader's spring"
-            " stiffer. Mass, damping and lead that go with the gradient put it right: coupled"
-            " document RIG --write NEW.toml."
+            "Release: the grip springs back by the structure's bend K·F at once, and starts from"
+            " there at rest, so times from 90 % of the displacement are late. Then it oscillates"
+            " faster than specified, since eq. (12) makes the loader's spring stiffer. Mass,"
+            " damping and lead scheduled by the gradient correct both: coupled document RIG"
+            " --write NEW.toml."
         )
     pushed = any(check.name.startswith(_FORCE) for check in failed)
     if pushed and control.loader.breakout > 0.0:

@@ -1,4 +1,4 @@
-"""Readings that cannot be fitted, or tell too little: refused, with what would be right."""
+"""Refusal of insufficient or impossible readings, with advice."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from coupled.errors import InputError
 from coupled.record.channels import unit_of
 from coupled.rig.parameters import Control
 
-FEWEST = 4  # a line of two unknowns, and something left to tell their errors by
+FEWEST = 4  # readings: two unknowns, and degrees of freedom for their errors
 FEWEST_CROSSED = 2  # readings with a force on another control
-INSEPARABLE = 1e3  # condition of δ, F and the forces on others, each scaled
-FAR = 0.1  # of the largest: what lies nearer to neutral may have any sign
-BEYOND_TRAVEL = 1.5  # that much more travel than there is, and the unit is wrong
-SURELY = 0.999  # how sure it must be that the gradients differ
+INSEPARABLE = 1e3  # condition number of δ, F and the forces on others, each scaled
+FAR = 0.1  # of the largest; a smaller deflection may have any sign
+BEYOND_TRAVEL = 1.5  # of the travel; a larger deflection is in a wrong unit
+SURELY = 0.999  # confidence that the gradients differ
 
 
 def refuse_poor(
     readings: Readings, control: Control, name: str, instruments: Instruments, file: Path | str
 ) -> None:
-    """Raise InputError for readings too few, of one force or gradient, of a wrong sign or unit."""
+    """Raise InputError for too few readings, one force or gradient, a wrong sign or unit."""
     n, force, deflection = len(readings.row), readings.force, readings.deflection
     if n < FEWEST:
         raise InputError(
@@ -56,7 +56,7 @@ def refuse_poor(
 
 
 def _refuse_others(readings: Readings, file: Path | str) -> None:
-    """Refuse forces on other controls that were never held, or only with this one's own."""
+    """Refuse forces on other controls that are zero, or collinear with this control's own."""
     for name, held in zip(readings.other_names, readings.others.T, strict=True):
         if np.count_nonzero(held) < FEWEST_CROSSED:
             problem = f"is not 0 in {np.count_nonzero(held)} rows; {FEWEST_CROSSED} at least"
@@ -72,10 +72,10 @@ def _refuse_others(readings: Readings, file: Path | str) -> None:
 
 
 def _refuse_signs(readings: Readings, control: Control, name: str, file: Path | str) -> None:
-    """Refuse what a wrong sign or unit gives, by its row."""
+    """Refuse rows with a wrong sign or unit."""
     deflection, force = readings.deflection, readings.force
     far = np.abs(deflection) > FAR * np.max(np.abs(deflection))
-    far &= np.abs(force) > FAR * np.max(np.abs(force))  # friction may turn a small force
+    far &= np.abs(force) > FAR * np.max(np.abs(force))  # friction may reverse a small force
     against = far & (deflection * force < 0.0)
     if against.any():
         row = int(readings.row[np.argmax(against)])
@@ -95,7 +95,7 @@ def _refuse_signs(readings: Readings, control: Control, name: str, file: Path | 
 
 
 def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
-    """Return whether F = G·δ with one G is surely wrong."""
+    """Return whether F = G·δ with one G is rejected (χ² test)."""
     deflection, force = readings.deflection, readings.force
     slope = float(force @ deflection / (deflection @ deflection))
     ruler = instruments.deflection_variance(deflection, readings.deflection_looks)
@@ -106,7 +106,7 @@ def _gradients_differ(readings: Readings, instruments: Instruments) -> bool:
 
 
 def _separating(control: Control, slope: float, strongest: float, d: str) -> str:
-    """Return, for a message, the reading that would separate S₁ and K best."""
+    """Return, for a message, the reading that separates S₁ and K best."""
     gradients = np.array(control.schedule.total_gradient)
     other = float(gradients[np.argmax(np.abs(gradients - slope))])
     if abs(other - slope) < 0.02 * abs(slope):

@@ -1,4 +1,4 @@
-"""What readings tell of a control: S₁, S₂, S₃ and K, their errors, and what they are made of."""
+"""The result of a calibration: S₁, S₂, S₃ and K of a control, with errors and readings."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CalibrationResult:
-    """What readings tell of a control.
+    """The result of a calibration.
 
-    `fit` allows for errors in all variables, `plain` is ordinary least squares, `printed`
-    (a, b) of the normal equations; `s3_mean` is eq. (13); `s2` each way to it; `accuracy` what
-    that makes of deflection and feel, None where no compensation can be given. `one_sided`:
-    nulls from one side only, on a control with friction. `readings` are those used, along the
-    arc; `level` as a level ruler read them, where they were corrected, and else None.
+    `fit` has errors in all variables, `plain` is ordinary least squares, `printed` (a, b) of the
+    normal equations. `s3_mean` is eq. (13), `s2` has each method for S₂. `accuracy` are the errors
+    of deflection and felt gradient, None if no compensation exists. `one_sided`: nulls from one
+    side only, on a control with friction. `readings` are those used, along the arc; `level` are the
+    level readings if they were corrected, else None.
     """
 
     control: str
@@ -63,7 +63,7 @@ class CalibrationResult:
 
     @property
     def s2_chosen(self) -> Estimate | None:
-        """S₂ as measured by the null, or else from a gain, or none."""
+        """S₂ by the null, otherwise from a gain, or None."""
         return next(reversed(self.s2.values()), None)
 
     @property
@@ -74,7 +74,7 @@ class CalibrationResult:
         return [int(r) for r in self.readings.row[np.abs(self.angle_rad) > arc.LIMIT_rad]]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures as JSON takes them, units in the names."""
+        """Return the JSON, with units in the names."""
         d = unit_of(self.control)
         fits = {"errors_in_variables": self.line, "ordinary_least_squares": self.plain}
         table: dict[str, Any] = {"control": self.control, "readings": self.count}

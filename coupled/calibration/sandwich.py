@@ -1,10 +1,10 @@
-"""Errors of a fit from its own residuals, honest for few and unevenly placed readings.
+"""Errors of a fit from its own residuals, valid for few and unevenly distributed readings.
 
-The sandwich with each reading's residuals weighed up by its leverage, (I − H)^−½, and the
-degrees of freedom of its variance by Satterthwaite: Bell and McCaffrey's (Survey
-Methodology 28, 2002; Imbens and Kolesár, Review of Economics and Statistics 98, 2016). It
-holds even where the instruments err otherwise than stated. With all readings at two
-corners the degrees of freedom fall to about half of n − 2, as they must.
+The sandwich estimator with residuals scaled by their leverage, (I − H)^−½, and the degrees of
+freedom of its variance by Satterthwaite: Bell and McCaffrey (Survey Methodology 28, 2002; Imbens
+and Kolesár, Review of Economics and Statistics 98, 2016). It is valid even if the instruments'
+errors differ from those stated. With all readings at two corners the degrees of freedom fall to
+about half of n − 2.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sandwich:
-    """Errors of a fit's p figures; in the basis q of its whitened design.
+    """Errors of a fit's p parameters, in the basis q of its whitened design.
 
-    `q` has shape (readings, residuals a reading, p), `lifted` is q by (I − H)^−½, `middle`
-    the scatter in that basis, `back` leads from the basis to the figures.
+    `q` has shape (readings, residuals of a reading, p), `lifted` is (I − H)^−½·q, `middle` the
+    scatter in that basis, `back` transforms from the basis to the parameters.
     """
 
     q: Floats
@@ -34,11 +34,11 @@ class Sandwich:
 
     @property
     def covariance(self) -> Floats:
-        """The covariance of the figures, shape (p, p)."""
+        """The covariance of the parameters, shape (p, p)."""
         return np.asarray(self.back @ self.middle @ self.back.T)
 
     def freedom(self, slope: Floats) -> float:
-        """Return the degrees of freedom of the variance of slope·figures."""
+        """Return the degrees of freedom of the variance of slope·parameters."""
         share = self.lifted @ (self.back.T @ slope)
         own = np.sum(share**2, axis=1)
         pulled = np.einsum("nmp,nm->np", self.q, share)
@@ -48,7 +48,7 @@ class Sandwich:
         return max(trace**2 / float(squares), 1.0) if squares > 0.0 else 1.0
 
     def estimate(self, value: float, slope: Floats) -> Estimate:
-        """Return a figure with its error: `slope` is its derivative by the fit's figures."""
+        """Return an estimate with its error; `slope` is its derivative by the parameters."""
         variance = float(slope @ self.covariance @ slope)
         return Estimate(value, float(np.sqrt(max(variance, 0.0))), self.freedom(slope))
 
@@ -56,8 +56,8 @@ class Sandwich:
 def sandwich(design: Floats, residual: Floats) -> Sandwich:
     """Return the errors of a least-squares fit.
 
-    `design`, shape (n, m, p), and `residual`, shape (n, m), are whitened, m a reading: those
-    of one reading may err together, different readings do not.
+    `design`, shape (n, m, p), and `residual`, shape (n, m), are whitened. The m residuals of a
+    reading may be correlated, those of different readings are not.
     """
     n, m, p = design.shape
     flat = design.reshape(n * m, p)

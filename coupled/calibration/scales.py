@@ -1,4 +1,4 @@
-"""S₃ by eq. (13), and S₂ both ways: from the internal gains, and by the null of eq. (14)."""
+"""S₃ by eq. (13), and S₂ by two methods: the internal gains, and the null of eq. (14)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def s3_by_ratios(force: Floats, v3: Floats) -> Estimate:
 
 
 def s2_from_gains(s1: Estimate, s3: Estimate, gains: Gains) -> dict[str, Estimate]:
-    """Return S₂ in V/N from each internal gain that is known: S₁/(S₁/S₂) and S₃/(S₃/S₂)."""
+    """Return S₂ in V/N from each known internal gain: S₁/(S₁/S₂) and S₃/(S₃/S₂)."""
     found = {}
     if gains.s1_over_s2 > 0.0:
         found[BY_S1] = s1.scaled(1.0 / gains.s1_over_s2)
@@ -32,11 +32,11 @@ def s2_by_null(
 ) -> Estimate:
     """Return S₂ in V/N as the mean of v₂/v₃, times S₃: eq. (14).
 
-    A hand that wanders works a control with friction onward, so that the supply has to reach
-    the hand's extreme force and not its mean: v₂/v₃ is too large where the null was approached
-    outward and as much too small where inward (`side` ±1). With both sides the difference is
-    fitted and drops out. With one, S₂ may be off by up to `one_sided_share` of itself, which
-    enters the error as an even distribution over ± that.
+    Variations of the hand force move a control with friction to the extreme of the force, so the
+    supply has to reach the extreme and not the mean: v₂/v₃ is too large for an outward approach
+    and too small by the same amount for an inward one (`side` ±1). With both sides the difference
+    is fitted and cancels. With one side, S₂ has a further error, uniform within ±
+    `one_sided_share` of itself.
     """
     ratio = v2 / v3
     if both_sides(side):
@@ -49,12 +49,12 @@ def s2_by_null(
 
 
 def both_sides(side: Floats) -> bool:
-    """Return whether nulls from both sides are enough to fit their difference."""
+    """Return whether nulls from both sides suffice to fit their difference."""
     return len(side) >= 4 and len(set(side.tolist())) == 2
 
 
 def _centre(values: Floats, side: Floats) -> Estimate:
-    """Return the centre between values from two sides, by least squares of centre and half gap."""
+    """Return the mean of both sides' values, by least squares of centre and half difference."""
     design = np.column_stack((np.ones_like(side), side))
     figures, *_ = np.linalg.lstsq(design, values, rcond=None)
     freedom = len(values) - 2.0

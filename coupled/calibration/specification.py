@@ -1,11 +1,11 @@
-"""What a control is specified to feel like: the reference of its checks.
+"""The specified force of a control: the reference of its checks.
 
-Static: the force that `specified_force` gives at each deflection, and the friction with the
-motion. Dynamic: the specified rig let go. The specified rig is what the host assumes, with a
-rigid structure, true scales and nothing amiss: the schedule's table as it is written, G_B and
-breakout as the host has them; mass, damping, friction and servo as the file has them, which
-says nothing else of them. A fault of those shows against another rig, or (static) against the
-aircraft's own forces, which are the reference where they are given (`aircraftdata`).
+Static: the force of `specified_force` at each deflection, plus friction along the motion. Dynamic:
+a release of the specified rig. The specified rig is the rig that the host assumes, rigid, with true
+scales and without faults: the schedule's table as filed, the host's G_B and breakout, and the
+filed mass, damping, friction and servo, for which there is no other value. Faults of the latter
+show only against another rig, or (static) against forces of the aircraft, which are the reference
+if given (`aircraftdata`).
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ POINTS = 401  # of a specified leg
 
 @dataclass(frozen=True)
 class SweepLeg:
-    """A quarter of a sweep, between neutral and a stop: δ in d, rising in size, F in N.
+    """A quarter of a sweep, between neutral and a stop: δ in d by rising size, F in N.
 
-    `surface` is the command that reaches the surface, about trim, of ±1. A leg that was `read` on
-    an aircraft is known at its own places only, and may be empty (`aircraftdata`).
+    `surface` is the command of the surface about trim, −1 to 1. A leg `read` on an aircraft is
+    known at its own deflections only, and may be empty (`aircraftdata`).
     """
 
     deflection: Floats
@@ -48,13 +48,13 @@ LEGS = {
 
 
 def specified_rig(rig: Rig) -> Rig:
-    """Return the rig as its host assumes it: rigid, true in every scale, with nothing amiss."""
+    """Return the rig as its host assumes it: rigid, with true scales, without faults."""
     changes = {f"controls.{name}": _specified(data) for name, data in rig.controls.items()}
     return rig.changed(changes)
 
 
 def _specified(data: Control) -> Control:
-    # Only what is named is taken over: all else, today's faults and those to come, is neutral.
+    # Only what is listed here is taken from the rig; all other keys are neutral.
     loader, table = data.loader, data.schedule
     return Control(
         surface=data.surface,
@@ -83,7 +83,7 @@ def _specified(data: Control) -> Control:
 
 
 def specified_legs(rig: Rig, control: ControlName, pressure_Pa: float) -> tuple[SweepLeg, ...]:
-    """Return what a slow sweep of a specified rig's control is to show, leg by leg."""
+    """Return the forces of a slow sweep of a specified rig's control, leg by leg."""
     data = rig.controls[control]
     share = np.linspace(1e-9, 1.0, POINTS)
     legs = []

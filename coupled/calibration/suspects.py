@@ -1,8 +1,8 @@
-"""Mistyped readings, found by a robust loss and named by their row.
+"""Mistyped readings, found by robust regression and reported by their row.
 
-Tukey's biweight, started from the line through two readings that most others agree with, so
-that a third of the readings may be wrong. v₃ against F is held to S₃ in
-the same way: a force with swapped digits shows there and hardly in v₁.
+Tukey's biweight, started from the line through two readings with which most others agree, so that
+a third of the readings may be wrong. v₃ is compared with S₃·F in the same way: swapped digits of a
+force show there and hardly in v₁.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from coupled.calibration.fit import error_variance
 from coupled.calibration.readings import Readings
 
 Floats = NDArray[np.float64]
-FEWEST = 5  # readings below which no reading can be called far off
+FEWEST = 5  # readings; outliers of fewer cannot be found
 MOST_PAIRS = 400
-MANY_SETS = 2000  # drawn where there are more figures than two
-LEAST_TURN = 0.3  # of the greatest angle between two readings' (δ, F)
-BIWEIGHT = 4.685  # 95 % as good as least squares where nothing is wrong
-TOO_FAR = 6.0  # robust standard deviations; chance leaves fewer than 1 in 100 benches there
-SLIP = 1e-4  # of the largest value: no mistyped digit is smaller
-NORMAL = 1.4826  # of a median absolute deviation to a standard deviation
+MANY_SETS = 2000  # random sets if there are more than two parameters
+LEAST_TURN = 0.3  # of the largest angle between two readings' (δ, F)
+BIWEIGHT = 4.685  # 95 % efficiency for Gaussian errors
+TOO_FAR = 6.0  # robust standard deviations; exceeded by chance in fewer than 1 of 100 benches
+SLIP = 1e-4  # of the largest value: the smallest mistyped digit
+NORMAL = 1.4826  # ratio of a standard deviation to a median absolute deviation
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading that is far off: its row, which of its columns, and by how many deviations."""
+    """An outlier: its row, the column in question, and its deviation."""
 
     row: int
     columns: str
@@ -39,7 +39,7 @@ class Suspect:
 
 
 def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]:
-    """Return the readings that are no slips of ruler, scale or meter."""
+    """Return the readings whose deviation exceeds the instruments' errors."""
     suspects = []
     if len(readings.row) >= FEWEST:
         line = _off_the_line(readings, instruments)
@@ -89,10 +89,10 @@ def robust_line(columns: Sequence[Floats], v1: Floats, spread: Floats) -> Floats
 
 
 def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
-    """Return the line through two readings that most others agree with, and their scale.
+    """Return the line through two readings with which most others agree, and the residuals' scale.
 
-    Only readings of gradients well apart make a line: two of one gradient would fit all of
-    that gradient whatever the others are. The scale is that of the least median residual.
+    The two readings must have different gradients: two of one gradient fit all readings of that
+    gradient. The scale is that of the least median residual.
     """
     if design.shape[1] > 2:
         return _of_all(design, target)
@@ -108,7 +108,7 @@ def _most_agreed(design: Floats, target: Floats) -> tuple[Floats, float]:
 
 
 def _of_all(design: Floats, target: Floats) -> tuple[Floats, float]:
-    """Do the same with as many readings at a time as there are figures, drawn by chance."""
+    """Return the same for more parameters, with random sets of as many readings."""
     rows, figures = design.shape
     rng = np.random.default_rng(0)
     sets = np.array([rng.choice(rows, figures, replace=False) for _ in range(MANY_SETS)])
@@ -118,7 +118,7 @@ def _of_all(design: Floats, target: Floats) -> tuple[Floats, float]:
 
 
 def _best_of(design: Floats, target: Floats, sets: NDArray[np.int64]) -> tuple[Floats, float]:
-    """Return which of these sets' lines most readings agree with, and their scale."""
+    """Return the line of the set with which most readings agree, and the residuals' scale."""
     betas = np.linalg.solve(design[sets], target[sets][:, :, None])[:, :, 0]
     residuals = np.abs(target - betas @ design.T)
     floor = 1e-12 * float(np.max(np.abs(target)))
@@ -134,7 +134,7 @@ def _scale(residual: Floats) -> float:
 
 
 def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
-    """Return how many deviations each v₁ is off the robust line."""
+    """Return the deviation of each v₁ from the robust line, in standard deviations."""
     columns = (readings.deflection, readings.force, *readings.others.T)
     v = readings.v1
     a, b, *c = robust_line(columns, v, np.ones_like(v))
@@ -147,7 +147,7 @@ def _off_the_line(readings: Readings, instruments: Instruments) -> Floats:
 def _off_the_ratio(
     top: Floats, bottom: Floats, top_variance: Floats, bottom_variance: Floats
 ) -> Floats:
-    """Return how many deviations each of `top` is off the median ratio times `bottom`."""
+    """Return the deviation of each `top` from the median ratio times `bottom`, likewise."""
     there = bottom != 0.0
     slope = float(np.median(top[there] / bottom[there])) if there.any() else 0.0
     spread = np.sqrt(top_variance + slope**2 * bottom_variance)
@@ -156,5 +156,5 @@ def _off_the_ratio(
 
 
 def _deviations(whitened: Floats) -> Floats:
-    """Return residuals over their robust scale, which is at least half of the declared one."""
+    """Return residuals over their robust scale, which is at least half of the stated one."""
     return np.asarray(np.abs(whitened) / max(_scale(whitened), 0.5))

@@ -1,9 +1,8 @@
-"""What a force documentation is drawn from: slow sweeps both ways, and releases.
+"""The motions of a force documentation: slow sweeps both ways, and releases.
 
-A sweep goes from neutral to one stop, to the other and back, slowly and at an even rate, as
-a static control check is flown (14 CFR Part 60, table A2A: 95 to 105 s). The force is the
-one that the rig's statics ask for there, friction with the motion; what the control does
-under it is the rig's own business.
+A sweep goes from neutral to one stop, to the other and back, slowly and at an even rate, as in a
+static control check (14 CFR Part 60, table A2A: 95 to 105 s). The force is that of the rig's
+static line, plus friction along the motion; the deflection is simulated.
 """
 
 from __future__ import annotations
@@ -22,17 +21,17 @@ from coupled.rig.statics import static_line, static_point
 
 Floats = NDArray[np.float64]
 SWEEP_s = 100.0
-TURN_s = 2.0  # in which the hand's friction force changes sides
-BEYOND = 1.02  # of the travel: the sweep pushes a little into the stops
+TURN_s = 2.0  # for the hand's friction force to change sign
+BEYOND = 1.02  # of the travel: the sweep pushes slightly into the stops
 HELD_s = 6.0
 RELEASE_s = 4.0
 FINE_Hz = 1000.0
-THROW = 0.4  # of the travel, from which a control is released; the rule says 25 to 50 %
+THROW = 0.4  # of the travel, from which a control is released; the rule requires 25 to 50 %
 
 
 @dataclass(frozen=True)
 class Release:
-    """A control let go: time from the release in s, deflection in d, and where it was held."""
+    """A release: time from it in s, deflection in d, and the deflection held before."""
 
     time_s: Floats
     deflection: Floats
@@ -55,7 +54,7 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
     quarter, half, last = 0.25 * SWEEP_s, 0.5 * SWEEP_s, SWEEP_s - TURN_s
     stops = [TURN_s, quarter, half - TURN_s, half + TURN_s, 3.0 * quarter, last]
     path = np.interp(ends, stops, [0.0, BEYOND, 0.0, 0.0, -BEYOND, 0.0]) * data.travel
-    # At neutral the static line jumps by the breakout, and the hand takes its time over it.
+    # At neutral the static line jumps by the breakout; the hand crosses the jump slowly.
     turns = [0.0, TURN_s, half - TURN_s, half + TURN_s, last, SWEEP_s]
     preload = np.interp(ends, turns, [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
     tiny = 1e-9 * data.travel
@@ -70,9 +69,9 @@ def sweep(rig: Rig, control: ControlName, pressure_Pa: float) -> History:
 
 
 def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> Release:
-    """Return what a control does that is held at `THROW` of its travel and let go.
+    """Return the motion of a control that is held at `THROW` of its travel and released.
 
-    `side` is +1 or −1. It is let go from rest; its grip springs back by the bend at once.
+    `side` is +1 or −1. It is released from rest; its grip springs back by the bend at once.
     """
     rig = _finely_read(rig, control)
     held = side * THROW * rig.controls[control].travel
@@ -93,7 +92,7 @@ def release(rig: Rig, control: ControlName, pressure_Pa: float, side: float) -> 
 
 
 def _finely_read(rig: Rig, control: ControlName) -> Rig:
-    """Return the rig read a thousand times a second, unless its frame makes the product."""
+    """Return the rig with a frame rate of 1 kHz, unless the frame determines the product."""
     if rig.controls[control].loader.multiplier == "digital":
         return rig
     return rig.changed({"frame_rate_Hz": max(rig.frame_rate, FINE_Hz)})

@@ -1,1 +1,1 @@
-"""Many flights at once: expectations checked, and parameters swept."""
+"""Many flights: expectations checked, and parameters swept."""

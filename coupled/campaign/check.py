@@ -1,4 +1,4 @@
-"""A run's expectations, judged: only what they look at is flown."""
+"""The check of a run's expectations; only the configurations that they need are flown."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class CheckResult:
 
     @property
     def passed(self) -> bool:
-        """Whether every expectation holds."""
+        """Whether all expectations are met."""
         return all(verdict.passed for verdict in self.verdicts)
 
     def to_polars(self) -> pl.DataFrame:
-        """Return a row a verdict; a figure and its bounds are in the unit of what is looked at."""
+        """Return a row for each verdict; values and bounds are in the unit of their quantity."""
         return pl.DataFrame(
             [verdict.as_dict() for verdict in self.verdicts], infer_schema_length=None
         )
@@ -44,11 +44,11 @@ def check(
     runs: str | Path | Sequence[str | Path | Sequence[Manoeuvre]],
     progress: Progress | None = None,
 ) -> CheckResult:
-    """Fly runs and hold them against what they expect.
+    """Fly runs and compare them with their expectations.
 
-    `runs` is a run file, the name of a shipped one, or several; a run may be given as its
-    cases, too. Only what the expectations look at is flown. `progress` is called with what is
-    flown, frames done and frames in all. Raises InputError for a run that expects nothing.
+    `runs` is a run file, the name of a shipped one, or several; a run may also be given as its
+    cases. Only the configurations with expectations are flown. `progress` is called with a text,
+    frames done and frames in all. Raises InputError for a run without expectations.
 
     >>> import coupled
     >>> coupled.check("appendix-c").passed
@@ -64,7 +64,7 @@ def check(
 
 
 def read_expecting(name: str) -> list[Manoeuvre]:
-    """Return the cases of a run that expects something; to check any other says nothing."""
+    """Return the cases of a run with expectations; raises InputError for any other."""
     return _expecting(read_run(name))
 
 
@@ -79,7 +79,7 @@ def _expecting(scenarios: Sequence[Manoeuvre]) -> list[Manoeuvre]:
 
 
 def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) -> list[Verdict]:
-    """Fly what a run's expectations look at, and return the verdicts, case by case."""
+    """Fly the configurations with expectations, and return the verdicts, case by case."""
     flights = compare([_needed(scenario) for scenario in scenarios], progress)
     flown: Flown = {(f.outcome.case, f.configuration): f for f in flights}
     undelayed = {where: fly_undelayed(f.manoeuvre) for where, f in flown.items() if _timed(f)}
@@ -93,7 +93,7 @@ def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) 
 
 
 def _needed(scenario: Manoeuvre) -> Manoeuvre:
-    """Return the scenario with only those configurations that something is expected of."""
+    """Return the scenario with only the configurations that have expectations."""
     wanted = set[str]()
     for expect in scenario.expect:
         flown: Sequence[str] = scenario.configurations
@@ -106,7 +106,7 @@ def _needed(scenario: Manoeuvre) -> Manoeuvre:
 
 
 def _timed(flight: Flight) -> bool:
-    """Tell whether a flight is held against the same one with nothing late."""
+    """Tell whether a flight is compared with the same flight without delays."""
     asked = [e for e in flight.manoeuvre.expect if e.standard in LATENCIES]
     ended = bool(flight.ended_early)
     return not ended and any(e.concerns(flight.outcome.case, flight.configuration) for e in asked)

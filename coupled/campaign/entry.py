@@ -1,4 +1,4 @@
-"""A flight of a sweep as its journal has it: a line of JSON, written and read back typed."""
+"""A flight of a sweep as a line of JSON in its journal, written and read back typed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 from coupled.errors import InputError
 
 Cell = bool | int | float | str
-AS_FILED = "as filed"  # the configuration of a rig that is flown as its file has it
+AS_FILED = "as filed"  # configuration name of an unchanged rig
 SURVIVED = "survived"
 
 
 @dataclass(frozen=True)
 class Columns:
-    """What a sweep's journal and table hold of a flight: the varied keys, and the figures.
+    """The columns of a sweep's journal and table: varied keys and figures.
 
-    `flights` is how many there are, `survive` whether survival is judged.
+    `flights` is the number of flights, `survive` whether survival is judged.
     """
 
     keys: tuple[str, ...]
@@ -36,11 +36,10 @@ class Columns:
 
 @dataclass(frozen=True)
 class JournalEntry:
-    """One flight of a sweep: its number, what was varied, and what came of it.
+    """One flight of a sweep: its number, its changes and its results.
 
-    `changes` are the varied values by key; `figures` in the units of their names, None where
-    there is none; `survived` is None where it was not judged; `ended_early` says why, or is
-    empty.
+    `changes` are the varied values by key; `figures` in the units of their names, None if a flight
+    has none; `survived` is None if it was not judged; `ended_early` is the reason, or empty.
     """
 
     flight: int
@@ -52,7 +51,7 @@ class JournalEntry:
     ended_early: str
 
     def as_dict(self, columns: Columns) -> dict[str, Any]:
-        """Return it as a line of the journal and a row of the table have it."""
+        """Return a line of the journal, or a row of the table."""
         row: dict[str, Any] = {"flight": self.flight, **self.changes}
         row["configuration"] = self.configuration
         row |= {name: self.figures[name] for name in columns.figures}
@@ -61,14 +60,14 @@ class JournalEntry:
         return {**row, "seed": self.seed, "ended_early": self.ended_early}
 
     def line(self, columns: Columns) -> str:
-        """Return it as a line of JSON."""
+        """Return a line of JSON."""
         return json.dumps(self.as_dict(columns), ensure_ascii=False)
 
 
 def read_entry(line: str, columns: Columns, file: object, place: str) -> JournalEntry:
     """Return the flight of a line of JSON.
 
-    Raises InputError, naming `file` and `place`, where the line is none of this sweep.
+    Raises InputError with `file` and `place` if the line is not one of this sweep.
     """
     try:
         row = json.loads(line)

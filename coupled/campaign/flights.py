@@ -1,6 +1,6 @@
-"""A sweep's flights, flown: a row a flight, kept within a quarter second, and one table at the end.
+"""The flights of a sweep: a row each, written to disk within a quarter second, and one table.
 
-The rows depend on the sweep's file alone, not on who flew them or in which order.
+The rows depend on the sweep's file only, not on the workers or the order.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from coupled.campaign.journal import Journal
 from coupled.campaign.plan import PlannedFlight, SweepPlan, extreme_names, planned_flights
 from coupled.campaign.sweepfile import Survive
 from coupled.errors import InputError
-from coupled.flight.kept import Hangar
+from coupled.flight.kept import AircraftCache
 from coupled.flight.loop import fly
 from coupled.parallel import as_done
 from coupled.record.record import Record
 
 Progress = Callable[[str, int, int], None]
-_AHEAD = 64  # blocks of flights that wait for a worker
-_BLOCK_s = 0.25  # what a worker flies before it hands over: a kill loses no more of its work
-_SHARE = 16  # of what is left, at the most, in a block: so that all workers end together
+_AHEAD = 64  # blocks in the queue of the workers
+_BLOCK_s = 0.25  # flying time of a block: the most that a killed worker loses
+_SHARE = 16  # a block has at most 1/16 of the remaining flights, so that all workers end together
 
 
 def fly_planned(
-    plan: SweepPlan, flight: PlannedFlight, hangar: Hangar | None = None
+    plan: SweepPlan, flight: PlannedFlight, cache: AircraftCache | None = None
 ) -> JournalEntry:
-    """Return what came of one flight; why it ended early, or could not be flown, is in it.
+    """Return the results of one flight, with the reason if it ended early or could not be flown.
 
-    A `hangar` keeps its aircraft for the next.
+    A `cache` keeps its aircraft for the next flight.
     """
     sweep, columns = plan.sweep, plan.columns
     entry = JournalEntry(
@@ -59,7 +59,7 @@ def fly_planned(
         entry = replace(entry, seed=scenario.seed)
         if flight.configuration:
             scenario = scenario.configured(flight.configuration)
-        record = fly(scenario, hangar=hangar, stops=True)
+        record = fly(scenario, cache=cache, stops=True)
     except InputError as error:
         return replace(entry, ended_early=f"not flown: {error.problem}")
     ended = record.manifest["ended_early"]
@@ -78,10 +78,9 @@ def fly_planned(
 def fly_sweep(
     plan: SweepPlan, journal: Journal, pool: Executor, progress: Progress | None = None
 ) -> pl.DataFrame:
-    """Fly what the journal lacks, and return the table, a row a flight in their order.
+    """Fly the flights that the journal lacks, and return the table, a row for each flight.
 
-    `progress` is called with flights done and to do since this began, so that the time left
-    is judged by what is flown now.
+    `progress` is called with flights done and to do since this call, for the remaining time.
     """
     todo = [flight for flight in planned_flights(plan) if flight.number not in journal.done]
     every = len(journal.done) + len(todo)
@@ -90,7 +89,7 @@ def fly_sweep(
     def blocks() -> Iterator[tuple[bytes, list[PlannedFlight]]]:
         begun = 0
         while begun < len(todo):
-            # To hand over and to keep a flight costs a tenth of a short one: many go together.
+            # The overhead of a flight is a tenth of a short one, so several are sent together.
             size = int(_BLOCK_s * done / flying_s) if flying_s else 1
             end = begun + max(1, min(size, (len(todo) - begun) // _SHARE))
             yield packed, todo[begun:end]
@@ -105,24 +104,24 @@ def fly_sweep(
 
 
 def _fly_block(packed: bytes, flights: Sequence[PlannedFlight]) -> tuple[list[JournalEntry], float]:
-    """Fly some of a plan that is sent as bytes, which costs nothing to send again.
+    """Fly some flights of a plan that is sent as bytes, pickled only once.
 
-    Return them, and how long it took, s.
+    Return the entries, and the time they took, s.
     """
     start = time.perf_counter()
-    plan, hangar = _unpacked(packed)
-    entries = [fly_planned(plan, flight, hangar) for flight in flights]
+    plan, cache = _unpacked(packed)
+    entries = [fly_planned(plan, flight, cache) for flight in flights]
     return entries, time.perf_counter() - start
 
 
 @lru_cache(maxsize=1)
-def _unpacked(packed: bytes) -> tuple[SweepPlan, Hangar]:
-    """Return a plan, and where this worker keeps the aircraft between its flights."""
-    return pickle.loads(packed), Hangar()
+def _unpacked(packed: bytes) -> tuple[SweepPlan, AircraftCache]:
+    """Return a plan, and this worker's cache of aircraft."""
+    return pickle.loads(packed), AircraftCache()
 
 
 def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:
-    """Return the table of flights, as they stand; numbers as doubles."""
+    """Return the table of flights in their order; numbers as doubles."""
     columns = plan.columns
     rows = [entry.as_dict(columns) for entry in entries]
     kinds = dict.fromkeys(columns.figures, pl.Float64)
@@ -143,7 +142,7 @@ def table(plan: SweepPlan, entries: Sequence[JournalEntry]) -> pl.DataFrame:
 
 
 def _cell(value: Any) -> Cell:
-    """Return a varied value as a cell takes it: a number or word as it is, else as JSON."""
+    """Return a varied value as a cell: a number or word unchanged, anything else as JSON."""
     return value if isinstance(value, (int, float, str)) else json.dumps(value, default=str)
 
 

@@ -1,8 +1,8 @@
-"""The journal of a sweep's folder: a line a flight, on the disk before it is counted.
+"""The journal of a sweep's folder: a line for each flight, written to disk before it counts.
 
-Lines of JSON, the first of them the sweep's identity. A line cut short by a kill is dropped,
-and its flight flown again. One process at a time holds a folder; a killed one lets go, and
-what it left half written is cleared by the next.
+Lines of JSON, the first of them the sweep's identity. A line cut short by a kill is dropped, and
+its flight flown again. One process at a time may use a folder. The lock of a killed process is
+released by the system, and its partial files are removed by the next process.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from coupled.files import clear, read_bytes
 
 JOURNAL = "flights.jsonl"
 LOCK = ".lock"
-UNFINISHED = ".coupled-"  # what `files` makes begins so until it is whole
+UNFINISHED = ".coupled-"  # prefix of a file in `files` until it is complete
 
 
 ANOTHER = "holds another sweep, or what this one reads has changed since; give a new folder"
@@ -33,7 +33,7 @@ def _header(identity: str) -> str:
 
 
 class Journal:
-    """The flights that are done; in memory only their numbers, `done`."""
+    """The completed flights; only their numbers, `done`, are in memory."""
 
     def __init__(self, folder: Path, plan: SweepPlan) -> None:
         self.path = folder / JOURNAL
@@ -43,7 +43,7 @@ class Journal:
 
     @staticmethod
     def check(folder: Path, plan: SweepPlan) -> None:
-        """Refuse a folder whose journal is another sweep's."""
+        """Raise InputError if the folder's journal is another sweep's."""
         first = read_bytes(folder / JOURNAL).partition(b"\n")
         if first[1] and first[0] + b"\n" != _header(plan.identity).encode():
             raise InputError(folder, "", ANOTHER)
@@ -75,12 +75,12 @@ class Journal:
             file.truncate(len(whole))
 
     def add(self, *entries: JournalEntry) -> None:
-        """Keep flights: they are on the disk when this returns."""
+        """Store flights; they are on the disk when this returns."""
         self._write("".join(entry.line(self._columns) + "\n" for entry in entries), "ab")
         self.done.update(entry.flight for entry in entries)
 
     def entries(self) -> list[JournalEntry]:
-        """Return the flights in the order of their numbers, as they were written."""
+        """Return the flights in the order of their numbers."""
         with self.path.open(encoding="utf-8") as lines:
             next(lines)
             found = [self._entry(line, number) for number, line in enumerate(lines, 2)]
@@ -102,14 +102,14 @@ class Journal:
 
 @contextmanager
 def opened(folder: Path, plan: SweepPlan) -> Iterator[Journal]:
-    """Give the journal of a sweep's folder, made if need be, to this process alone."""
+    """Open the journal of a sweep's folder, created if needed, for this process alone."""
     try:
         if folder.is_dir() and _foreign(folder) and not (folder / JOURNAL).exists():
             raise InputError(folder, "", "is not empty, and holds no sweep; give a new folder")
         if (folder / JOURNAL).exists():
-            Journal.check(folder, plan)  # before anything is written beside another sweep
+            Journal.check(folder, plan)  # before anything is written to the folder
         folder.mkdir(parents=True, exist_ok=True)
-        # SQLite's lock works on every system, and is the kernel's: nothing is left by a kill.
+        # SQLite's lock works on every system, and the kernel releases it after a kill.
         lock = sqlite3.connect(folder / LOCK, timeout=0.0, isolation_level=None)
     except InputError:
         raise
@@ -130,7 +130,7 @@ def opened(folder: Path, plan: SweepPlan) -> Iterator[Journal]:
 
 
 def _foreign(folder: Path) -> bool:
-    """Return whether a folder holds what no sweep that was killed early has left."""
+    """Return whether a folder contains files other than those of an unfinished sweep."""
     names = (path.name for path in folder.iterdir())
     return any(name != LOCK and not name.startswith(UNFINISHED) for name in names)
 

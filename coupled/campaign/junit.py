@@ -1,4 +1,4 @@
-"""Verdicts as JUnit XML, which build servers read: a suite a run, a test an expectation."""
+"""Verdicts as JUnit XML for build servers: a suite for each run, a test for each expectation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit_xml(verdicts: Sequence[Verdict]) -> str:
-    """Return the XML; what could not be judged is an error, what missed its bound a failure."""
+    """Return the XML; an unjudged expectation is an error, a missed bound a failure."""
     root = _element(None, "testsuites", **_counts(verdicts))
     for run, group in groupby(verdicts, key=lambda verdict: verdict.run):
         tests = list(group)

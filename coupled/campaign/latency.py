@@ -1,14 +1,14 @@
-"""Latency: how much later a simulated aircraft answers than the aircraft itself (Part 60, 4.a).
+"""Latency: the delay of a simulator's response after that of the aircraft (Part 60, 4.a).
 
-The rule counts from the aircraft's own answer to an abrupt command at the control. That answer is
-flown: the same aircraft under the same hand, on the same rig with nothing in it that takes time, at
-frames of half a millisecond. What the aircraft and its control's mass and spring take is in both
-and drops out; what is left is what the simulator adds.
+The rule counts from the aircraft's own response to an abrupt command at the control. That response
+is simulated: the same aircraft and hand, on the same rig without delays, at frames of half a
+millisecond. Responses of the aircraft and of the control's mass and spring are in both and cancel;
+the difference is the simulator's.
 
-Either answer begins where the rate of pitch, roll or yaw has come to 5 % of the greatest that it
-reaches within a second. A delay alone then shows as it is, and a smaller answer is not a later one.
-A host that takes the force at t_k adds a frame and a half: half of it while the command is held,
-and one in JSBSim, which turns this frame's moment into the next one's rate.
+A response begins when the rate of pitch, roll or yaw reaches 5 % of its largest value within a
+second. A pure delay is then measured exactly, and a smaller response does not count as a later one.
+A host that takes the force at t_k adds a frame and a half: half a frame while the command is held,
+and one in JSBSim, which integrates this frame's moment to the next one's rate.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-UNDELAYED = "with nothing late"  # the reference's name, as a configuration's
+UNDELAYED = "with nothing late"  # configuration name of the reference
 REFERENCE_Hz = 2000.0
-FRAMES_LATE = 1.5  # of a host and JSBSim; the reference's own are taken into account
-BEGUN = 0.05  # of the greatest rate
-WITHIN_s = 1.0  # of the beginning: where the greatest rate is looked for
-_ROUNDS = 100  # at most; an answer of two parts takes some ten
+FRAMES_LATE = 1.5  # of a host and JSBSim; subtracted from the reference
+BEGUN = 0.05  # of the largest rate
+WITHIN_s = 1.0  # of the beginning, in which the largest rate is searched
+_ROUNDS = 100  # at most; a response of two parts takes some ten
 _SETTLED_s = 1e-6
 
-# What takes time between hand and surface, and what it is where nothing does.
+# The delays between hand and surface, and their values in the reference.
 AT_ONCE: dict[str, Any] = {
     "loader.delay_s": 0.0,
     "loader.modifying_lag_s": 0.0,
@@ -63,7 +63,7 @@ AT_ONCE: dict[str, Any] = {
 
 
 def undelayed_rig(rig: Rig) -> Rig:
-    """Return the rig with nothing in it that takes time between hand and surface."""
+    """Return the rig without delays between hand and surface."""
     changes: dict[str, Any] = {"frame_rate_Hz": REFERENCE_Hz, "noise": {}}
     changes["loader_rate_Hz"] = max(rig.loader_rate, REFERENCE_Hz)
     if rig.flight is not None:
@@ -76,21 +76,21 @@ def undelayed_rig(rig: Rig) -> Rig:
 
 
 def fly_undelayed(manoeuvre: Manoeuvre, progress: Any = None) -> Flight:
-    """Fly a manoeuvre, in the configuration that it is in, with nothing late."""
+    """Fly a manoeuvre in its configuration, without delays."""
     rig = undelayed_rig(manoeuvre.rig)
     return fly_and_judge(replace(manoeuvre, rig=rig), UNDELAYED, progress)
 
 
 def latency_s(control: ControlName, flight: Flight, reference: Flight) -> float:
-    """Return by how much later than the reference a flight answers a control, s.
+    """Return the delay of a flight's response to a control after the reference's, s.
 
-    Raises UnjudgedError for a flight that is no test of it.
+    Raises UnjudgedError if the flight is not a valid test.
     """
     _check_flight(control, flight.manoeuvre)
     begun_s = _begins(reference.record, control)
     own = _answer(reference.record, control, begun_s)
     late = 0.0
-    for _ in range(_ROUNDS):  # the second in which the greatest rate is looked for comes late, too
+    for _ in range(_ROUNDS):  # the second with the largest rate is delayed as well
         before, late = late, _answer(flight.record, control, begun_s + late) - own
         if abs(late - before) <= _SETTLED_s:
             break
@@ -108,7 +108,7 @@ def _check_flight(control: ControlName, manoeuvre: Manoeuvre) -> None:
 
 
 def _begins(record: Record, control: ControlName) -> float:
-    """Return when the hand's force begins, s."""
+    """Return the time at which the hand's force begins, s."""
     force = record[channel(control, "hand_force")]
     moved = np.flatnonzero(force != force[0])
     if not moved.size:
@@ -117,10 +117,10 @@ def _begins(record: Record, control: ControlName) -> float:
 
 
 def _answer(record: Record, control: ControlName, begun_s: float) -> float:
-    """Return when the rate that a control turns the aircraft at has begun, s.
+    """Return the time at which the rate that a control causes has begun, s.
 
-    It is the last time before the greatest rate at which it was under its share, straight
-    between rows, so that noise is not taken for an answer.
+    It is the last time before the largest rate at which the rate was below `BEGUN` of it,
+    interpolated between rows, so that noise does not count.
     """
     time_s, rate = record.time_s, record[RATE[control]]
     if begun_s + WITHIN_s > time_s[-1]:

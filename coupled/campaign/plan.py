@@ -1,7 +1,7 @@
-"""A sweep file: which run, which of its keys vary, how, and what is kept of each flight.
+"""A sweep file: the run, its varied keys, and the results kept of each flight.
 
-Every value is tried on the run's files before anything flies. A combination that only
-together cannot be flown becomes a row that says so.
+Every value is checked on the run's files before the first flight. A combination that cannot be
+flown becomes a row with the reason.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from coupled.schema import load_toml
 
 @dataclass(frozen=True)
 class PlannedFlight:
-    """One flight of a sweep: its number, what is changed, and the run's noise seed if it has one.
+    """One flight of a sweep: its number, its changes, and the run's noise seed if it has one.
 
-    `configuration` is empty for the rig as its file says.
+    `configuration` is empty for the rig as filed.
     """
 
     number: int
@@ -47,7 +47,7 @@ class PlannedFlight:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """A sweep, ready to fly: `table` are the run's tables, `files` all that its flights read."""
+    """A sweep ready to fly: `table` are the run's tables, `files` all input files."""
 
     sweep: SweepFile
     file: Path
@@ -58,30 +58,30 @@ class SweepPlan:
 
     @property
     def keys(self) -> list[str]:
-        """The keys that vary, one a parameter."""
+        """The varied keys, one for each parameter."""
         return [vary.key for vary in self.sweep.vary]
 
     @property
     def columns(self) -> Columns:
-        """What the sweep's journal and table hold."""
+        """The columns of the sweep's journal and table."""
         sweep = self.sweep
         figures = (*sweep.keep, *extreme_names(sweep.extremes))
         return Columns(tuple(self.keys), figures, bool(sweep.survive), flight_count(sweep))
 
     def scenario(self, changes: Mapping[str, Any]) -> Manoeuvre:
-        """Return the run's case with values changed, by their dotted keys."""
+        """Return the run's case with changed values, by their dotted keys."""
         return _changed(self.table, self.run_file, self.sweep.case, changes)
 
 
 def read_plan(file: Path) -> SweepPlan:
-    """Return the sweep of a file, every value tried, the run's own faults blamed on the run."""
+    """Return the sweep of a file, with every value checked; faults of the run name the run."""
     return plan_from_table(load_toml(file), file)
 
 
 def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
     """Return the sweep of a file's tables; `file` is named in faults.
 
-    A run that is named by a relative path is sought beside it first.
+    A run given by a relative path is first searched beside the file.
     """
     sweep = read_sections(given, file)
     run_file = find_named(file, "run", sweep.run, shipped_runs(), "run")
@@ -107,7 +107,7 @@ def plan_from_table(given: Mapping[str, Any], file: Path) -> SweepPlan:
 
 
 def planned_flights(plan: SweepPlan) -> list[PlannedFlight]:
-    """Return every flight of a sweep; the same file gives the same flights."""
+    """Return every flight of a sweep, reproducible from its file."""
     sweep, found = plan.sweep, list[PlannedFlight]()
     configurations: list[Any] = list(sweep.configurations) or [""]
     for i, values in enumerate(points(sweep)):
@@ -145,14 +145,14 @@ def _changed(
 
 
 def extreme_names(channels: Sequence[str]) -> list[str]:
-    """Return the figures that the least and greatest values of channels are kept as."""
+    """Return the names of the figures for the extremes of channels."""
     return [f"{which}_{name}" for name in channels for which in ("least", "greatest")]
 
 
 def _check_keys(
     sweep: SweepFile, file: Path, try_changes: Callable[[dict[str, Any]], Manoeuvre]
 ) -> set[Path]:
-    """Try every value alone, and return the files that its flight would read.
+    """Check every value alone, and return the files that its flight would read.
 
     Raises the first fault of each parameter, together.
     """
@@ -181,7 +181,7 @@ def _blamed(
     file: Path,
     try_changes: Callable[[dict[str, Any]], Manoeuvre],
 ) -> InputError:
-    """Return the fault of a value, blamed on the one of its keys that cannot have it."""
+    """Return the fault of a value, with the key that does not accept it."""
     key = next((k for k in (vary.key, *vary.also) if error.key.endswith(k)), "")
     if not key and vary.also:
         for each in (vary.key, *vary.also):
@@ -198,7 +198,7 @@ def _blamed(
 
 
 def _check_property(scenario: Manoeuvre, key: str) -> None:
-    """Refuse a property that the aircraft lacks; one that will not trim is a row of the table."""
+    """Refuse a property that the aircraft lacks; a failure to trim is a row of the table."""
     try:
         make_airframe(scenario)
     except InputError as error:
@@ -207,7 +207,7 @@ def _check_property(scenario: Manoeuvre, key: str) -> None:
 
 
 def _identity(sweep: SweepFile, files: set[Path]) -> str:
-    """Return the hash of what a sweep's table depends on: its keys, its files, the versions."""
+    """Return the hash of a sweep's inputs: its keys, its files, the versions."""
     content = {
         "sweep": sweep.model_dump(exclude={"name"}),
         "files": sorted(sha256(path) for path in files if path.is_file()),

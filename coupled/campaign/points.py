@@ -1,4 +1,4 @@
-"""The points of a sweep: every combination of a grid, or draws from its ranges."""
+"""The points of a sweep: all combinations of a grid, or samples of its ranges."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _grid_values(vary: Vary) -> list[Any]:
 
 
 def _drawn(vary: Vary, shares: Floats) -> list[Any]:
-    """Return the values at shares from 0 to 1 of a range, or of a list."""
+    """Return the values at shares from 0 to 1 of a range or a list."""
     if vary.values is not None:
         places = np.minimum((shares * len(vary.values)).astype(int), len(vary.values) - 1)
         return [vary.values[place] for place in places]

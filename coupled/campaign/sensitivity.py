@@ -1,13 +1,13 @@
-"""Which parameters matter: Sobol's indices of a sweep's figures, with bootstrap intervals.
+"""Sensitivity of a sweep's figures: Sobol indices of its parameters, with bootstrap intervals.
 
-The points are two independent sets A and B of a scrambled Sobol sequence, and for each
-parameter i the set A with its i-th column from B. Of a figure f with variance V over them,
+The points are two independent sets A and B of a scrambled Sobol sequence, and for each parameter i
+the set A with its i-th column from B. For a figure f with variance V over them,
 
-    first_i = ⟨f_B·(f_ABi − f_A)⟩/V        its share of V that is i's alone (Saltelli et al. 2010)
-    total_i = ⟨(f_A − f_ABi)²⟩/(2·V)       with all that i does together with others (Jansen 1999)
+    first_i = ⟨f_B·(f_ABi − f_A)⟩/V        share of V by i alone (Saltelli et al. 2010)
+    total_i = ⟨(f_A − f_ABi)²⟩/(2·V)       with all interactions of i (Jansen 1999)
 
-The intervals are those of 95 % over resampled points. A point of which one flight could not
-be flown, or ended before the figure could be read, is left out whole.
+The intervals are those of 95 % over resampled points. A point is left out if one of its flights
+could not be flown, or ended before the figure was available.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 INDICES = "sensitivity.csv"
 _RESAMPLED = 1000
 _LEAST_POINTS = 8
-_CONSTANT = 1e-9  # of the largest value: a figure that spreads by less does not vary
+_CONSTANT = 1e-9  # of the largest value: a figure with a smaller spread is constant
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class VarianceShare:
 
 @dataclass(frozen=True)
 class SobolIndex:
-    """What one parameter does to one figure: alone (`first`), and with others (`total`).
+    """The indices of one parameter and one figure: alone (`first`), and with others (`total`).
 
-    None where nothing varies. `points` is how many of the sampled points it is made from.
+    None if the figure is constant. `points` is the number of sampled points used.
     """
 
     configuration: str
@@ -54,7 +54,7 @@ class SobolIndex:
     points: int
 
     def as_dict(self) -> dict[str, str | int | float | None]:
-        """Return it as JSON and CSV take it."""
+        """Return a row for JSON and CSV."""
         row: dict[str, str | int | float | None] = {
             "configuration": self.configuration,
             "figure": self.figure,
@@ -83,8 +83,7 @@ def design(samples: int, parameters: int, seed: int) -> Floats:
 def sobol(values: Floats) -> tuple[Floats, Floats]:
     """Return first and total indices of values of shape (…, parameters + 2, samples).
 
-    Rows are A, B and the mixed sets, as `design` has them; the indices have shape
-    (…, parameters).
+    Rows are A, B and the mixed sets, as in `design`; the indices have shape (…, parameters).
     """
     values = values - values[..., :2, :].mean(axis=(-2, -1), keepdims=True)
     a, b, mixed = values[..., :1, :], values[..., 1:2, :], values[..., 2:, :]
@@ -126,7 +125,7 @@ def _of_figure(
 
 
 def _shares(whole: Floats, resampled: Floats) -> list[VarianceShare]:
-    """Return each parameter's index with its interval, of (resamples, parameters)."""
+    """Return each parameter's index with its interval, from (resamples, parameters)."""
     low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
     return [
         VarianceShare(float(value), float(least), float(most))
@@ -135,5 +134,5 @@ def _shares(whole: Floats, resampled: Floats) -> list[VarianceShare]:
 
 
 def write_indices(indices: Sequence[SobolIndex], path: Path) -> None:
-    """Write the indices as CSV, a row an index, whole."""
+    """Write the indices as CSV, a row for each, atomically."""
     write_table(pl.DataFrame([index.as_dict() for index in indices]), path)

@@ -1,13 +1,12 @@
-"""A flight held against 14 CFR 25.143(d) and Part 60, appendix A, table A2A (`tolerances`).
+"""A flight compared with 14 CFR 25.143(d) and Part 60, appendix A, table A2A (`tolerances`).
 
-Pilot forces are judged by how long they last: the greatest against the short-term limit, and
-what is held for longer than a short term against the long-term one; whichever comes nearer to
-its limit is the figure. All forces are the hand's own, not what the strain gauge says. Part 60:
-the force of a held control against the specified one (2.a, and 2.d.8 and 2.e.1 in flight), and
-the peak rate after a small pitch input (2.b.4), for which the rigid structure stands for the
-aircraft. 2.b.4 is for approach and landing, whose choice is the run's, and for rates of 0.5 to
-2 °/s: a larger one is not judged by it, and "rate against rigid" has the same tolerances for any
-rate. Latency (4.a) is `latency`.
+Pilot forces are judged by their duration: the largest force against the short-term limit, and the
+force held for longer than a short term against the long-term one. The figure is the one closer to
+its limit. All forces are the hand's own, not the strain gauge's readings. Part 60: the force of a
+held control against the specified one (2.a, and 2.d.8 and 2.e.1 in flight), and the peak rate after
+a small pitch input (2.b.4), for which the rigid structure represents the aircraft. 2.b.4 is for
+approach and landing, which the run must choose, and for rates of 0.5 to 2 °/s; "rate against rigid"
+has the same tolerances for any rate. Latency (4.a) is in `latency`.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _LONG_TERM: Standard = "25.143(d) long-term"
 
 @dataclass(frozen=True)
 class StandardFigure:
-    """A flight's figure and its bounds, in N, rad/s or s; `note` says which of several it is."""
+    """A flight's figure and its bounds, in N, rad/s or s; `note` identifies one of several."""
 
     value: float
     least: float | None
@@ -58,9 +57,9 @@ def judge_standard(
 ) -> StandardFigure:
     """Return a flight's figure and its bounds.
 
-    `reference` is the rigid flight of a rate, and of a latency the one with nothing late.
-    `control` is the one that the comparison looks at where none is named. Raises
-    UnjudgedError where the standard is for other flights.
+    `reference` is the rigid flight for a rate, and the flight without delays for a latency.
+    `control` is by default that of the comparison. Raises UnjudgedError if the standard does not
+    apply to the flight.
     """
     looked_at = control or flight.manoeuvre.control
     if standard == _LONG_TERM or standard in _SHORT_TERM:

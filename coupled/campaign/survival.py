@@ -1,8 +1,8 @@
-"""Which of a sweep's flights are survived, and where the boundary of each configuration lies.
+"""The survived flights of a sweep, and the boundary of survival of each configuration.
 
-Where what the surface can do decides, the boundary moves with it: that of a configuration is
-the rigid one's times what its surface reaches by the closed form, 1 − loss. The loss is that of
-the mildest flight, which stays nearest to its trim.
+If the surface's authority decides, the boundary scales with it: that of a configuration is the
+rigid one's times the share of the command that reaches its surface by the closed form, 1 − loss.
+The loss is that of the mildest flight, which stays closest to its trim.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ RIGID, LOSS = "rigid", "loss_closed_form"
 
 @dataclass(frozen=True)
 class SurvivalLimit:
-    """What a configuration survives of the values of one key.
+    """The survival of a configuration over the values of one key.
 
-    `shares` are (value, share of its flights that are survived); `boundary` lies midway between
-    the neighbours at which survival ends, `predicted` where the closed form has it; None where
-    there is no such place, or more than one.
+    `shares` are (value, survived share of its flights); `boundary` is midway between the
+    neighbours at which survival ends, `predicted` that of the closed form; None if there is no
+    boundary, or more than one.
     """
 
     configuration: str
@@ -35,7 +35,7 @@ class SurvivalLimit:
 
 
 def limits(found: pl.DataFrame, key: str) -> list[SurvivalLimit]:
-    """Return the limit of each configuration against a varied key with numbers."""
+    """Return the limit of each configuration over a varied key with numbers."""
     made = [_limit(found, key, name) for name in found["configuration"].unique(maintain_order=True)]
     rigid = next((limit.boundary for limit in made if limit.configuration == RIGID), None)
     if rigid is None or LOSS not in found.columns:
@@ -61,7 +61,7 @@ def _limit(found: pl.DataFrame, key: str, configuration: str) -> SurvivalLimit:
 def _with_prediction(
     found: pl.DataFrame, key: str, limit: SurvivalLimit, rigid: float
 ) -> SurvivalLimit:
-    """Add where the closed form has the boundary."""
+    """Add the boundary predicted by the closed form."""
     if limit.boundary is None or limit.configuration == RIGID:
         return limit
     rows = found.filter((pl.col("configuration") == limit.configuration) & pl.col(SURVIVED))

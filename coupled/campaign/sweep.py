@@ -1,4 +1,4 @@
-"""A sweep, whole: a run flown over values of its parameters, to one table."""
+"""A sweep: a run flown over values of its parameters, with one table of results."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ TABLE = "table.parquet"
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A sweep's flights, a row each, and what they tell.
+    """The flights of a sweep, a row each, with their analysis.
 
-    `table` has the varied keys, the configuration, the figures that are kept, and why a flight
-    ended early; units are in the names. `indices` are those of a sensitivity sweep, `limits`
-    where survival ends, of one that asks for it. `found` flights were in the folder before.
+    `table` has the varied keys, the configuration, the figures, and why a flight ended early;
+    units are in the names. `indices` are those of a sensitivity sweep, `limits` the boundaries of
+    survival, if requested. `found` flights were in the folder before.
     """
 
     plan: SweepPlan
@@ -43,12 +43,12 @@ class SweepResult:
     found: int
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the table, a row a flight."""
+        """Return the table, a row for each flight."""
         return self.table
 
     @property
     def remarks(self) -> list[str]:
-        """What the losses alone do not show, a sentence each, by the first flight's rig."""
+        """Explanations of the losses, a sentence each, from the first flight's rig."""
         asked = self.plan.sweep
         if not {"loss", "loss_closed_form"} & set(asked.keep):
             return []
@@ -73,14 +73,14 @@ def sweep(
     progress: Progress | None = None,
     begun: Callable[[int, int], None] | None = None,
 ) -> SweepResult:
-    """Fly a run over values of its parameters, and return a row a flight.
+    """Fly a run over values of its parameters, and return a row for each flight.
 
     `plan` is a sweep file, the name of a shipped one, or the tables of one. In `folder` each
-    flight is kept as it is done, and another call goes on there; without one nothing is kept.
-    `workers` are processes (all cores unless given; 1 flies here), `cluster` the address of a
-    dask scheduler. `progress` is called with a text, flights done and to do; `begun` once,
-    with the flights that the folder has and those that the sweep has. Raises InputError where
-    the sweep means nothing, or the folder holds another.
+    flight is stored when it is done, and a later call continues there; by default nothing is
+    stored. `workers` are processes (default: all cores; 1 flies in this process), `cluster` the
+    address of a dask scheduler. `progress` is called with a text, flights done and to do; `begun`
+    once, with the flights in the folder and those of the sweep. Raises InputError for an invalid
+    sweep, or a folder with another.
 
     >>> import coupled
     >>> bends = {"key": "rig.controls.column.loader.bend_m_per_N", "values": [1e-5, 9e-5]}
@@ -115,7 +115,7 @@ def sweep(
 
 
 def judged(plan: SweepPlan, table: pl.DataFrame, found: int = 0) -> SweepResult:
-    """Return a sweep's result from its table: with the indices or limits that it asks for."""
+    """Return a sweep's result from its table, with the indices or limits that it requests."""
     asked = plan.sweep
     indices: list[SobolIndex] = []
     if asked.method == "sensitivity" and asked.samples is not None:
@@ -127,5 +127,5 @@ def judged(plan: SweepPlan, table: pl.DataFrame, found: int = 0) -> SweepResult:
 
 
 def write_table(found: pl.DataFrame, path: Path) -> None:
-    """Write a table as Parquet, whole."""
+    """Write a table as Parquet, atomically."""
     csvfile.write_table(found, path)

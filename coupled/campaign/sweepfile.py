@@ -19,7 +19,7 @@ _NO_CONDITION = ("name", "card", "case", "configurations", "expect", "record_pro
 
 
 class Vary(Section):
-    """A parameter and its values: a list, or a range. `also` are keys that go with it."""
+    """A parameter and its values: a list, or a range. `also` are further keys with its value."""
 
     key: str = quantity("", min_length=1, max_length=200)
     also: list[str] = []
@@ -31,7 +31,7 @@ class Vary(Section):
 
 
 class Survive(Section):
-    """What a flight has to keep to be survived: a channel within bounds, in every row."""
+    """A condition of survival: a channel within bounds, in every row."""
 
     channel: str = quantity("", min_length=1)
     least: float | None = None

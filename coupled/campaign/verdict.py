@@ -1,6 +1,6 @@
-"""An expectation held against its flight: the figure, its bounds, and the margin between.
+"""An expectation compared with its flight: the figure, its bounds, and the margin.
 
-What could not be judged says why, and has failed.
+An expectation that could not be judged has a reason, and has failed.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ Bounds = tuple[float | None, float | None]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one expectation on one flight; `value` and its bounds in one unit.
+    """The verdict on one expectation of one flight; `value` and bounds in one unit.
 
-    `problem` says why a figure could not be had; there is none then. `quantity` is a name that
-    ends in the unit of value and bounds, as `force_N`.
+    `problem` is the reason why there is no figure. `quantity` is a name that ends in the unit of
+    value and bounds, such as `force_N`.
     """
 
     run: str
@@ -42,16 +42,16 @@ class Verdict:
 
     @property
     def margin(self) -> float | None:
-        """How far the figure is inside its nearest bound, in its unit; negative outside."""
+        """The distance of the figure from its nearest bound, in its unit; negative outside."""
         return None if self.value is None else _margin(self.value, (self.least, self.most))
 
     @property
     def passed(self) -> bool:
-        """Whether the figure was had, and lies within its bounds."""
+        """Whether there is a figure within its bounds."""
         return self.margin is not None and self.margin >= 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON takes it."""
+        """Return the JSON."""
         table = {key: value for key, value in self.__dict__.items() if key != "quantity"}
         unit = unit_in(self.quantity).replace("_per_", "/")
         return {**table, "unit": unit, "margin": self.margin, "passed": self.passed}
@@ -73,7 +73,7 @@ def wanted(verdict: Verdict, system: System = "si") -> str:
 
 
 def figures(verdict: Verdict, system: System = "si") -> tuple[str, str]:
-    """Return what was found, and its margin, each with its unit; a dash where there is none."""
+    """Return the figure and its margin, each with its unit; a dash if there is none."""
     if verdict.value is None or verdict.margin is None:
         return "–", "–"
     unit = shown(verdict.quantity, system)
@@ -83,7 +83,7 @@ def figures(verdict: Verdict, system: System = "si") -> tuple[str, str]:
 
 
 def finding(verdict: Verdict, system: System = "si") -> str:
-    """Return what was found, in one line."""
+    """Return the result in one line."""
     bounds = f" (wanted {wanted(verdict, system)})" if wanted(verdict) else ""
     if verdict.value is None or verdict.margin is None:
         return verdict.problem + bounds
@@ -92,7 +92,7 @@ def finding(verdict: Verdict, system: System = "si") -> str:
 
 
 def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | None) -> Verdict:
-    """Return the verdict on a flight, held against `other` where the expectation says so."""
+    """Return the verdict on a flight, compared with `other` if the expectation requires it."""
     if flight is None or (expect.reference is not None and other is None):
         raise UnjudgedError("was not flown")
     figure = _figure(expect, flight, other)
@@ -145,7 +145,7 @@ def _refuse_early(flight: Flight, end_s: float) -> None:
 
 
 def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
-    """Return what is taken of a channel: of every row, the one nearest to its bound."""
+    """Return the figure of a channel; of all rows, the one closest to its bound."""
     last_s = flight.manoeuvre.duration_s if expect.end is None else expect.end
     end_s = last_s if expect.at is None else expect.at
     flights = [flight] if other is None else [flight, other]
@@ -169,7 +169,7 @@ def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
 
 
 def _time_reached(expect: Expect, flight: Flight) -> float:
-    """Return when the channel first meets or crosses the level, straight between rows, in s."""
+    """Return when the channel first reaches the level, interpolated between rows, in s."""
     assert expect.reaches is not None
     end_s = flight.manoeuvre.duration_s if expect.end is None else expect.end
     times, values = _window(expect, flight, end_s)

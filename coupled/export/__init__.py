@@ -1,1 +1,1 @@
-"""A rig's loaders as systems that JSBSim itself runs, with the aircraft around them."""
+"""Export of a rig's loaders as JSBSim systems, with the aircraft that includes them."""

@@ -1,4 +1,4 @@
-"""What flies an exported script: a program that has JSBSim's Python package, and not ours."""
+"""Flight of an exported script by JSBSim's Python package alone, without this package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 
-# Written into the folder as it is: it has to run where coupled is not installed.
+# Written into the folder unchanged: it must run where coupled is not installed.
 PROGRAM = '''"""Fly a script of this folder with JSBSim alone, and print its channels as CSV.
 
     python fly.py scripts/NAME.xml [PROPERTY ...] > NAME.csv
@@ -66,11 +66,11 @@ _LONGEST_s = 600.0
 
 
 def fly_alone(folder: Path, script: str, names: Sequence[str]) -> tuple[NDArray[np.float64], str]:
-    """Return a script's flight by JSBSim alone, a row a run and a column a name, and its messages.
+    """Return a script's flight by JSBSim alone, a row for each run and a column for each name.
 
-    `folder` is an exported one. Raises InputError where JSBSim does not fly it.
+    And its messages. `folder` is an exported one. Raises InputError if JSBSim does not fly it.
     """
-    # -I: neither this folder nor the user's variables lead to our package.
+    # -I: neither this folder nor the user's variables make our package importable.
     command = [sys.executable, "-I", str(folder / "fly.py"), str(folder / script), *names]
     environment = {**os.environ, "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""What befalls the aircraft of a run, as a JSBSim script has it: air that moves, events."""
+"""The adverse conditions of a run in a JSBSim script: moving air, events."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m
 
 _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
-_MOVED = np.linspace(-1.0, 1.0, 201)  # how far a trim is moved
+_MOVED = np.linspace(-1.0, 1.0, 201)  # positions of a moved trim
 _GUST, _MILSPEC = "atmosphere/cosine-gust/", "atmosphere/turbulence/milspec/"
 
 
@@ -43,7 +43,7 @@ def add_conditions(script: Script, manoeuvre: Manoeuvre) -> None:
 
 
 def unknown_condition(manoeuvre: Manoeuvre) -> str:
-    """Return the key of a condition that a script cannot have, or an empty string."""
+    """Return the key of a condition that cannot be exported, or an empty string."""
     given = manoeuvre.conditions
     for key in type(given).model_fields:
         if getattr(given, key) and key not in ("wind", "gust", "turbulence", "event"):
@@ -56,7 +56,7 @@ def unknown_condition(manoeuvre: Manoeuvre) -> str:
 
 
 def _add_wind(script: Script, wind: Wind) -> None:
-    """Add a wind along the heading of the start, which is north, and upwards."""
+    """Add a wind along the initial heading, which is north, and upwards."""
     times = np.array(wind.time)
     script.led["atmosphere/wind-north-fps"] = times, np.array(wind.along) / FOOT_m
     if wind.up is not None:
@@ -93,8 +93,8 @@ def _add_event(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
         move = Move(*_shares(event, manoeuvre), to=event.to)
         script.moved.setdefault(event.of_model, []).append(move)
     elif event.engine_out is not None:
-        # A turbine has no magnetos and a piston engine no cut-off: JSBSim ends a script that sets
-        # what is not there.
+        # A turbine has no magnetos and a piston engine no cut-off: JSBSim ends a script that sets a
+        # missing property.
         airframe = make_airframe(manoeuvre)
         assert isinstance(airframe, JSBSimAirframe)
         number = f"[{event.engine_out}]" if event.engine_out else ""
@@ -106,14 +106,14 @@ def _add_event(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
 
 
 def _shares(event: Event, manoeuvre: Manoeuvre) -> tuple[Floats, Floats]:
-    """Return the times of an event, s, and how much of it has happened: all within a frame."""
+    """Return the times of an event, s, and its completed share at each: all within a frame."""
     over = max(event.over, 1e-3 / manoeuvre.rig.frame_rate)
     begins = event.at - (over if event.over == 0.0 else 0.0)
     return np.array([begins, begins + over]), np.array([0.0, 1.0])
 
 
 def _add_runaway(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
-    """Let a trim run: by so much, on top of where JSBSim's trim left it."""
+    """Move a trim by an amount, relative to JSBSim's trim."""
     control, flight = event.trim, manoeuvre.rig.flight
     assert control is not None and event.by is not None and flight is not None
     by = COMMAND_SIGN[SURFACES[control]] * event.by
@@ -125,7 +125,7 @@ def _add_runaway(script: Script, event: Event, manoeuvre: Manoeuvre) -> None:
 
 
 def _follow_trim(script: Script, manoeuvre: Manoeuvre, flight: Flight, name: str) -> None:
-    """Let a factor that counts from the trim count from wherever it is moved to (`Alterations`)."""
+    """Update the reference of a factor about the trim as the trim moves (`Alterations`)."""
     frame_s, folders = 1.0 / manoeuvre.rig.frame_rate, [aircraft_folder()]
     for alteration in ALTERATIONS:
         part = alteration.part

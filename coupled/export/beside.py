@@ -1,4 +1,4 @@
-"""An exported flight beside coupled's own, channel by channel."""
+"""Comparison of an exported flight with coupled's own, channel by channel."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from coupled.record.record import Record
 from coupled.units import FOOT_m, PSF_Pa
 
 Floats = NDArray[np.float64]
-NEUTRAL = 0.01  # of travel, within which F_mod's own breakout may stand on either side
+NEUTRAL = 0.01  # of travel, within which F_mod's breakout may have either sign
 
 
 @dataclass(frozen=True)
 class Beside:
-    """How far an exported flight is from coupled's own, at the worst frame and control.
+    """The errors of an exported flight against coupled's own, at the worst frame and control.
 
     `deflection` and `estimate` are shares of the travel, `force` and `modifying_force` of the
-    greatest there (F_mod where δc is 1 % of the travel from neutral: there it jumps), `surface` of
-    the surface's travel; `loss` is the difference of the authority lost, a share; `load_factor` and
-    `pitch_rad` the motion's. None where there is none.
+    largest there (F_mod where δc is at least 1 % of the travel from neutral, at which it jumps),
+    `surface` of the surface's travel; `loss` is the difference of the lost authority, a share;
+    `load_factor` and `pitch_rad` the motion's. None if there is none.
     """
 
     run: str
@@ -54,7 +54,7 @@ class Beside:
 
 
 def properties(manoeuvre: Manoeuvre) -> list[str]:
-    """Return the properties of an exported flight that stand for a record's channels."""
+    """Return the properties of an exported flight that correspond to a record's channels."""
     found = [name for control in manoeuvre.rig.controls for name in _own(control).values()]
     return found + list(_motion(manoeuvre))
 
@@ -90,11 +90,11 @@ def _motion(manoeuvre: Manoeuvre) -> dict[str, tuple[str, float]]:
 
 
 def alone_record(manoeuvre: Manoeuvre, record: Record, table: Floats) -> Record:
-    """Return coupled's own record with what JSBSim alone flew in its place.
+    """Return coupled's own record with the channels of JSBSim's flight instead.
 
-    `table` has a row a run and the columns of `properties`. A row of a record is what the host has
-    at the start of a frame: the controls' from the run over that frame, the motion from the run
-    before. The first row keeps our motion, since JSBSim trims in its first run.
+    `table` has a row for each run and the columns of `properties`. A row of a record has the host's
+    data at the start of a frame: the controls' from the run over that frame, the motion from the
+    run before. The first row keeps our motion, since JSBSim trims in its first run.
     """
     flight = manoeuvre.rig.flight
     steps = flight.steps_per_frame if flight is not None else 1
@@ -112,7 +112,7 @@ def alone_record(manoeuvre: Manoeuvre, record: Record, table: Floats) -> Record:
 
 
 def beside(manoeuvre: Manoeuvre, configuration: str, ours: Record, alone: Record) -> Beside:
-    """Hold a flight by JSBSim alone against coupled's own."""
+    """Compare a flight by JSBSim alone with coupled's own."""
     rig, rows = manoeuvre.rig, min(len(ours), len(alone))
     worst = dict.fromkeys(("deflection", "estimate", "force", "modifying_force", "surface"), 0.0)
     for control, data in rig.controls.items():

@@ -25,7 +25,7 @@ from coupled.rig.packing import crossed_bends
 from coupled.rig.rig import Rig
 from coupled.rig.sensing import SENSING
 
-HAND_rad_per_s = 6.0  # bandwidth of the hand that an axis is, as a run's clamp has it
+HAND_rad_per_s = 6.0  # bandwidth of the hand on an axis, as that of a run's clamp
 _CONVERTERS = ("computed", "force", "product", "gradient")
 
 
@@ -48,19 +48,19 @@ def control_system(rig: Rig, name: ControlName, substeps: int) -> System:
 
 
 def clamp_gains(made: Made, gradient: float) -> tuple[float, float, float]:
-    """Return stiffness, damping and integral of a hand that holds the grip at a place."""
+    """Return stiffness, damping and integral of a hand that holds the grip at a position."""
     loader, w = made.control.loader, HAND_rad_per_s
     return w * loader.damping, w * loader.mass, w * gradient
 
 
 def _add_inputs(made: Made) -> None:
-    """Add what whoever flies gives: a force, or a place that a hand holds; and the switches."""
+    """Add the inputs: a force, or a position that a hand holds; and the switches."""
     system, d, host = made.system, made.d, made.control.compensation
     travel, own = made.control.travel, made.own
     given = system.declare("force-N", 0.0, "the pilot's force on the grip, N")
-    system.declare("hand", 0.0, "1: a hand holds the grip where hand-deflection and axis say")
+    system.declare("hand", 0.0, "1: a hand holds the grip at hand-deflection plus axis")
     place = f"hand-deflection-{d}"
-    wanted = system.declare(place, 0.0, f"where the hand holds the grip, {d}")
+    wanted = system.declare(place, 0.0, f"position at which the hand holds the grip, {d}")
     gains = clamp_gains(made, max(made.control.schedule.total_gradient))
     for gain, unit, value in zip(
         ("stiffness", "damping", "integral"),
@@ -76,20 +76,20 @@ def _add_inputs(made: Made) -> None:
     ):
         system.declare(switch, float(on), what)
     if made.rig.flight is None:
-        system.declare(BENCH_PRESSURE, 0.0, "the dynamic pressure that the host is given, Pa")
-    system.channel("input", "The force given; or a hand, led by the axis that moves the command.")
+        system.declare(BENCH_PRESSURE, 0.0, "the host's dynamic pressure, Pa")
+    system.channel("input", "A given force, or a hand moved by the axis of the command.")
     command = prop(made.command)
     system.add(
         "trim-norm",
         either(stepping(), own("trim-norm"), command),
-        out="the command in trim, on top of which the loader's comes",
+        out="the command in trim, to which the loader's is added",
     )
     moved = within(made.sign * (command - own("trim-norm")), -1.0, 1.0)
     axis = either(equal(command, own("command-norm")), own("axis-norm"), moved)
     system.add(
         "axis-norm",
         either(stepping(), axis, 0.0),
-        f"Whoever else sets {made.command} is a joystick: pull, right and right foot positive.",
+        f"Any other value of {made.command} is a joystick's: pull, right, right foot positive.",
         out="the joystick's axis, ±1 the whole travel",
     )
     led: tuple[tuple[str, Expr], ...] = (
@@ -145,7 +145,7 @@ def _leads(made: Made) -> bool:
 
 
 def _led(made: Made, i: int, after: Expr, lagged: Expr) -> tuple[Expr, Expr, Expr]:
-    """Return the force at both ends of substep i with the host's lead on it, and z, N."""
+    """Return the force with the host's lead at both ends of substep i, and z, N."""
     lag, h, own = made.control.compensation.force_lead_lag, made.own("step-s"), made.own
     now = made.system.add(f"step-{i}/lead", lagged + h / (h + lag) * (after - lagged))
     ahead = made.system.add(f"step-{i}/led", after + own("host/lead") / lag * (after - now))
@@ -153,9 +153,9 @@ def _led(made: Made, i: int, after: Expr, lagged: Expr) -> tuple[Expr, Expr, Exp
 
 
 def _delayed(made: Made, start: Expr) -> list[Expr] | None:
-    """Return the force at each node of the run as a transport delay leaves it, N; None without.
+    """Return the force at each node of the run behind a transport delay, N; None without one.
 
-    Between the ends of runs it is taken as straight.
+    It is linear between the ends of runs.
     """
     delay, n = made.control.loader.delay, made.substeps
     if delay == 0.0:
@@ -163,7 +163,7 @@ def _delayed(made: Made, start: Expr) -> list[Expr] | None:
     runs = delay * made.rig.frame_rate * made.steps
     add, own = made.system.add, made.own
     count = math.floor(runs) + 2
-    for j in range(count, 1, -1):  # the oldest first, so that each takes what the last run left
+    for j in range(count, 1, -1):  # the oldest first, so that each takes the last run's value
         add(
             f"late/back-{j}",
             made.kept(f"late/back-{j - 1}"),
@@ -182,17 +182,17 @@ def _delayed(made: Made, start: Expr) -> list[Expr] | None:
 
 
 def _give(made: Made, now: Motion, grip: Grip, lagged: Expr | None) -> None:
-    """Add what the run leaves: the loader's and the grip's places, for the next and for all."""
+    """Add the results of the run: positions of loader and grip, for the next run and as output."""
     system, d, add = made.system, made.d, made.system.add
-    system.channel("linkage", "δ = x + K·F, and what the next run goes on from")
-    add(f"loader-{d}", now.computed, out=f"δc as it is, {d}")
+    system.channel("linkage", "δ = x + K·F, and the state for the next run")
+    add(f"loader-{d}", now.computed, out=f"δc, {d}")
     add("rate", now.rate)
     if now.felt is not None:
         add("felt-N", now.felt)
     if lagged is not None:
         add("lead-N", lagged)
         add("led-N", made.own(f"step-{made.substeps}/led"))
-    add(f"servo-{d}", grip.position, out=f"the servo's place, {d}")
+    add(f"servo-{d}", grip.position, out=f"the servo's position, {d}")
     add("servo-rate", grip.rate)
     if made.control.loader.play > 0.0:
         add(f"grip-{d}", grip.grip)
@@ -211,7 +211,7 @@ def _give(made: Made, now: Motion, grip: Grip, lagged: Expr | None) -> None:
 
 
 def _crossed(made: Made, *, assumed: bool) -> Expr | None:
-    """Return what the other controls' forces bend here, or what the host takes it for, d."""
+    """Return the bend here by the other controls' forces, true or as assumed by the host, d."""
     if made.rig.structure.stands_apart:
         return None
     names = [name for name in CONTROL_NAMES if name in made.rig.controls]
@@ -226,7 +226,7 @@ def _crossed(made: Made, *, assumed: bool) -> Expr | None:
 
 
 def _converters(made: Made) -> dict[str, tuple[float, float]]:
-    """Return step and range of each converter, as `rig/sensing` works them out."""
+    """Return step and range of each converter, computed by `rig/sensing`."""
     rig = made.rig
     frame_s = 1.0 / rig.frame_rate
     given = Given(made.control, Hand(), frame_s, frame_s / rig.substeps, rig.substeps)

@@ -1,8 +1,8 @@
 """Expressions that become JSBSim functions.
 
 Written with Python's operators, an expression is the tree of a `<function>`. A property is
-`prop("aero/qbar-psf")`, a number a `<v>`. What is known when it is written is worked out at once,
-so that an effect with a neutral value leaves no term behind.
+`prop("aero/qbar-psf")`, a number a `<v>`. Constants are evaluated at once, so that an effect with a
+neutral value leaves no term.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-_LINE = 96  # an element shorter than this stands on one line
+_LINE = 96  # largest length of an element on one line
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Expr:
 
     @property
     def number(self) -> float | None:
-        """The value of a constant, None for what is found in flight."""
+        """The value of a constant, None for any other expression."""
         return float(self.text) if self.tag == "v" else None
 
     def __add__(self, other: Value) -> Expr:
@@ -82,7 +82,7 @@ Value = Expr | float | int
 
 
 def as_expr(value: Value) -> Expr:
-    """Return a number as a constant; an expression as it is."""
+    """Return a number as a constant; an expression unchanged."""
     if isinstance(value, Expr):
         return value
     if not math.isfinite(value):
@@ -96,7 +96,7 @@ def prop(name: str) -> Expr:
 
 
 def total(*terms: Value) -> Expr:
-    """Return a sum; constants are worked out, sums within it are opened."""
+    """Return a sum; constants are evaluated, nested sums are flattened."""
     known, rest = 0.0, list[Expr]()
     for term in map(as_expr, terms):
         for part in term.parts if term.tag == "sum" else (term,):
@@ -110,7 +110,7 @@ def total(*terms: Value) -> Expr:
 
 
 def times(*factors: Value) -> Expr:
-    """Return a product; constants are worked out, products within it are opened."""
+    """Return a product; constants are evaluated, nested products are flattened."""
     known, rest = 1.0, list[Expr]()
     for factor in map(as_expr, factors):
         for part in factor.parts if factor.tag == "product" else (factor,):
@@ -148,7 +148,7 @@ equal = _known("eq", lambda a, b: float(a == b))
 
 
 def either(condition: Value, then: Value, otherwise: Value) -> Expr:
-    """Return `then` where the condition is not 0, `otherwise` where it is."""
+    """Return `then` if the condition is not 0, else `otherwise`."""
     test = as_expr(condition)
     if test.number is not None:
         return as_expr(then if test.number != 0.0 else otherwise)
@@ -157,12 +157,12 @@ def either(condition: Value, then: Value, otherwise: Value) -> Expr:
 
 
 def within(value: Value, low: Value, high: Value) -> Expr:
-    """Return a value held between two bounds."""
+    """Return a value limited to two bounds."""
     return least(most(value, low), high)
 
 
 def looked_up(at: Expr, points: Sequence[float], values: Sequence[float]) -> Expr:
-    """Return a table over a property, straight between its rows and held at its ends."""
+    """Return a table over a property, linear between its rows and constant beyond."""
     if len(set(values)) == 1:
         return as_expr(values[0])
     rows = "\n".join(f"  {x!r} {y!r}" for x, y in zip(points, values, strict=True))

@@ -1,4 +1,4 @@
-"""The folder of an export, and the runs that go into it."""
+"""The folder of an export, and the runs in it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from coupled.resources import shipped_runs
 from coupled.rig.rig import Rig
 from coupled.schema import load_toml
 
-MARK = "coupled-export.json"  # by which a folder is known as ours, to be written anew
+MARK = "coupled-export.json"  # identifies a folder of an export, which may be overwritten
 
 
 def check_folder(folder: Path) -> None:
-    """Raise InputError for a folder that holds something else than a former export."""
+    """Raise InputError for a folder with files other than those of a former export."""
     if folder.is_file():
         raise InputError(folder, "", "is a file; name a folder")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
@@ -29,7 +29,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_export(made: Export, folder: Path) -> None:
-    """Write an export into its folder, all files or none; what a former one left goes."""
+    """Write an export into its folder, all files or none; files of a former one are removed."""
     before = _former(folder)
     files: Files = dict(made.files)
     with Outputs() as outputs:
@@ -50,7 +50,7 @@ def write_export(made: Export, folder: Path) -> None:
 
 
 def _former(folder: Path) -> set[str]:
-    """Return the places of the files that a former export put there."""
+    """Return the paths of a former export's files."""
     try:
         found = json.loads((folder / MARK).read_text(encoding="utf-8"))["files"]
         return {name for name in found if isinstance(name, str)}
@@ -64,10 +64,10 @@ def runs_of(rig_name: str) -> list[str]:
 
 
 def exportable(rig: Rig, cases: Sequence[Manoeuvre]) -> tuple[list[Flown], list[str]]:
-    """Return the cases that fly with this export, and those that need one of their own, with why.
+    """Return the cases that fly with this export, and those that need another, with the reason.
 
-    What a script can set are the aircraft's place, speed and levers, and the corrections; another
-    loader, frame or model is another export.
+    A script can set the aircraft's position, speed and levers, and the corrections; another loader,
+    frame or model needs another export.
     """
     flown, others = list[Flown](), list[str]()
     for case in cases:
@@ -87,7 +87,7 @@ def exportable(rig: Rig, cases: Sequence[Manoeuvre]) -> tuple[list[Flown], list[
 
 
 def _differs(rig: Rig, other: Rig) -> str:
-    """Return what keeps a case's rig from flying with another's export, or nothing."""
+    """Return why a case's rig cannot fly with another's export, or nothing."""
     if set(rig.controls) != set(other.controls) or rig.structure != other.structure:
         return "other controls"
     differs = [

@@ -1,4 +1,4 @@
-"""The host as JSBSim's components, once a frame: schedule, ΔG, what it reads, δ̂.
+"""The host as JSBSim components, once a frame: schedule, ΔG, its readings, δ̂.
 
 The equations are those of `rig/schedule`, `modification`, `sensing` and `compensation`.
 """
@@ -34,16 +34,16 @@ def pressure(made: Made) -> Expr:
 
 
 def converted(value: Expr, step: float, full_scale: float) -> Expr:
-    """Return a value as a converter of this step and range passes it; step 0 passes all."""
+    """Return a value after a converter of this step and range; unchanged for step 0."""
     if step == 0.0:
         return value
     return within(step * below(value / step + 0.5), -full_scale, full_scale - step)
 
 
 def add_schedule(made: Made) -> None:
-    """Add q̄ as the schedule gets it, and G_T of its table."""
+    """Add the schedule's q̄, and G_T of its table."""
     schedule, d = made.control.schedule, made.d
-    made.system.channel("schedule", "G_T(q̄), straight between the table's rows, held at its ends")
+    made.system.channel("schedule", "G_T(q̄), linear between the table's rows, constant beyond")
     got = schedule.pressure_scale * pressure(made)
     if schedule.pressure_lag > 0.0:
         before = made.own("schedule/pressure-Pa")
@@ -56,7 +56,7 @@ def add_schedule(made: Made) -> None:
     for name, table in tables.items():
         rest = _at_rest(schedule.dynamic_pressure, table)
         sloped = [rest + schedule.slope * (value - rest) for value in table]
-        says = f"G_T, the gradient asked for, N/{d}"
+        says = f"G_T, the specified gradient, N/{d}"
         looked = looked_up(at, schedule.dynamic_pressure, sloped)
         made.once_a_frame(name, looked, out=says if name.startswith("gradient") else "")
 
@@ -69,9 +69,9 @@ def _at_rest(pressures: list[float], table: list[float]) -> float:
 
 
 def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
-    """Add ΔG, eq. (12) or G_T − G_B, the break and F_extra of appendix C, and what the host sends.
+    """Add ΔG, eq. (12) or G_T − G_B, the break and F_extra of appendix C, and the host's output.
 
-    `steps` are its converters' steps and ranges by the names that `rig/sensing` has for them.
+    `steps` are its converters' steps and ranges by their names in `rig/sensing`.
     """
     control, d, add = made.control, made.d, made.system.add
     made.system.channel("modification", "ΔG = G_T/(1 − K̂·G_T) − G_B, eq. (12), where corrected")
@@ -95,7 +95,7 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         edge = either(early, 0.0, edge)
     made_force = 1.0 / sensing.modifying_scale
     scale = made_force * (sensing.computed_scale if hybrid else 1.0)
-    assumed: Any = bend  # the report's functions take what multiplies and divides as numbers do
+    assumed: Any = bend  # the report's functions work on expressions as on numbers
     asked: dict[str, Any] = {"first": first, "second": second}
     on_computed = {name: total_to_computed(each, assumed) for name, each in asked.items()}
     if has_extra(made):
@@ -117,7 +117,7 @@ def add_modification(made: Made, steps: dict[str, tuple[float, float]]) -> None:
 
 
 def add_inertia(made: Made) -> None:
-    """Add m, c and the lead on the force by the gradient, where the host sets them."""
+    """Add m, c and the lead on the force by the gradient, if the host sets them."""
     host, loader = made.control.compensation, made.control.loader
     if host.inertia_gradient is None:
         return
@@ -134,9 +134,9 @@ def add_inertia(made: Made) -> None:
 
 
 def add_reading(made: Made, steps: dict[str, tuple[float, float]]) -> None:
-    """Add what the host reads of δc and F, and the product of a digital host."""
+    """Add the host's readings of δc and F, and the product of a digital host."""
     sensing, d = made.control.sensing, made.d
-    made.system.channel("reading", "δc and F as the host has them, eq. (2)")
+    made.system.channel("reading", "δc and F as the host reads them, eq. (2)")
     read = converted(sensing.read_scale * made.own(f"loader-{d}"), *steps["computed"])
     made.once_a_frame(f"computed-{d}", read, out=f"δc as the host reads it, {d}")
     force = converted(sensing.force_scale * made.own("force-held-N"), *steps["force"])
@@ -147,22 +147,22 @@ def add_reading(made: Made, steps: dict[str, tuple[float, float]]) -> None:
         given = made.own("host/held")
     else:
         given = modifying(made, made.own(f"loader-{d}"), smooth=False)
-    made.once_a_frame("modifying-force-N", given, out="F_mod that the host asks for, N")
+    made.once_a_frame("modifying-force-N", given, out="F_mod of the host, N")
 
 
 def add_estimate(made: Made, others: Expr | None) -> None:
-    """Add δ̂ = δc + K̂·F, eq. (1) solved for δ; `others` is what other controls' forces bend, d."""
+    """Add δ̂ = δc + K̂·F, eq. (1) solved for δ; `others` is the bend by other controls, d."""
     d, host = made.d, made.control.compensation
     made.system.channel("compensation", "δ̂ = δc + K̂·F where corrected, else δ̂ = δc")
     bent = host.bend * made.own("force-read-N")
     if others is not None:
         bent = bent + others
     estimate = made.own(f"computed-{d}") + made.own("deflection-correction") * bent
-    made.once_a_frame(f"estimate-{d}", estimate, out=f"δ̂, what the surface is given, {d}")
+    made.once_a_frame(f"estimate-{d}", estimate, out=f"δ̂, the input of the surface, {d}")
 
 
 def add_external(made: Made) -> None:
-    """Add the force that holds over the frame to come: an offset, and the bob weight's."""
+    """Add the constant forces of the next frame: an offset, and the bob weight's."""
     loader = made.control.loader
     made.system.channel("bob weight", "−b·(n_z − 1), and a constant force")
     external = Expr("v", text=repr(loader.offset))

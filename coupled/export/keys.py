@@ -1,8 +1,8 @@
-"""What of a rig an export takes along: every key of its file is known here, or refused by name.
+"""The keys of a rig in an export: every key of its file is listed here, or refused by name.
 
-All sections are walked by their declared parameters. A key that stands at its default leaves out an
-effect, and asks nothing of the export; any other has to be listed below. So a key that comes to the
-rig later is refused until the export has it.
+All sections are walked by their declared parameters. A key at its default leaves out an effect and
+needs nothing in the export; any other must be listed below. So a new key of a rig is refused until
+the export supports it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.structure import Compliance, Structure
 from coupled.schema import Section, file_keys
 
-# Written out, not taken from the sections: what is added there is not known here.
+# Listed explicitly, not taken from the sections, so that new keys are not included.
 EXPORTED: Mapping[type[Section], frozenset[str]] = {
     Rig: frozenset(("name", "frame_rate", "controls")),
     Control: frozenset((*("surface", "travel", "length"),)),
@@ -81,7 +81,7 @@ EXPORTED: Mapping[type[Section], frozenset[str]] = {
     ),
 }
 
-# What says something about the rig and does nothing in flight, or nothing in JSBSim.
+# Keys without an effect in flight, or in JSBSim.
 WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
     Rig: {
         "loader_rate": "the export chooses the loader's rate itself",
@@ -104,7 +104,7 @@ WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
     Sensing: {"gauge_order": "nothing without a gauge", "gauge_damping_ratio": "the same"},
 }
 
-# Known, and not exported: why, by key.
+# Keys that are not exported, with the reason.
 REFUSED: Mapping[type[Section], Mapping[str, str]] = {
     Loader: {"friction_stiffness": "friction that yields before it slips is not exported"},
     Sensing: {
@@ -126,7 +126,7 @@ REFUSED: Mapping[type[Section], Mapping[str, str]] = {
     },
 }
 
-# What is approximated where it is not neutral, and how far off that is.
+# Keys that are approximated if not neutral, with the error.
 APPROXIMATED: Mapping[str, str] = {
     "loader.delay": "the delayed force is taken as straight between the ends of JSBSim's runs",
     "structure": "of a control that comes later in the order column, wheel, pedals, the force of"
@@ -135,7 +135,7 @@ APPROXIMATED: Mapping[str, str] = {
 
 
 def check_keys(rig: Rig, file: object) -> list[str]:
-    """Return what is left out and why; raise InputError for a key that cannot be exported."""
+    """Return the keys left out, with the reason; raises InputError for a key not exported."""
     left = list[str]()
     for section, path, d in _sections(rig):
         left += _check_section(section, path, d, file)
@@ -143,7 +143,7 @@ def check_keys(rig: Rig, file: object) -> list[str]:
 
 
 def _sections(rig: Rig) -> Iterator[tuple[Section, str, str]]:
-    """Yield all sections of a rig with their dotted places, and the unit of deflection there."""
+    """Yield all sections of a rig with their dotted paths, and their unit of deflection."""
     waiting: list[tuple[Section, str, str]] = [(rig, "", "m")]
     while waiting:
         section, path, d = waiting.pop()
@@ -166,7 +166,7 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
     for key, name in file_keys(kind, d).items():
         field, value = kind.model_fields[name], getattr(section, name)
         dotted = f"{path}.{key}" if path else key
-        if isinstance(value, Section):  # its own keys say more
+        if isinstance(value, Section):  # its own keys are checked
             continue
         if name in exported or value == field.get_default(call_default_factory=True):
             continue
@@ -183,9 +183,9 @@ def _check_section(section: Section, path: str, d: str, file: object) -> list[st
 
 
 def only_scripted(rig: Rig) -> list[str]:
-    """Return what of a rig's aircraft only the scripts set, a line each with its key and why.
+    """Return the settings of a rig's aircraft made by scripts only, a line each with key and why.
 
-    Flown without a script, as in FlightGear, the exported aircraft is without it.
+    Without a script, as in FlightGear, the exported aircraft does not have them.
     """
     flight = rig.flight
     if flight is None:
@@ -203,7 +203,7 @@ def only_scripted(rig: Rig) -> list[str]:
 
 
 def approximated(rig: Rig) -> list[str]:
-    """Return what of a rig is approximated, and how."""
+    """Return the approximated parts of a rig, with the approximation."""
     found = list[str]()
     for name, control in rig.controls.items():
         if control.loader.delay > 0.0:

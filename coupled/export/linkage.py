@@ -1,7 +1,7 @@
-"""The linkage as JSBSim's components: servo, play, bend and hand (`rig/linkage`, `rig/hand`).
+"""The linkage as JSBSim components: servo, backlash, bend and hand (`rig/linkage`, `rig/hand`).
 
-The servo's map over a substep is exact, as the rig's own: its weights are worked out anew in every
-run from the step that JSBSim takes, so that the system holds at any rate.
+The servo's map over a substep is exact, like the rig's own: its weights are computed in every run
+from JSBSim's step, so that the system is valid at any rate.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coupled.export.making import Made
 
 @dataclass(frozen=True)
 class Grip:
-    """Where servo and grip are, d and d/s, and the hand's force and its integral, N."""
+    """Positions of servo and grip, d and d/s, and the hand's force and its integral, N."""
 
     position: Expr
     rate: Expr
@@ -35,7 +35,7 @@ class Grip:
 
 
 def add_weights(made: Made) -> None:
-    """Add the servo's weights for a δc that runs straight over a substep (`servo_weights`)."""
+    """Add the servo's weights for a δc linear over a substep (`servo_weights`)."""
     loader, system, h = made.control.loader, made.system, made.own("step-s")
     if loader.servo_frequency == 0.0:
         return
@@ -62,7 +62,7 @@ def add_weights(made: Made) -> None:
 
 
 def add_servo(made: Made, place: str, was: Motion, now: Motion, grip: Grip) -> Grip:
-    """Add one substep of servo and play; the hand's part is as before."""
+    """Add one substep of servo and backlash; the hand's part is unchanged."""
     system, loader, own = made.system, made.control.loader, made.own
     x, v = grip.position, grip.rate
     if loader.servo_frequency == 0.0:
@@ -88,7 +88,7 @@ def add_servo(made: Made, place: str, was: Motion, now: Motion, grip: Grip) -> G
 
 
 def bend(made: Made, force: Expr) -> Expr:
-    """Return the structure's bend under a force, d, as `bend` is switched."""
+    """Return the structure's bend under a force, d, with its switch."""
     loader = made.control.loader
     limit = loader.bend_limit
     bent = _compliance(made, force) * force
@@ -105,7 +105,7 @@ def _compliance(made: Made, force: Expr) -> Expr:
 
 
 def _slope(made: Made, force: Expr) -> Expr:
-    """Return the bend's derivative by force, d/N; of all the bend, where a part has a play."""
+    """Return the bend's derivative by force, d/N; that of the whole bend with hysteresis."""
     compliance, limit = _compliance(made, force), made.control.loader.bend_limit
     if limit > 0.0:  # 1/cosh²(y) = 4·e/(e + 1)², e = exp(2y)
         e = exponential((2.0 / limit) * compliance * force)
@@ -130,10 +130,10 @@ def _carried(made: Made, carried: Expr, force: Expr) -> Expr:
 
 
 def add_hand(made: Made, place: str, script: Expr, target: Expr, grip: Grip) -> Grip:
-    """Add the hand's force at the end of a substep: the force given, and what holds a place.
+    """Add the hand's force at the end of a substep: the given force, and that of holding.
 
-    `script` is the force given there, N, `target` where the hand holds the grip, d. The bend's
-    local slope is taken implicitly, as in `rig/hand`.
+    `script` is the given force there, N, `target` the position at which the hand holds the grip, d.
+    The bend's local slope is taken implicitly, as in `rig/hand`.
     """
     system, own, h = made.system, made.own, made.own("step-s")
     hold, damping = own("hand/stiffness-now"), own("hand/damping-now")
@@ -153,7 +153,7 @@ def add_hand(made: Made, place: str, script: Expr, target: Expr, grip: Grip) -> 
 
 
 def begin(made: Made) -> Grip:
-    """Return servo and grip as the run before left them."""
+    """Return servo and grip at the end of the run before."""
     add, kept = made.system.add, made.kept
     hysteresis = made.control.loader.bend_hysteresis_share > 0.0
     position = add("step-0/servo", kept(f"servo-{made.d}"))

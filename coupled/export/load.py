@@ -1,15 +1,15 @@
-"""The load and the factors of a rig's aircraft, written into the files of its exported model.
+"""The loading and the factors of a rig's aircraft, written into its exported model's files.
 
 In flight, `flight/loading` moves the centre of gravity and fills the tanks of a loaded model, and
-`flight/altered` sets the factors on its aerodynamics. The exported aircraft has to be the same in
+`flight/altered` sets the factors on its aerodynamics. The exported aircraft must be the same in
 JSBSim and in FlightGear, with a script and without, so the numbers are written into its files:
 
     cg_aft              the aerodynamic reference point, moved forward: metrics, location AERORP
     fuel                the contents of each tank, times the factor
-    pitch_damping, …    the factors that count from zero, where the model's aerodynamics have them
+    pitch_damping, …    the factors with reference zero, in the model's aerodynamics
 
-A factor about the trim (`elevator_effectiveness`) needs the place of the surface in trim, which no
-file can hold: a script sets it.
+A factor about the trim (`elevator_effectiveness`) needs the surface position in trim, which a file
+cannot contain: a script sets it.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from coupled.units import FOOT_m, INCH_m
 
 POINT = "metrics/aero-rp-x-in"
 TANKS = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
-_UNITS_m = {"IN": INCH_m, "FT": FOOT_m, "M": 1.0}  # of a location; JSBSim takes no other
-_REACHED = 1e-6  # relative: JSBSim's own factors between units have seven digits
+_UNITS_m = {"IN": INCH_m, "FT": FOOT_m, "M": 1.0}  # of a location; JSBSim accepts no others
+_REACHED = 1e-6  # relative tolerance: JSBSim's own unit factors have seven digits
 
 
 def set_load(files: Files, flight: Flight | None, file: object) -> Files:
-    """Return an exported aircraft's files with the rig's load and factors in them.
+    """Return an exported aircraft's files with the rig's loading and factors.
 
-    `file` is the rig's, named in faults. Raises InputError where the model has no place for one.
+    `file` is the rig's, named in faults. Raises InputError if the model cannot have them.
     """
     if flight is None:
         return files
@@ -58,10 +58,10 @@ def set_load(files: Files, flight: Flight | None, file: object) -> Files:
 
 
 def check_load(folder: Path, rig: Rig, file: object) -> None:
-    """Load an exported aircraft by JSBSim, and hold its load against that of our own flight.
+    """Load an exported aircraft in JSBSim, and compare its loading with that of our own flight.
 
-    `folder` holds the export. Raises InputError where they differ, and where the rig's own aircraft
-    does not take the load, as more fuel than its tanks hold.
+    `folder` has the export. Raises InputError if they differ, and if the rig's own aircraft cannot
+    be loaded so, for example with more fuel than its tanks hold.
     """
     flight = rig.flight
     if flight is None or (flight.cg_aft == 0.0 and flight.fuel == 1.0):
@@ -84,7 +84,7 @@ def check_load(folder: Path, rig: Rig, file: object) -> None:
 
 
 def _section(files: Files, main: PurePosixPath, name: str) -> PurePosixPath:
-    """Return the file that a section of the model is in: the model's, or one that it names."""
+    """Return the file of a section of the model: the model's, or one that it names."""
     section = ElementTree.fromstring(files[main]).find(name)
     own = "" if section is None else section.get("file", "").removesuffix(".xml")
     place = main.parent / f"{own}.xml"
@@ -92,7 +92,7 @@ def _section(files: Files, main: PurePosixPath, name: str) -> PurePosixPath:
 
 
 def _with_point(text: bytes, flight: Flight, file: object) -> bytes:
-    """Return a file whose aerodynamic reference point lies further forward, by `cg_aft`."""
+    """Return a file with the aerodynamic reference point moved forward by `cg_aft`."""
     for number in _numbers(text, "location", "x"):
         unit = number.within.get("unit", "IN")
         if number.within.get("name") == "AERORP" and unit in _UNITS_m:
@@ -102,14 +102,14 @@ def _with_point(text: bytes, flight: Flight, file: object) -> bytes:
 
 
 def _with_contents(text: bytes, share: float) -> bytes:
-    """Return a file whose tanks hold so many times as much."""
+    """Return a file with the contents of all tanks multiplied by `share`."""
     for number in reversed(_numbers(text, "tank", "contents")):
         text = number.replaced(text, share * number.value)
     return text
 
 
 def _with_factors(text: bytes, flight: Flight) -> bytes:
-    """Return a model with the factors that count from zero (`modelfile` declares them)."""
+    """Return a model with the factors with reference zero (declared by `modelfile`)."""
     for alteration in ALTERATIONS:
         part, factor = alteration.part, alteration.factor(flight)
         if alteration.about_trim or factor == 1.0:
@@ -124,7 +124,7 @@ def _with_factors(text: bytes, flight: Flight) -> bytes:
 
 @dataclass(frozen=True)
 class _Number:
-    """A number in an XML file: the bytes that it takes, and the attributes of what it is within."""
+    """A number in an XML file: its bytes, and the attributes of its parent element."""
 
     value: float
     start: int
@@ -132,7 +132,7 @@ class _Number:
     within: Mapping[str, str]
 
     def replaced(self, text: bytes, value: float) -> bytes:
-        """Return the file with another number in its place, and nothing else changed."""
+        """Return the file with only this number replaced."""
         return text[: self.start] + repr(value).encode() + text[self.end :]
 
 

@@ -1,18 +1,18 @@
-"""The loader as JSBSim's components: δc over one of its substeps (`rig/loader` has the equations).
+"""The loader as JSBSim components: δc over one of its substeps (equations: `rig/loader`).
 
     m·δc'' + c·δc' + friction·Sgn(δc') + breakout·Sgn(δc) + G_B·δc + k₃·δc³ + F_mod = F + F_ext
 
-The smooth part is stepped by the implicit midpoint rule, as the rig's own is. Friction and breakout
+The smooth part is stepped by the implicit midpoint rule, like the rig's own. Friction and breakout
 are set-valued here too, and implicit: with u = δc' at the middle of the step h,
-A = 2m/h + c + h·k/2 and W = A·δc' + all that pushes,
+A = 2m/h + c + h·k/2 and W = A·δc' + all forces,
 
     A·u + F_c·Sgn(u) + F_BO·Sgn(δc + h·u) ∋ W
 
-has one solution, and in closed form, since the left side rises with u and jumps at u = 0 and at
-u₀ = −δc/h only: u = max(min(u₁, a), min(u₂, b), u₃), where a ≤ b are the two places of the jumps
-and u₁ ≥ u₂ ≥ u₃ what u is below, between and above both. So a control inside its friction
-or its breakout stays exactly where it is, at any rate. What differs from the rig's own: an event
-counts for all of the substep in which it falls, not from its own time on.
+has one solution in closed form, since the left side rises with u and jumps only at u = 0 and at
+u₀ = −δc/h: u = max(min(u₁, a), min(u₂, b), u₃), where a ≤ b are the two jumps and u₁ ≥ u₂ ≥ u₃ the
+solutions below, between and above both. So a control inside its friction or its breakout does not
+move, at any rate. In contrast to the rig's own loader, an event counts for the whole substep in
+which it falls.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from coupled.rig.loader import stop_of
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the loader is: δc in d, δc' in d/s, and an F_mod that lags as it is felt, N."""
+    """The state of the loader: δc in d, δc' in d/s, and a lagged F_mod, N."""
 
     computed: Expr
     rate: Expr
@@ -50,7 +50,7 @@ def held(made: Made) -> bool:
 
 
 def modifying(made: Made, at: Expr, *, smooth: bool) -> Expr:
-    """Return F_mod at δc = `at` as the host's last numbers have it; `smooth` without F_extra."""
+    """Return F_mod at δc = `at` by the host's last output; `smooth` without F_extra."""
     own, schedule = made.own, made.control.schedule
     force = own("host/first") * at
     if made.control.loader.multiplier == "hybrid":
@@ -79,9 +79,9 @@ def has_extra(made: Made) -> bool:
 
 
 def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -> Motion:
-    """Add one substep, in which the force goes straight from `before` to `after`, N.
+    """Add one substep, over which the force is linear from `before` to `after`, N.
 
-    `place` begins the names of its components; `was` is where the loader stood.
+    `place` is the prefix of its components' names; `was` is the loader's state before.
     """
     system, loader, h = made.system, made.control.loader, made.own("step-s")
     mass, damping = inertia(made)
@@ -114,7 +114,7 @@ def add_loader(made: Made, place: str, before: Expr, after: Expr, was: Motion) -
 
 
 def inertia(made: Made) -> tuple[Expr | float, Expr | float]:
-    """Return m and c: the file's, or what the host sets by the gradient."""
+    """Return m and c: the file's, or those set by the host from the gradient."""
     loader, host = made.control.loader, made.control.compensation
     mass: Expr | float = loader.mass
     damping: Expr | float = loader.damping
@@ -142,7 +142,7 @@ def _spring(made: Made, at: Expr) -> tuple[Expr, Expr]:
 def _halfway(
     made: Made, place: str, was: Motion, inert: Expr, pushed: Expr
 ) -> tuple[Expr, Expr | None]:
-    """Return u, and where there is a breakout also u₀, which brings the control to neutral."""
+    """Return u, and with a breakout also u₀, which moves the control to neutral."""
     system, loader, h = made.system, made.control.loader, made.own("step-s")
     preload = breakout(made)
     dry = max(loader.friction, loader.breakaway) > 0.0
@@ -166,7 +166,7 @@ def _level(made: Made, rate: Expr) -> Expr:
 
 
 def breakout(made: Made) -> Expr | float | None:
-    """Return the preload about neutral, N: the loader's and, of a hybrid, the host's."""
+    """Return the preload about neutral, N: the loader's, and a hybrid's from the host."""
     own = made.control.loader.breakout
     if has_extra(made) and not held(made):
         return made.own("host/extra") + own
@@ -190,7 +190,7 @@ def _solved(
         low, high = (pushed + preload) / inert, (pushed - preload) / inert
         return most(least(low, neutral), high)
     both = friction + preload
-    # Friction jumps at u = 0, the preload at u₀: the first of them is met from below.
+    # Friction jumps at u = 0, the preload at u₀: which comes first from below.
     first = either(greater(neutral, 0.0), preload - friction, friction - preload)
     return most(
         least((pushed + both) / inert, least(neutral, 0.0)),
@@ -210,7 +210,7 @@ def _rate(made: Made, v: Expr, halfway: Expr) -> Expr:
 
 
 def _too_slow(made: Made, rate: Expr, pull: Expr) -> Expr:
-    """Return whether a control that comes to neutral at this speed is held there in a substep."""
+    """Return whether a control at neutral with this speed is stopped there in a substep."""
     preload = breakout(made)
     assert preload is not None
     mass, _ = inertia(made)
@@ -219,7 +219,7 @@ def _too_slow(made: Made, rate: Expr, pull: Expr) -> Expr:
 
 
 def _feel(made: Made, name: str, felt: Expr | None, at: Expr) -> Expr:
-    """Return F_mod as the loader feels it where it is held: at once, or half a substep on."""
+    """Return F_mod on the loader if it is held: at once, or advanced by half a substep."""
     digital = made.control.loader.multiplier == "digital"
     wanted = made.own("host/held") if digital else modifying(made, at, smooth=False)
     lag = made.control.loader.modifying_lag

@@ -1,8 +1,8 @@
-"""What the stages of one exported control share: its data, its system, and how time is divided.
+"""The common data of the stages of one exported control: rig, system, and time steps.
 
 A run of JSBSim takes one step of dt. The loader takes `substeps` of h = dt/substeps within it, each
-a set of components of its own: JSBSim runs components in the order in which they stand in the file,
-and has no loop. A host that is slower than JSBSim acts at every `steps`-th run, and holds between.
+a set of components of its own, since JSBSim runs components in the order of the file and has no
+loop. A host slower than JSBSim acts at every `steps`-th run, and holds its outputs in between.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from coupled.rig.rig import Rig
 from coupled.rig.surface import COMMAND_SIGN
 
 DT = prop("simulation/dt")
-STILL_s = 1e-6  # the loader's step in a run that takes no time, as in JSBSim's trim
+STILL_s = 1e-6  # the loader's step in a run of zero time, as in JSBSim's trim
 
 
 @dataclass(frozen=True)
 class Made:
-    """One control in the making.
+    """One control during its export.
 
     `substeps` of the loader in a run of JSBSim, `steps` of JSBSim in a frame of the host.
     """
@@ -48,7 +48,7 @@ class Made:
 
     @property
     def steps(self) -> int:
-        """Runs of JSBSim in a frame of the host."""
+        """The number of runs of JSBSim in a frame of the host."""
         return self.rig.flight.steps_per_frame if self.rig.flight is not None else 1
 
     @property
@@ -58,11 +58,11 @@ class Made:
 
     @property
     def sign(self) -> float:
-        """JSBSim's sign of a command that a positive force gives."""
+        """JSBSim's sign of a command for a positive force."""
         return COMMAND_SIGN[self.control.surface]
 
     def own(self, name: str) -> Expr:
-        """Return a component's value, of the last run where it stands before it."""
+        """Return a component's value, of the last run if it comes later in the file."""
         return self.system.own(name)
 
     def kept(self, name: str) -> Expr:
@@ -70,20 +70,20 @@ class Made:
         return self.own("live") * self.own(name)
 
     def once_a_frame(self, name: str, value: Value, says: str = "", out: str = "") -> Expr:
-        """Add a component that the host sets at its frames, and holds between them."""
+        """Add a component that the host sets at its frames, and holds in between."""
         if self.steps > 1:
             value = either(equal(self.own("clock"), 0.0), value, self.own(name))
         return self.system.add(name, value, says, out=out)
 
     def frame_gain(self, lag_s: float) -> Expr:
-        """Return the share of the way that a first-order lag goes in a frame of the host."""
+        """Return the step response of a first-order lag after a frame of the host."""
         return 1.0 - exponential(-(self.steps / lag_s) * DT)
 
 
 def add_clock(made: Made) -> None:
-    """Add what divides time: whether JSBSim steps, the loader's step, the host's frame."""
+    """Add the time steps: whether JSBSim steps, the loader's step, the host's frame."""
     system = made.system
-    system.channel("time", "A run that takes no time (JSBSim's start and trim) sets all back.")
+    system.channel("time", "A run of zero time (JSBSim's start and trim) resets all.")
     system.add("live", either(stepping(), own_started(made), 0.0), "1 from the second step on")
     system.add("started", stepping(), "1 from the first step on")
     step = either(made.own("live"), DT / float(made.substeps), STILL_s)
@@ -95,7 +95,7 @@ def add_clock(made: Made) -> None:
 
 
 def stepping() -> Expr:
-    """Return 1 where JSBSim's time goes on, 0 where it starts or trims."""
+    """Return 1 if JSBSim's time advances, 0 during its start or trim."""
     return Expr("gt", (DT, Expr("v", text="0.0")))
 
 

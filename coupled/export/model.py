@@ -1,4 +1,4 @@
-"""The aircraft of an export: its files as they are, the include, and all that they refer to."""
+"""The aircraft of an export: its files with the includes, and all files that they name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 
 Files = dict[PurePosixPath, bytes]
-_SYSTEMS = ("system", "autopilot", "flight_control")  # as JSBSim loads them, one after the other
+_SYSTEMS = ("system", "autopilot", "flight_control")  # in JSBSim's order of loading
 _BENCH = b"""<?xml version="1.0"?>
 <!-- No aircraft: a weight that carries the loader of a bench. q comes from a property. -->
 <fdm_config name="bench" version="2.0">
@@ -45,16 +45,16 @@ _BENCH = b"""<?xml version="1.0"?>
 
 
 def model_name(flight: Flight | None) -> str:
-    """Return the folder's and file's name of a rig's aircraft; of a bench the stand's."""
+    """Return the name of the folder and file of a rig's aircraft; for a bench the stand's."""
     return "bench" if flight is None else flight.model
 
 
 def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> Files:
-    """Return an aircraft's files by their places in the exported folder.
+    """Return an aircraft's files by their paths in the exported folder.
 
     `systems` are the names of those to include, before all of the aircraft's own; `file` is named
-    in faults. Of the model's folder all XML files are taken; of the engines, thrusters and systems
-    that it shares with other models those that it names.
+    in faults. All XML files of the model's folder are included, and the shared engines, thrusters
+    and systems that they name.
     """
     name = model_name(flight)
     folder = PurePosixPath("aircraft", name)
@@ -85,9 +85,9 @@ def model_files(flight: Flight | None, systems: Sequence[str], file: object) -> 
 
 
 def _settable(text: bytes) -> bytes:
-    """Return a file in which each kinematic has an output, from which JSBSim lets it start.
+    """Return a file in which each kinematic has an output, which JSBSim can initialise.
 
-    Where JSBSim does not trim, what moves at a rate has to begin in its place (`start`).
+    If JSBSim does not trim, parts that move at a rate must start in their positions (`start`).
     """
 
     def with_output(found: re.Match[bytes]) -> bytes:
@@ -99,7 +99,7 @@ def _settable(text: bytes) -> bytes:
 
 
 def flightgear_set(name: str, systems: Sequence[str]) -> str:
-    """Return the file by which FlightGear knows an aircraft, each joystick's axis a hand."""
+    """Return FlightGear's file of an aircraft, with each joystick axis as a hand."""
     names = [at.removeprefix("coupled-") for at in systems]
     hands = "".join(f'<{control}><hand type="double">1</hand></{control}>' for control in names)
     return f"""<?xml version="1.0"?>
@@ -129,7 +129,7 @@ def _home(flight: Flight, file: object) -> Path:
 
 
 def _including(text: bytes, systems: Sequence[str]) -> bytes:
-    """Return a model's file with systems included before its own, and nothing else changed."""
+    """Return a model's file with systems included before its own, otherwise unchanged."""
     places = list(_top_level(text))
     at = next((place for tag, place in places if tag in _SYSTEMS), None)
     if at is None:
@@ -139,7 +139,7 @@ def _including(text: bytes, systems: Sequence[str]) -> bytes:
 
 
 def _top_level(text: bytes) -> Iterator[tuple[str, int]]:
-    """Yield tag and place of each element directly below the root."""
+    """Yield tag and position of each element directly below the root."""
     depth, found = 0, list[tuple[str, int]]()
     parser = expat.ParserCreate()
 
@@ -159,9 +159,9 @@ def _top_level(text: bytes) -> Iterator[tuple[str, int]]:
 
 
 def _shared(files: Files, folder: PurePosixPath) -> Files:
-    """Return what the files name that lies in JSBSim's own folders, and what that names.
+    """Return the files of JSBSim's own folders that the files name, and those that they name.
 
-    It is put into the model's own folder, where JSBSim looks first and FlightGear only.
+    They are put into the model's own folder, where JSBSim searches first and FlightGear only.
     """
     root = next(iter(packaged_models().values())).parent
     found: Files = {}
@@ -183,7 +183,7 @@ def _shared(files: Files, folder: PurePosixPath) -> Files:
 
 
 def parsed_leniently(text: bytes) -> ElementTree.Element:
-    """Return the root of a file's XML, an empty one where it cannot be read."""
+    """Return the root of a file's XML, an empty one if it cannot be read."""
     try:
         return parsed(text, "")
     except UnreadableModelError:

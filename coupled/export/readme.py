@@ -1,4 +1,4 @@
-"""The README of an exported folder: how to fly it, its properties, its errors, what it lacks."""
+"""The README of an exported folder: how to fly it, its properties, its errors, parts left out."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from coupled.record.channels import SURFACES
 from coupled.rig.rig import Rig
 
 _HAND = """\
-Two ways lead to the grip. A force: set `coupled/{control}/force-N`. Or a hand that holds a place:
-set `coupled/{control}/hand` to 1, and where it holds the grip by `hand-deflection-…`, or by a
-joystick: whatever else sets `{command}` is taken as its axis, and what the loader makes of
-it goes to the surface in its stead, on top of the trim."""
+Move the grip by a force: set `coupled/{control}/force-N`. Or by a hand that holds a position: set
+`coupled/{control}/hand` to 1, and the position by `hand-deflection-…` or a joystick. A value of
+`{command}` from another program is taken as the joystick's axis, and replaced by the loader's
+output plus the trim."""
 
 
 def readme_text(
@@ -31,14 +31,14 @@ def readme_text(
 ) -> str:
     """Return the README's text.
 
-    `rate_Hz` is JSBSim's, `flights` are those held against our own, `left` is what of the rig is
-    left out, `scripted` what of it only the scripts set.
+    `rate_Hz` is JSBSim's, `flights` are the comparisons with our own, `left` are the parts of the
+    rig left out, `scripted` those set by the scripts only.
     """
     name = model_name(rig.flight)
     parts = [
         f"# {name} with the control loader of `{rig.name}`",
-        f"Made by `coupled export`: the JSBSim model {name}, its files as they are but for a line"
-        f" that includes each `Systems/coupled-….xml`{_changed(rig)}, and in newtons the rig's"
+        f"Made by `coupled export`: the JSBSim model {name}, its files unchanged except for a line"
+        f" that includes each `Systems/coupled-….xml`{_changed(rig)}, and the loaders of the rig's"
         f" {', '.join(systems)}.",
         _flying(rig, name, rate_Hz, substeps, scripts),
         _HAND.format(control=next(iter(systems)), command=_command(systems)),
@@ -49,9 +49,9 @@ def readme_text(
     about = approximated(rig)
     if about:
         lines = [f"- {one}" for one in about]
-        parts.append("## Approximated\n\nThe errors above have it in them.\n\n" + "\n".join(lines))
+        parts.append("## Approximated\n\nThe errors above include it.\n\n" + "\n".join(lines))
     if scripted:
-        head = "## Set by the scripts only\n\nFlown without a script, the aircraft is without it.\n"
+        head = "## Set by the scripts only\n\nWithout a script, the aircraft does not have it.\n"
         parts.append("\n".join([head, *(f"- {one}" for one in scripted)]))
     if left:
         parts.append("## Left out\n\n" + "\n".join(f"- {one}" for one in left))
@@ -59,7 +59,7 @@ def readme_text(
 
 
 def _changed(rig: Rig) -> str:
-    """Return what else of the model's files is changed, as it stands in a sentence."""
+    """Return the other changes of the model's files, for use in a sentence."""
     flight = rig.flight
     if flight is None:
         return ""
@@ -92,8 +92,8 @@ def _flying(rig: Rig, name: str, rate_Hz: float, substeps: int, scripts: Sequenc
     lines += ["```", ""]
     lines.append(
         f"The loader takes {substeps} steps in a step of JSBSim, {substeps * rate_Hz:g} Hz at the"
-        f" {rate_Hz:g} Hz of the scripts; it works at any other rate, and is as exact as its steps"
-        " are short. A run of JSBSim that takes no time (its start, its trim) sets it back."
+        f" {rate_Hz:g} Hz of the scripts; it works at any other rate, with an error that grows with"
+        " its steps. A run of JSBSim of zero time (its start, its trim) resets it."
     )
     return "\n".join(lines)
 
@@ -107,11 +107,11 @@ def _properties(systems: Mapping[str, System]) -> str:
 
 def _errors(flights: Sequence[Beside]) -> str:
     lines = [
-        "## Beside coupled's own flights",
+        "## Comparison with coupled's own flights",
         "",
         "Each script flown by JSBSim alone, at the worst frame and control: deflection in % of"
-        " travel, force and F_mod in % of the greatest (F_mod jumps at neutral, and is read from"
-        " 1 % of travel on), the authority lost in points.",
+        " travel, force and F_mod in % of the largest (F_mod jumps at neutral, and is compared"
+        " beyond 1 % of travel), the lost authority in percentage points.",
         "",
         "| run | case | configuration | deflection | force | F_mod | lost |",
         "| --- | --- | --- | --- | --- | --- | --- |",

@@ -1,9 +1,9 @@
-"""A run of ours as a script that JSBSim flies alone.
+"""A run as a script for JSBSim alone.
 
-What a script can say is said: the trim, the pilots' forces as tables over time, straight between,
-the wind, the gust, the turbulence and the events. A clamp is the export's own hand, led to its
-place. JSBSim has no pilot who looks: what such a pilot did in a flight of ours is played back as a
-force, and the script says so.
+The script has the trim, the pilots' forces as tables over time, linear in between, the wind, the
+gust, the turbulence and the events. A clamp is the export's own hand, moved to its position. JSBSim
+has no pilot who observes the motion: the force of such a pilot in our own flight is played back,
+with a note in the script.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from coupled.record.record import Record
 from coupled.rig.equations import specified_gradient
 
 Floats = NDArray[np.float64]
-CLOSE = 1e-4  # of a table's greatest value: rows that a straight line leaves no further off
+CLOSE = 1e-4  # of a table's largest value: tolerance of its thinning
 _TIME = "simulation/sim-time-sec"
-_LOOKING = ("attitude", "track")  # pilots who go by the motion
+_LOOKING = ("attitude", "track")  # pilots who observe the motion
 
 
 @dataclass(frozen=True)
 class Move:
-    """A property that goes from where the start left it: by a way, or to a value, by shares."""
+    """A property moved from its initial value: by an amount, or to a value, by shares."""
 
     times: Floats
     shares: Floats
@@ -39,13 +39,13 @@ class Move:
 
 @dataclass
 class Script:
-    """A script in the making: what is set before the start, at it, and led in flight.
+    """A script: settings before the start, at it, and in flight.
 
-    `led` goes by time, `following` by another property; `moved` starts from where the trim left it.
+    `led` is over time, `following` over another property; `moved` starts from the trimmed value.
     """
 
     before: dict[str, float] = field(default_factory=dict)
-    started: dict[str, float | str] = field(default_factory=dict)  # a name is a property's value
+    started: dict[str, float | str] = field(default_factory=dict)  # a name: a property's value
     led: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # {property: time, value}
     at: list[tuple[float, dict[str, float]]] = field(default_factory=list)
     moved: dict[str, list[Move]] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Script:
     trims: bool = True
 
     def text(self, name: str, aircraft: str, start: str, dt_s: float, end_s: float) -> str:
-        """Return the script's file."""
+        """Return the script's text."""
         said = "\n".join(f"  {note}" for note in self.notes).replace("--", "- -")
         begun = {name: f"coupled/start/{name}" for name in self.moved}
         self.before |= dict.fromkeys(begun.values(), 0.0)
@@ -66,8 +66,8 @@ class Script:
         lines.append(f'  <use aircraft="{aircraft}" initialize="{start}"/>')
         lines.append(f'  <run start="0" end="{end_s!r}" dt="{dt_s!r}">')
         lines += [f'    <property value="{v!r}">{p}</property>' for p, v in self.before.items()]
-        # JSBSim works out all values of an event before it sets one of them. What reads the trim
-        # has to stand in an event after that of the trim.
+        # JSBSim computes all values of an event before it sets one of them. A value that depends on
+        # the trim must be in an event after that of the trim.
         if self.trims:
             lines += _event("trim", [_set("simulation/do_simple_trim", 1.0)])
         kept = {start: name for name, start in begun.items()}
@@ -98,7 +98,7 @@ def _event(name: str, sets: list[list[str]], at_s: float = 0.0, continuous: str 
 
 
 def _table(times: Floats, values: Floats, by: str = _TIME) -> list[str]:
-    """Return a table over time, or a property. A run's own time, in JSBSim, is that of its end."""
+    """Return a table over time, or a property. In JSBSim the time of a run is that of its end."""
     rows = [f"    {t!r} {v!r}" for t, v in zip(times.tolist(), values.tolist(), strict=True)]
     lines = ["<table>", f"  <independentVar>{by}</independentVar>"]
     return [*lines, "  <tableData>", *rows, "  </tableData>", "</table>"]
@@ -116,15 +116,15 @@ def _moved(start: str, moves: Sequence[Move], dt_s: float) -> list[str]:
 
 
 def _led(name: str, function: list[str]) -> list[str]:
-    """Return the event that leads a property by a function."""
+    """Return the event that sets a property by a function."""
     inner = ["  <function>", *(f"    {line}" for line in function), "  </function>"]
     return _event(name, [[f'<set name="{name}">', *inner, "</set>"]], 0.0, ' continuous="true"')
 
 
 def thinned(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the rows of a table that straight lines between them do not make good.
+    """Return the rows of a table from which linear interpolation gives the others.
 
-    Within `CLOSE` of the greatest value at every row (Ramer, Douglas and Peucker's way).
+    Within `CLOSE` of the largest value at every row (Ramer-Douglas-Peucker).
     """
     allowed = CLOSE * float(np.max(np.abs(values), initial=0.0))
     kept = {0, len(times) - 1}
@@ -143,7 +143,7 @@ def thinned(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def lead_pilots(script: Script, manoeuvre: Manoeuvre, record: Record) -> None:
-    """Let a script do what the pilots of a manoeuvre do; `record` is of our own flight of it."""
+    """Add the pilots of a manoeuvre to a script; `record` is our own flight of it."""
     rig = manoeuvre.rig
     steps = rig.flight.steps_per_frame if rig.flight is not None else 1
     times = np.arange(manoeuvre.frames * steps, dtype=float) / (rig.frame_rate * steps)
@@ -153,7 +153,7 @@ def lead_pilots(script: Script, manoeuvre: Manoeuvre, record: Record) -> None:
             _lead(script, f"coupled/{name}/force-N", record.time_s, force)
             script.notes.append(
                 f"{name}: the force that the pilot ({pilot.kind}) gave in coupled's own flight,"
-                " played back: JSBSim has no pilot who looks."
+                " played back: JSBSim has no pilot who observes the motion."
             )
             continue
         pressure_Pa = float(record["dynamic_pressure_Pa"][0])

@@ -1,4 +1,4 @@
-"""How an exported flight starts: JSBSim's initial conditions, and what is set before its trim."""
+"""The start of an exported flight: JSBSim's initial conditions, and settings before its trim."""
 
 from __future__ import annotations
 
@@ -44,11 +44,10 @@ def initial_conditions(manoeuvre: Manoeuvre, alpha_rad: float | None) -> str:
 def add_start(
     script: Script, manoeuvre: Manoeuvre, exported: Flight | None, files: Files
 ) -> float | None:
-    """Add what an aircraft is set to before its trim, and in it.
+    """Add an aircraft's settings before its trim, and in it.
 
-    `exported` is the section of the rig that was exported, whose load the aircraft has; `files`
-    are the aircraft's own.
-    Return the angle of attack at the start, rad, where JSBSim does not find it itself.
+    `exported` is the section of the exported rig, whose loading the aircraft has; `files` are the
+    aircraft's own. Return the angle of attack at the start, rad, if JSBSim does not find it itself.
     Raises InputError.
     """
     flight = manoeuvre.rig.flight
@@ -79,7 +78,7 @@ def add_start(
 
 
 def _add_factors(script: Script, flight: Flight) -> None:
-    """Add the factors on the aerodynamics that count from the trim on; the model has the others."""
+    """Add the factors with reference trim; the model has the others."""
     for alteration in ALTERATIONS:
         part, factor = alteration.part, alteration.factor(flight)
         if factor != 1.0 and alteration.about_trim:
@@ -88,14 +87,14 @@ def _add_factors(script: Script, flight: Flight) -> None:
 
 
 def _add_newton(script: Script, airframe: JSBSimAirframe, names: list[str], files: Files) -> None:
-    """Put an aircraft that JSBSim does not trim where Newton's method has it, before the start."""
+    """Set an aircraft that JSBSim cannot trim to the state of Newton's method, before the start."""
     script.trims = False
     levers = [*filter(_THROTTLES, names), "fcs/elevator-cmd-norm", *_moved_slowly(files)]
     script.before |= {name: airframe.lever(name).read() for name in levers}
 
 
 def _moved_slowly(files: Files) -> Iterator[str]:
-    """Yield the properties that a model moves at a rate, which would begin elsewhere."""
+    """Yield the properties that a model moves at a rate, which would start elsewhere."""
     for place, text in files.items():
         if place.suffix != ".xml" or b"<kinematic" not in text:
             continue

@@ -1,4 +1,4 @@
-"""The run to the surface as JSBSim's components (`rig/surface`), and the command it gives."""
+"""The surface's chain as JSBSim components (`rig/surface`), and its command."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from coupled.export.making import Made, stepping
 
 
 def add_surface(made: Made) -> None:
-    """Add the surface's command about trim, and give it to the aircraft on top of its trim."""
+    """Add the surface's command about trim, and add it to the aircraft's trim."""
     control, system, own = made.control, made.system, made.own
     rigging = control.rigging
-    system.channel("surface", "the command about trim, ±1 the whole travel, then on top of it")
+    system.channel(
+        "surface", "the command about trim, ±1 the whole travel, and its sum with the trim"
+    )
     asked = within((made.sign / control.travel) * own(f"estimate-{made.d}"), -1.0, 1.0)
     if rigging.stretch_loss > 0.0:
         asked = asked / (1.0 + rigging.stretch_loss * pressure(made))

@@ -1,4 +1,4 @@
-"""A JSBSim `<system>`: properties that may be set, and components in the order of their run."""
+"""A JSBSim `<system>`: properties that may be set, and components in their order of execution."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from coupled.export.expression import Expr, Value, as_expr, prop
 
 
 class System:
-    """One system file in the making. `at` is the place of its properties, as coupled/column."""
+    """One system file. `at` is the path of its properties, for example coupled/column."""
 
     def __init__(self, name: str, at: str) -> None:
         self.name, self.at = name, at
@@ -19,7 +19,7 @@ class System:
         self._open = False
 
     def declare(self, name: str, value: float, what: str) -> Expr:
-        """Declare a property that whoever flies may set, and return it; `what` says what it is."""
+        """Declare a property that the user may set, and return it; `what` describes it."""
         path = f"{self.at}/{name}"
         self._declared.append(f'  <property value="{value!r}">{path}</property>  {_comment(what)}')
         self.documented[path] = what
@@ -33,14 +33,14 @@ class System:
         self._open = True
 
     def own(self, name: str) -> Expr:
-        """Return a component's value: of this run behind it, of the last run before it."""
+        """Return a component's value: of this run if it comes earlier, else of the last run."""
         return prop(f"{self.at}/{name}")
 
     def add(self, name: str, value: Value, says: str = "", output: str = "", out: str = "") -> Expr:
         """Add a component with this value, and return its property.
 
-        `says` stands in the file beside it, `out` in the list of what the system gives;
-        `output` is a further property that takes the value.
+        `says` is a comment in the file, `out` its text in the list of outputs; `output` is a
+        further property that takes the value.
         """
         path = f"{self.at}/{name}"
         if says or out:
@@ -63,7 +63,7 @@ class System:
         self._open = False
 
     def text(self, head: Sequence[str]) -> str:
-        """Return the system's file; `head` says what it is, line by line."""
+        """Return the system's file; `head` describes it, line by line."""
         self._close()
         said = "\n".join(f"  {line}" for line in head)
         lines = ['<?xml version="1.0"?>', f"<!--\n{said.replace('--', '- -')}\n-->"]

@@ -1,4 +1,4 @@
-"""A rig exported: the files of the folder, and how far what they fly is from our own."""
+"""A rig's export: the files of the folder, and the errors of their flights against our own."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-RATE_Hz = 960.0  # of the loader, unless another is asked for: docs/export.md has the errors
+RATE_Hz = 960.0  # default of the loader: docs/export.md has the errors
 MOST_SUBSTEPS = 64
-DEFLECTION, FORCE, LOSS = 0.01, 0.02, 0.005  # what an exported flight may be off by
+DEFLECTION, FORCE, LOSS = 0.01, 0.02, 0.005  # tolerances of an exported flight
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
 class Flown:
-    """A run to export: a manoeuvre, and the configurations that get a script each."""
+    """A run to export: a manoeuvre, and the configurations with a script each."""
 
     manoeuvre: Manoeuvre
     configurations: tuple[Configuration, ...]
@@ -41,10 +41,10 @@ class Flown:
 
 @dataclass(frozen=True)
 class Export:
-    """What an export made: its files by place, its loader's steps in a run, its errors.
+    """The result of an export: its files by path, its loader's steps in a run, its errors.
 
-    `beside` are the flights held against our own, `left` what of the rig is left out and why,
-    `scripted` what of it only the scripts set, `said` what JSBSim said as it loaded and flew them.
+    `beside` are the flights compared with our own, `left` the parts of the rig left out and why,
+    `scripted` those set by the scripts only, `said` JSBSim's messages from loading and flying.
     """
 
     rig: Rig
@@ -57,7 +57,7 @@ class Export:
 
     @property
     def within(self) -> bool:
-        """Whether every flight is as near to our own as an export has to be."""
+        """Whether every flight is within the tolerances of an export."""
         return all(
             one.deflection <= DEFLECTION
             and max(one.force, one.modifying_force) <= FORCE
@@ -67,7 +67,7 @@ class Export:
 
 
 def step_rate(rig: Rig) -> float:
-    """Return the rate at which JSBSim steps an exported rig, Hz."""
+    """Return JSBSim's step rate of an exported rig, Hz."""
     return rig.frame_rate * (rig.flight.steps_per_frame if rig.flight is not None else 1)
 
 
@@ -79,11 +79,11 @@ def export(
     check: bool = True,
     progress: Progress | None = None,
 ) -> Export:
-    """Return a rig as JSBSim's systems with its aircraft around them, and a script for each run.
+    """Return a rig as JSBSim systems with its aircraft, and a script for each run.
 
     `file` names the rig in faults; `rate_Hz` is the least rate of the loader; with `check` every
-    script is flown by JSBSim alone and held against our own flight. Raises InputError for what an
-    export cannot express, naming the key.
+    script is flown by JSBSim alone and compared with our own flight. Raises InputError with the key
+    for parts that cannot be exported.
     """
     left = check_keys(rig, file)
     scripted = only_scripted(rig)
@@ -132,7 +132,7 @@ def export(
 def fly_exported(
     folder: Path, name: str, manoeuvre: Manoeuvre, record: Record
 ) -> tuple[Record, str]:
-    """Return the record of an exported script, flown by JSBSim alone, and what JSBSim says.
+    """Return the record of an exported script, flown by JSBSim alone, and JSBSim's messages.
 
     `name` is the script's in the exported `folder`, `record` our own flight of the manoeuvre.
     """
@@ -141,7 +141,7 @@ def fly_exported(
 
 
 def rig_files(rig: Rig, systems: dict[str, System], file: object = "rig") -> Files:
-    """Return the aircraft with a rig's systems and its load, by place in the exported folder."""
+    """Return the aircraft with a rig's systems and its loading, by path in the exported folder."""
     names = [f"coupled-{name}" for name in systems]
     files = set_load(model_files(rig.flight, names, file), rig.flight, file)
     folder = PurePosixPath("aircraft", model_name(rig.flight), "Systems")
@@ -155,7 +155,7 @@ def rig_files(rig: Rig, systems: dict[str, System], file: object = "rig") -> Fil
 
 
 def script_name(manoeuvre: Manoeuvre, configuration: str, runs: Sequence[Flown]) -> str:
-    """Return the name of a script: the run's, its case's number where it has several, and how."""
+    """Return the name of a script: the run's, its case's number if it has several, and how."""
     cases = [run.manoeuvre for run in runs if run.manoeuvre.name == manoeuvre.name]
     labels = [case.label for case in cases]
     number = f"-{labels.index(manoeuvre.label) + 1}" if len(cases) > 1 else ""
@@ -192,7 +192,7 @@ def run_files(
 
 
 def switches(rig: Rig, configuration: Configuration) -> dict[str, float | str]:
-    """Return the properties that put an exported rig into one of a comparison's configurations."""
+    """Return the properties that select one of a comparison's configurations."""
     on = {
         "bend": configuration != "rigid",
         "deflection-correction": configuration in ("deflection only", "compensated"),
@@ -206,7 +206,7 @@ def switches(rig: Rig, configuration: Configuration) -> dict[str, float | str]:
 
 
 def put(files: Files, folder: Path) -> None:
-    """Write files to their places in a folder that is ours."""
+    """Write files to their paths in a folder of an export."""
     for place, text in files.items():
         path = folder / place
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A rig's aircraft in its conditions: the plain airframe, and all that is put around it."""
+"""A rig's aircraft in its conditions: the plain airframe with its wrappers."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def make_aircraft(
     conditions: Sequence[Wrapper] = (),
     gusts: Gusts | None = None,
 ) -> JSBSimAirframe:
-    """Return a rig's aircraft, trimmed, as its `flight` section and a run's conditions have it.
+    """Return a rig's aircraft, trimmed, by its `flight` section and a run's conditions.
 
-    `controls` are those of the rig in its order; `models`, folders of models of our own, searched
-    first; `file` and `run_file`, where rig and run are described, for faults; `record`, further
-    properties to read each frame; `gusts`, in place of those that the rig draws from seed 0.
-    Raises InputError.
+    `controls` are those of the rig in its order; `models`, folders of our own models, searched
+    first; `file` and `run_file`, the files of rig and run, for faults; `record`, further properties
+    to read each frame; `gusts`, in place of those that the rig draws from seed 0. Raises
+    InputError.
 
-    Before each frame the conditions act in their order, then the gusts; then the factors follow
-    a trim that was moved. A model of the user's own is tried in a process of its own first.
+    Before each frame the conditions act in their order, then the gusts, then the factors, which
+    follow a moved trim. A model of the user's own is first loaded in a process of its own.
     """
     check_own_model(flight, frame_s, controls, models, file)
     return make_unchecked(
@@ -58,7 +58,7 @@ def make_unchecked(
     conditions: Sequence[Wrapper] = (),
     gusts: Gusts | None = None,
 ) -> JSBSimAirframe:
-    """Return an aircraft as `make_aircraft` does, of a model that ends no process."""
+    """Return an aircraft as `make_aircraft` does, of a model that does not crash the process."""
 
     def plain_aircraft(names: Sequence[str]) -> Aircraft:
         return JSBSimAirframe(flight, frame_s, ("column",), models, file, names)

@@ -1,12 +1,12 @@
-"""One aircraft, plain: loaded, trimmed and stepped. The only module that knows JSBSim.
+"""One plain aircraft: loaded, trimmed and stepped. The only module that uses JSBSim.
 
 The airframe is trimmed on its flight path, takes the commands of elevator, aileron and rudder
-(about trim, ±1 for the whole travel) and gives the motion. It opens no socket,
-writes no file and prints nothing: a model's own inputs and outputs are disabled
-before they start, and JSBSim's log is kept to be quoted where something fails.
+(about trim, ±1 for the whole travel) and gives the motion. It opens no socket, writes no file and
+prints nothing: a model's own inputs and outputs are disabled before they start, and JSBSim's log is
+kept for error messages.
 
-How it is loaded, what of it differs from its model, and what befalls it are wrappers
-(`wrapper`), which it calls in their order at three moments. `aircraft` makes their list.
+Loading, changes of the model and events are wrappers (`wrapper`), called in their order at three
+moments. `aircraft` makes their list.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ from coupled.units import FOOT_m, KNOT_m_per_s
 
 _COMMANDS = {name: f"fcs/{name}-cmd-norm" for name in SURFACES.values()}
 _HEIGHT, _WHEELS = "position/h-agl-ft", "gear/wow"
-_STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # what is no wheel
+_STRUCTURE = re.compile(r"contact/unit(\[\d+\])?/WOW").fullmatch  # contacts other than wheels
 
 
 class _Log(jsbsim.FGLogger):
-    """Keeps what JSBSim says, and prints none of it."""
+    """Keeps JSBSim's messages, and prints none of them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -69,14 +69,14 @@ class _Log(jsbsim.FGLogger):
         """Begin a message."""
 
     def file_location(self, filename: str, line: int) -> None:
-        """Take the place that the message is about."""
+        """Take the file and line of the message."""
 
     def message(self, message: str) -> None:
         """Take a piece of the message."""
         self.text = (self.text + message)[-2000:]
 
     def format(self, format: Any) -> None:
-        """Take the colour of what follows."""
+        """Take the colour of the next piece."""
 
     def flush(self) -> None:
         """End a message."""
@@ -96,15 +96,15 @@ def packaged_models() -> Mapping[str, Path]:
 class JSBSimAirframe:
     """A JSBSim model, trimmed at the rig's altitude, calibrated airspeed and flight path.
 
-    Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of
-    the rig in its order; `models`, folders of models of our own, searched first; `file`,
-    where the rig was described, for faults; `record`, further properties to read each
-    frame, asked for in `record_file`; `wrappers`, in the order in which they act. Without the
-    wrappers that `aircraft.make_aircraft` adds, the section's load, factors and gusts are left out.
+    Parameters: the rig's `flight` section; `frame_s` in seconds; `controls`, those of the rig in
+    its order; `models`, folders of our own models, searched first; `file`, the rig's file, for
+    faults; `record`, further properties to read each frame, requested in `record_file`; `wrappers`,
+    in the order in which they act. Load, factors and gusts of the section act only through the
+    wrappers of `aircraft.make_aircraft`.
     """
 
-    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
-    whole_motion: Callable[[], tuple[float, ...]]  # with zeros for those that its rig has not
+    motion: Callable[[], tuple[float, ...]]  # the current values of the motion's channels, SI
+    whole_motion: Callable[[], tuple[float, ...]]  # with zeros for channels that its rig lacks
     step: Step  # one frame with commands about trim
 
     def __init__(
@@ -132,10 +132,10 @@ class JSBSimAirframe:
         nodes = [self._node(_COMMANDS[SURFACES[control]]) for control in controls]
         writes = [(node.set_double_value, node.get_double_value()) for node in nodes]
         plain = stepper(self._fdm.run, writes, flight.steps_per_frame)
-        hooks = [hook for wrapper in wrappers if (hook := wrapper.meet(self)) is not None]
+        hooks = [hook for wrapper in wrappers if (hook := wrapper.attach(self)) is not None]
         self.step = led_by(hooks, plain)
         self._unled = plain
-        # Above this altitude no wheel is near the ground, and no height need be asked for.
+        # Above this altitude no wheel is near the ground, and the height need not be checked.
         ground_m = self.motion()[ALTITUDE] - self._height() * FOOT_m
         self.safe_altitude_m = ground_m + 100.0
         calls = (self._fdm.run, self.safe_altitude_m, self.trouble)
@@ -160,7 +160,7 @@ class JSBSimAirframe:
             raise self.fault("model", f"there is no JSBSim model {name!r}; {nearest(name, known)}")
         fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
         frame_s /= self._flight.steps_per_frame
-        fdm.set_dt(frame_s)  # a model's rate limits take it as they load
+        fdm.set_dt(frame_s)  # before loading, for the model's rate limits
         _log.text = ""
         scaled = [part for wrapper in wrappers for part in wrapper.scaled]
         ballast = any(wrapper.ballast for wrapper in wrappers)
@@ -184,19 +184,19 @@ class JSBSimAirframe:
         if not loaded:
             raise self.fault("model", f"{name} does not load: {_log.text.strip()[-200:]}")
         fdm.disable_input()
-        fdm.disable_output()  # which does not keep run_ic from opening the files
+        fdm.disable_output()  # run_ic opens the files nevertheless
         output = 0
         while fdm.get_output_filename(output):
             fdm.set_output_filename(output, os.devnull)
             output += 1
         fdm.set_dt(frame_s)
         self._properties = fdm.get_property_manager()
-        # By this list, since asking the manager for a malformed name ends the process.
+        # The manager crashes on a malformed name, so names are searched in this list.
         self._catalog = catalogue(fdm.query_property_catalog(""))
         return fdm
 
     def _own_folder(self, name: str) -> Path:
-        """Return the folder that the rig says its model lies in."""
+        """Return the folder of the rig's own model."""
         folder = Path(self._flight.folder)
         try:
             there = (folder / name / f"{name}.xml").is_file()
@@ -207,7 +207,7 @@ class JSBSimAirframe:
         return folder
 
     def _set(self, name: str, value: float) -> None:
-        """Set a property that the rig file names, if it is there and is the model's to set."""
+        """Set a property named by the rig file, if it exists and may be set."""
         key = f"properties.{name}"
         if name.startswith(("simulation/", "ic/")) or name == "propulsion/set-running":
             raise self.fault(key, "is set from the rig's other keys; leave it out")
@@ -268,21 +268,21 @@ class JSBSimAirframe:
             raise self.fault("model", f"{flight.model} does not start: {_log.text.strip()[-200:]}")
 
     def restart(self) -> None:
-        """Put it back and trim it again; only one around which nothing acts (`kept`)."""
+        """Reset and trim the aircraft; only one without acting wrappers (`kept`)."""
         put_back(self._fdm)
         self._trim(())
 
     def surface_map(self, surface: str = "elevator_rad") -> tuple[Floats, Floats]:
-        """Return commands about trim, and where a surface stands for each, rad.
+        """Return commands about trim, and a surface's position for each, rad.
 
-        Spends this aircraft: it is flown through all of them, a frame each.
+        The aircraft cannot be used afterwards: it is flown through all of them, a frame each.
         """
         return flown_through(self.step, self.motion, self._controls, surface)
 
     def surface_stops(self, control: str) -> dict[str, dict[str, Any] | None]:
-        """Return where a control's surface meets its stop, as it is trimmed now (`surfacemap`).
+        """Return the stops of a control's surface at the current trim (`surfacemap`).
 
-        Spends this aircraft: some frames are flown, without what else acts on it.
+        The aircraft cannot be used afterwards: some frames are flown, without wrappers.
         """
         return stops_found(self._unled, self.motion, self._controls, control)
 
@@ -295,7 +295,7 @@ class JSBSimAirframe:
         return name in self._catalog
 
     def lever(self, name: str, file: object = None, key: str = "model") -> Lever:
-        """Return a property that may be set in flight; a fault is that of a key in a file."""
+        """Return a property that may be set in flight; faults name a key of a file."""
         file = self._file if file is None else file
         if name.startswith(("simulation/", "ic/")):
             raise InputError(file, key, f"{name} is not the aircraft's; it is not set in flight")
@@ -305,16 +305,16 @@ class JSBSimAirframe:
         return Lever(node.set_double_value, node.get_double_value)
 
     def reader(self, name: str) -> Callable[[], float] | None:
-        """Return what reads a property, in JSBSim's unit; None where the model has none such."""
+        """Return a function that reads a property, in JSBSim's unit; None if it does not exist."""
         node: Any = self._properties.get_node(name) if self.has(name) else None
         return None if node is None else cast(Read, node.get_double_value)
 
     def set_gust(self, up_m_per_s: float) -> None:
-        """Let a gust rise at this speed from the next step on, beside any wind."""
+        """Set a gust's upward speed from the next step on, in addition to any wind."""
         self._fdm[GUST_DOWN] = -up_m_per_s / FOOT_m
 
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
-        """Return what flies it by a rig from frame to frame; None where more acts on it."""
+        """Return the fast loop of rig and aircraft; None if wrappers act on the aircraft."""
         return None if self._plain is None else plain_frames(self._plain, placed)
 
     def extra(self) -> tuple[float, ...]:
@@ -322,7 +322,7 @@ class JSBSimAirframe:
         return tuple([read() for read in self._extra])
 
     def trouble(self) -> str:
-        """Return why the flight cannot go on, or an empty string."""
+        """Return why the flight must end, or an empty string."""
         height = self._height()
         if height > 0.0 and not any(touches() for touches in self._touching):
             return ""

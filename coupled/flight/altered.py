@@ -1,13 +1,13 @@
-"""What of an aircraft's aerodynamics differs from its model's, by factors of the rig's `flight`.
+"""Changes of an aircraft's aerodynamics, by factors of the rig's `flight` section.
 
-An alteration is data: the factor's name, the quantity whose part is scaled, in which axes, and
-about what. `modelfile` scales that part of the model itself, so a moment is made as a moment, by
-whatever function the model has for it, and nothing else comes along.
+An alteration is data: the factor's name, the quantity whose part is scaled, the axes, and the
+reference value. `modelfile` scales that part in the model itself, so a moment stays a moment, by
+whatever function the model uses, without side effects.
 
     pitch_damping            C_mq: the pitching moment due to the pitch rate alone
-    pitch_stiffness          C_mα: the pitching moment due to the angle of attack; the trim with it
-    lift_slope               C_Lα: the lift due to the angle of attack; the trim with it
-    elevator_effectiveness   all forces and moments due to the elevator, about its place in trim
+    pitch_stiffness          C_mα: the pitching moment due to the angle of attack; changes the trim
+    lift_slope               C_Lα: the lift due to the angle of attack; changes the trim
+    elevator_effectiveness   all forces and moments due to the elevator, about its trim position
 """
 
 from __future__ import annotations
@@ -23,21 +23,22 @@ from coupled.flight.wrapper import Aircraft, Hook, Wrapper
 from coupled.rig.parameters import Flight
 
 _TRIM = "fcs/pitch-trim-cmd-norm"
-_TRIMS = np.linspace(-2.0, 2.0, 401)  # how far it is moved
+_TRIMS = np.linspace(-2.0, 2.0, 401)  # positions of a moved trim
 
 
 @dataclass(frozen=True)
 class Alteration:
-    """A factor of the `flight` section, by its field's name, and what it scales.
+    """A factor of the `flight` section, by its field's name, and the part that it scales.
 
-    `about_trim` says that the part counts from the quantity's value in trim, not from zero.
+    `about_trim`: the part is that of the deviation from the quantity's value in trim, not from
+    zero.
     """
 
     part: Scaled
     about_trim: bool = False
 
     def factor(self, flight: Flight) -> float:
-        """Return the factor that a rig has."""
+        """Return the factor of a rig."""
         return float(getattr(flight, self.part.name))
 
 
@@ -75,15 +76,15 @@ ALTERATIONS = (
         about_trim=True,
     ),
 )
-# The changes that make an aircraft its model as filed, in still air.
+# The changes that restore the filed model, in still air.
 UNALTERED = {a.part.name: 1.0 for a in ALTERATIONS} | {"mass": 1.0, "gust_rms_m_per_s": 0.0}
 
 
 class Alterations(Wrapper):
     """The factors of a rig that are not 1.
 
-    `make_plain` makes an aircraft like this one, plain, which reads the properties it is asked
-    for: where the trim is moved in flight, its surface tells where the trim alone puts it.
+    `make_plain` makes a plain aircraft like this one, which reads given properties: if the trim is
+    moved in flight, it gives the surface position of the trim alone.
     """
 
     def __init__(self, flight: Flight, make_plain: Callable[[Sequence[str]], Aircraft]) -> None:
@@ -92,15 +93,15 @@ class Alterations(Wrapper):
 
     @property
     def scaled(self) -> tuple[Scaled, ...]:
-        """What the factors scale."""
+        """The parts that the factors scale."""
         return tuple(alteration.part for alteration in self._made)
 
     def load(self, aircraft: Aircraft) -> None:
-        """Let the factors count in the trim that count from zero."""
+        """Set the factors with reference zero, which act in the trim."""
         self._set(aircraft, about_trim=False)
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Let the others count from the trim, wherever it is moved to."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Set the factors with reference trim, and follow a moved trim."""
         held = [
             (name, aircraft.lever(alteration.part.held(name)).set)
             for alteration in self._made
@@ -122,7 +123,7 @@ class Alterations(Wrapper):
     def _follow(
         self, aircraft: Aircraft, held: Sequence[tuple[str, Callable[[float], object]]]
     ) -> Hook:
-        """Return what holds the quantities at where the trim alone puts the surface."""
+        """Return a hook that holds the quantities at the surface position of the trim alone."""
         trim = aircraft.lever(_TRIM).read
         start = last = trim()
         moved = np.empty((0, len(held)))
@@ -140,7 +141,7 @@ class Alterations(Wrapper):
         return follow
 
     def _moved(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Return the quantities where the elevator is moved by each of _TRIMS, (trims, names)."""
+        """Return the quantities at each position of the trim in _TRIMS, (trims, names)."""
         other = self._make_plain(names)
         values = []
         for command in _TRIMS.tolist():

@@ -1,4 +1,4 @@
-"""What the frame loop flies, and the simplest of it: a bench, where q̄ is given."""
+"""The airframe of the frame loop, and its simplest kind: a bench with given q̄."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ assert len(BENCH_MOTION) == LOAD
 
 
 class Airframe(Protocol):
-    """What the frame loop flies: an aircraft, or a bench that only gives q̄."""
+    """The airframe of the frame loop: an aircraft, or a bench that only gives q̄."""
 
-    motion: Callable[[], tuple[float, ...]]  # the motion's channels as they are now, SI
-    whole_motion: Callable[[], tuple[float, ...]]  # at rest where it has none
+    motion: Callable[[], tuple[float, ...]]  # the current values of the motion's channels, SI
+    whole_motion: Callable[[], tuple[float, ...]]  # at rest for channels that it lacks
     step: Callable[[tuple[float, float, float]], None]  # one frame with commands about trim
-    safe_altitude_m: float  # above it there is no ground to meet
+    safe_altitude_m: float  # altitude above which the ground cannot be near
 
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
-        """Return what flies it by a rig from frame to frame; None where more acts on it."""
+        """Return the fast loop of rig and airframe; None if wrappers act on it."""
 
     def trouble(self) -> str:
-        """Return why the flight cannot go on, or an empty string; asked below safe_altitude_m."""
+        """Return why the flight must end, or an empty string; called below safe_altitude_m."""
 
     def extra(self) -> tuple[float, ...]:
-        """Return the further properties that a run asked for."""
+        """Return the further properties requested by a run."""
 
 
 class Bench:
-    """No aircraft: the dynamic pressure that the host is given, from a schedule in time."""
+    """No aircraft: the dynamic pressure for the host, from a schedule in time."""
 
     def __init__(self, frame_s: float, pressures_Pa: Sequence[tuple[float, float]]) -> None:
         self._frame_s = frame_s
@@ -61,7 +61,7 @@ class Bench:
         self._k += 1
 
     def plain_frames(self, placed: Placed) -> PlainFrames | None:
-        """Return nothing: its frames are taken one by one."""
+        """Return None: its frames are stepped one by one."""
         return None
 
     def extra(self) -> tuple[float, ...]:
@@ -69,5 +69,5 @@ class Bench:
         return ()
 
     def trouble(self) -> str:
-        """Return nothing: a bench has no trouble."""
+        """Return an empty string."""
         return ""

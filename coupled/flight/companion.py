@@ -1,4 +1,4 @@
-"""Who goes along with a flight, frame by frame, and what of the flight it may see and change."""
+"""The companion of a flight, called before and after each frame, and its access to the flight."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Aboard:
-    """A flight's arrays, which who goes along may read and change between frames.
+class FlightAccess:
+    """A flight's arrays, which a companion may read and change between frames.
 
-    controls  the rig's controls as the kernels hold them, shape (n,)
+    controls  the rig's controls in the kernels' arrays, shape (n,)
     script    the hands' force in N and held deflection on all nodes, shape (n, 2, nodes)
-    data      the record, shape (frames, channels); rows to come hold noise
-    hands     what each pilot's hand is, by the control
-    so_far    the record from one frame up to another, while the flight goes on
+    data      the record, shape (frames, channels); future rows contain noise
+    hands     each pilot's hand, by the control
+    so_far    the record from one frame up to another, during the flight
     """
 
     manoeuvre: Manoeuvre
@@ -40,16 +40,16 @@ class Aboard:
 
 
 class Companion(Protocol):
-    """Who goes along with a flight, frame by frame: a live host."""
+    """An object called before and after each frame of a flight, such as a live host."""
 
-    elsewhere: bool  # hand and loader are real: the rig's are not simulated
-    leads: bool  # it may lead the services of any control, between frames
+    elsewhere: bool  # hand and loader are real and not simulated
+    leads: bool  # it may set services of any control, between frames
 
-    def board(self, aboard: Aboard) -> None:
-        """Begin, with the aircraft in trim."""
+    def begin(self, access: FlightAccess) -> None:
+        """Start, with the aircraft in trim."""
 
     def before(self, k: int, motion: tuple[float, ...]) -> str:
-        """Do what precedes frame k; return why the flight is to end, or an empty string."""
+        """Act before frame k; return why the flight must end, or an empty string."""
 
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
-        """Take the surface commands of frame k before the aircraft has them."""
+        """Act after frame k, with its surface commands, before the aircraft's step."""

@@ -1,4 +1,4 @@
-"""The adverse conditions of a run: its wind, gust, turbulence and events, read and made to act."""
+"""The adverse conditions of a run: wind, gust, turbulence and events, read and applied."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TABLES: dict[str, type[Section]] = {"wind": Wind, "gust": Gust, "turbulence": T
 
 
 class Conditions(Section):
-    """What a run file may say of them."""
+    """The conditions of a run file."""
 
     wind: Wind | None = None
     gust: Gust | None = None
@@ -32,14 +32,14 @@ class Conditions(Section):
 
     @property
     def given(self) -> list[str]:
-        """The tables that are there, and need an aircraft."""
+        """The tables of the file that need an aircraft."""
         there = [key for key in Conditions.model_fields if getattr(self, key)]
         on_aircraft = any(event.service is None for event in self.event.values())
         return [key for key in there if key != "event" or on_aircraft]
 
 
 def build_conditions(table: dict[str, Any], file: object) -> None:
-    """Put sections in the place of a run's tables, each checked."""
+    """Replace a run's tables by checked sections."""
     for key, section in _TABLES.items():
         if key in table:
             table[key] = build(section, table[key], file, key)
@@ -60,7 +60,7 @@ def build_conditions(table: dict[str, Any], file: object) -> None:
 def condition_wrappers(
     conditions: Conditions, file: object, frame_s: float, seed: int
 ) -> list[Wrapper]:
-    """Return the conditions as what is put around an aircraft, in the order in which they act."""
+    """Return the conditions as wrappers of an aircraft, in the order in which they act."""
     found: list[Wrapper] = []
     if conditions.wind is not None:
         found.append(MovingAir(conditions.wind, frame_s))

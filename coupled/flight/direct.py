@@ -1,7 +1,7 @@
-"""Whether a model flies with direct controls, to the rig's signs: found by flying it.
+"""Whether a model flies with direct controls and the rig's signs, found by flying it.
 
-A rig that says `direct_controls = false` is let off the first half: its surfaces may follow with a
-lag or a law of the model's own.
+With `direct_controls = false` in the rig only the signs are checked: its surfaces may follow with a
+lag or a control law of the model.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ def check_direct_controls(
     models: Sequence[Path] = (),
     file: object = "rig",
 ) -> Mapping[str, float]:
-    """Fly a small step of each control on an aircraft of its own, and refuse what is not direct.
+    """Fly a small step of each control on a separate aircraft, and refuse indirect controls.
 
-    Direct means: within one step the surface stands at its new place, stays there, and the
-    aircraft turns to the side that the rig's signs say; where the rig asks for no direct
-    controls, the surface need only have moved. Returns {control: surface travel in
-    rad per unit of command}. Kept per aircraft: a sweep's flights share few.
+    Direct means: within one step the surface is at its new position, stays there, and the aircraft
+    turns to the side of the rig's signs. If the rig requires no direct controls, the surface need
+    only have moved. Returns {control: surface travel in rad per unit of command}. Cached by
+    aircraft, since a sweep has few.
     """
     return _travel(flight.model_dump_json(), frame_s, tuple(controls), tuple(models), file)
 
@@ -88,7 +88,7 @@ def _fly(
     frames: int,
     commands: tuple[float, float, float],
 ) -> list[tuple[float, ...]]:
-    """Return the motion of an aircraft of its own under commands, frame by frame."""
+    """Return the motion of a separate aircraft under commands, frame by frame."""
     airframe = make_aircraft(flight, frame_s, controls, models, file)
     motions = []
     for _ in range(frames):

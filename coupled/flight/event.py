@@ -1,8 +1,7 @@
-"""What happens in flight: an engine stops, the trim runs away, a lever moves, a loader's service.
+"""Events in flight: engine failure, trim runaway, moved levers, services of the loader.
 
-Each event is a table of a run file, `[event.NAME]`, of one of four kinds. The aircraft starts
-in trim and whole; what is wrong with it comes later. A service is the rig's, with or without an
-aircraft (`rig/serving`).
+Each event is a table of a run file, `[event.NAME]`, of one of four kinds. The aircraft starts in
+trim and without faults. A service is the rig's, with or without an aircraft (`rig/serving`).
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from coupled.schema import Section, named, quantity
 
 Move = Callable[[float], None]  # to a share of the whole, from 0 to 1
 _TRIMS = {"column": "pitch", "wheel": "roll", "pedals": "yaw"}
-# Fuel cut and magnetos off, for the engine that JSBSim has picked; −1 picks all.
+# Fuel cut and magnetos off, for the engine selected in JSBSim; −1 selects all.
 OFF = {"propulsion/cutoff_cmd": 1.0, "propulsion/magneto_cmd": 0.0}
 PICK = "propulsion/active_engine"
-EARLY = 1e-6  # of a frame: one that starts at the time itself has met it
+EARLY = 1e-6  # of a frame, within which an event at the start of a frame belongs to it
 
 
 class Event(Section):
@@ -71,8 +70,8 @@ class Events(Wrapper):
     def __init__(self, events: Mapping[str, Event], file: object, frame_s: float) -> None:
         self._events, self._file, self._frame_s = events, file, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Return what lets happen, before each frame, what happens by its start."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Return a hook that moves all events begun by the start of each frame."""
         makers = (_trim, _engine, _property)
         moves = [
             (event, move)
@@ -84,7 +83,7 @@ class Events(Wrapper):
 
 
 def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
-    """Return what lets happen, called before each frame, what happens by its start."""
+    """Return a hook that moves all events begun by the start of each frame."""
     frame = 0
 
     def happen() -> None:
@@ -102,13 +101,13 @@ def happening(moves: list[tuple[Event, Move]], frame_s: float) -> Hook:
 def service_events(
     events: Mapping[str, Event], controls: ControlArray, names: Sequence[str], frame_s: float
 ) -> Hook | None:
-    """Return what leads the loaders' services of a flying rig, called before each frame, if any."""
+    """Return a hook that sets the loaders' services of a flying rig before each frame, if any."""
     moves = [(e, _service(controls, names, e)) for e in events.values() if e.service is not None]
     return happening(moves, frame_s) if moves else None
 
 
 def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move:
-    """Return what leads a service to its value, evenly from where it stands when it begins."""
+    """Return a function that moves a service linearly from its present value to its target."""
     control, service, to = str(event.control), str(event.service), float(event.to or 0.0)
     begun: float | None = None
 
@@ -123,7 +122,7 @@ def _service(controls: ControlArray, names: Sequence[str], event: Event) -> Move
 def trim_moved(
     events: Mapping[str, Event], control: ControlName, times_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return by how much events have moved a control's trim at some times, as a JSBSim command."""
+    """Return the shift of a control's trim by events at some times, as a JSBSim command."""
     moved = np.zeros_like(times_s)
     for event in events.values():
         if event.trim == control and event.by is not None:
@@ -134,7 +133,7 @@ def trim_moved(
 
 
 def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
-    """Return what moves the trim, by a share of the surface's travel; two may move one."""
+    """Return a function that moves the trim by a share of the surface's travel; shifts add up."""
     if event.trim is None or event.by is None:
         return None
     name = f"fcs/{_TRIMS[event.trim]}-trim-cmd-norm"
@@ -150,10 +149,10 @@ def _trim(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | 
 
 
 def _engine(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
-    """Return what stops an engine."""
+    """Return a function that stops an engine."""
     if event.engine_out is None:
         return None
-    number = f"[{event.engine_out}]" if event.engine_out else ""  # as JSBSim lists them
+    number = f"[{event.engine_out}]" if event.engine_out else ""  # JSBSim's index
     running = f"propulsion/engine{number}/set-running"
     if not aircraft.has(running):
         raise InputError(file, f"{place}.engine_out", "there is no such engine; the first is 0")
@@ -173,7 +172,7 @@ def _engine(aircraft: Aircraft, event: Event, file: object, place: str) -> Move 
 
 
 def _property(aircraft: Aircraft, event: Event, file: object, place: str) -> Move | None:
-    """Return what leads a property of the model to a value."""
+    """Return a function that moves a property of the model to a value."""
     if event.of_model is None or event.to is None:
         return None
     lever, to = aircraft.lever(event.of_model, file, f"{place}.property"), event.to

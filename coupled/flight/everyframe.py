@@ -1,4 +1,4 @@
-"""The calls of every frame, to read the motion, to run and to move a lever: quick ones."""
+"""Fast functions for every frame: read the motion, run a step, set a property."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LATERAL_PROPERTIES = (
 assert len(LONGITUDINAL_PROPERTIES) == len(LONGITUDINAL)
 assert len(LATERAL_PROPERTIES) == len(LATERAL)
 _LONGITUDINAL = len(LONGITUDINAL)
-# By channel; JSBSim has all but q̄, airspeed and height in SI, too.
+# By channel; JSBSim has all but q̄, airspeed and height in SI.
 PROPERTIES = dict(
     zip(LONGITUDINAL + LATERAL, LONGITUDINAL_PROPERTIES + LATERAL_PROPERTIES, strict=True)
 )
@@ -47,19 +47,19 @@ class Lever(NamedTuple):
 
 
 Read = Callable[[], float]
-Write = tuple[Callable[[float], object], float]  # what sets a command, and its value in trim
+Write = tuple[Callable[[float], object], float]  # a command's setter, and its value in trim
 PlainFrames = Callable[[int, int], int]
 
 
 class Motion(NamedTuple):
-    """What reads the motion, in SI: the channels that there are, and with zeros for the others."""
+    """Functions that read the motion, in SI: its channels, and with zeros for missing ones."""
 
     read: Callable[[], tuple[float, ...]]
     read_whole: Callable[[], tuple[float, ...]]
 
 
 def motion_reader(longitudinal: Sequence[Read], lateral: Sequence[Read]) -> Motion:
-    """Return what reads the motion; written out, since every frame calls it."""
+    """Return the functions that read the motion; unrolled, since every frame calls them."""
     qbar, load, elevator, pitch_rate, alpha, pitch, speed, height = longitudinal
 
     def column() -> tuple[float, ...]:
@@ -89,7 +89,7 @@ def motion_reader(longitudinal: Sequence[Read], lateral: Sequence[Read]) -> Moti
     aileron, rudder, roll_rate, yaw_rate, beta, roll, heading = lateral
 
     def all_controls() -> tuple[float, ...]:
-        turned = heading()  # from 0 to 2π, north being either
+        turned = heading()  # from 0 to 2π, where both mean north
         return (
             qbar() * PSF_Pa,
             load(),
@@ -116,7 +116,7 @@ def stepper(
     writes: Sequence[Write],
     steps: int,
 ) -> Callable[[tuple[float, float, float]], None]:
-    """Return a function that runs a frame with commands about trim, one a control."""
+    """Return a function that runs a frame with commands about trim, one for each control."""
     (first, first_trim), *others = writes
 
     def one(commands: tuple[float, float, float], /) -> None:
@@ -146,9 +146,9 @@ def stepper(
 
 
 class PlainAircraft(NamedTuple):
-    """What flies an aircraft around which nothing acts: its calls, and where to be careful.
+    """The calls of an aircraft without acting wrappers, and when to check it.
 
-    Below `safe_altitude_m`, and where the height is no number, `trouble` says whether to go on.
+    Below `safe_altitude_m`, and if the height is NaN, `trouble` tells whether the flight must end.
     """
 
     longitudinal: Sequence[Read]
@@ -160,11 +160,11 @@ class PlainAircraft(NamedTuple):
 
 
 def plain_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames | None:
-    """Return what flies rig and aircraft from a frame up to another, with nothing in between.
+    """Return a loop of rig and aircraft from one frame to another, without calls in between.
 
-    It does what `motion_reader`, the rig's frame and `stepper` do, in one loop: to call them
-    and to pack the motion takes a fifth of what a rig costs. It returns the frame that it has come
-    to, an earlier one where there is trouble. None for two controls, of which none is shipped.
+    It does what `motion_reader`, the rig's frame and `stepper` do, in one loop: their calls, and
+    packing the motion, cost a fifth of the rig's own time. It returns the frame reached, an earlier
+    one if the flight must end. None for rigs with two controls, of which none is shipped.
     """
     if not aircraft.lateral and len(aircraft.writes) == 1:
         return _column_frames(aircraft, placed)
@@ -213,7 +213,7 @@ def _three_frames(aircraft: PlainAircraft, placed: Placed) -> PlainFrames:
             altitude = height() * FOOT_m
             if not altitude > safe_m and trouble():
                 return k
-            turned = heading()  # from 0 to 2π, north being either
+            turned = heading()  # from 0 to 2π, where both mean north
             command, second, third = rig_frame(
                 address,
                 k,

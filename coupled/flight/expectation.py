@@ -1,8 +1,8 @@
-"""What a run file expects of its flights: `[[expect]]`, read and checked before anything flies.
+"""The expectations of a run file, `[[expect]]`, checked before anything is flown.
 
-An expectation looks at a channel, at a figure that a comparison measures, or at a limit of
-the standards. Which rows of which flight, and within which bounds, its other keys say. `why` names
-where the bounds are from, above all whether they only pin what the model did before.
+An expectation is about a channel, a figure of a comparison, or a limit of the standards. Its other
+keys select rows and flights, and give the bounds. `why` is the origin of the bounds, above all
+whether they only pin the model's earlier result.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ LATENCIES: tuple[Standard, ...] = (
     "Part 60 4.a latency 300 ms",
     "Part 60 4.a latency 100 ms",
 )
-RATES = (SMALL_RATE, RATE)  # they hold a flight against the rigid one
+RATES = (SMALL_RATE, RATE)  # compared with the rigid flight
 REFERENCE = "rigid"
 
-SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole: a bound of 1 bounds nothing
+SHARES: tuple[Figure, ...] = ("loss", "loss_closed_form")  # of a whole; a bound of 1 is no bound
 RELATIVE: tuple[Figure, ...] = (*SHARES, "asked_norm", "reached_norm", "hand_travel_norm")
 RELATIVE += ("surface_stop_norm",)
 RELATIVE += ("felt_ratio", "felt_ratio_closed_form")
@@ -67,7 +67,7 @@ class UnjudgedError(Exception):
 
 
 class Expect(Section):
-    """One expectation; of `channel`, `measure` and `standard` just one is given."""
+    """One expectation, of exactly one of `channel`, `measure` and `standard`."""
 
     channel: str | None = None
     measure: Figure | None = None
@@ -92,7 +92,7 @@ class Expect(Section):
     @field_validator("least", "most", "equal", "within", mode="before")
     @classmethod
     def _in_shares(cls, value: Any, info: ValidationInfo) -> Any:
-        """Return a bound that is written in per cent as a share; refuse a share of 1 or more."""
+        """Return a bound given in per cent as a share; refuse a share of 1 or more."""
         measure, channel = info.data.get("measure"), info.data.get("channel") or ""
         if isinstance(value, str):
             found = _PER_CENT.fullmatch(value)
@@ -106,7 +106,7 @@ class Expect(Section):
 
     @property
     def bounds(self) -> tuple[float | None, float | None]:
-        """The least and the greatest that the figure may be, in its own unit."""
+        """The least and the largest value of the figure, in its own unit."""
         if self.equal is not None and self.within is not None:
             return self.equal - self.within, self.equal + self.within
         if self.reaches is not None:
@@ -115,11 +115,11 @@ class Expect(Section):
 
     @property
     def reference(self) -> str | None:
-        """The configuration that the flight is held against, if any."""
+        """The configuration of the reference flight, if any."""
         return REFERENCE if self.standard in RATES else self.minus
 
     def concerns(self, case: str, configuration: str) -> bool:
-        """Tell whether a flight is one that this is expected of."""
+        """Tell whether the expectation applies to a flight."""
         if self.case not in (None, case) or configuration == self.reference:
             return False
         return self.configuration in (None, configuration)
@@ -135,7 +135,7 @@ class Expect(Section):
 
     @property
     def words(self) -> str:
-        """What is looked at, for people."""
+        """The subject of the expectation, in words."""
         text = self.channel or self.measure or self.standard or ""
         if self.control is not None:
             text += f", {self.control}"
@@ -165,7 +165,7 @@ def check_expectations(
     configurations: Sequence[str],
     duration_s: float,
 ) -> None:
-    """Refuse what could never be judged. `cases` are the channels of each case, by its label."""
+    """Refuse expectations that can never be judged; `cases` are the channels by case label."""
     for i, expect in enumerate(expectations):
         place = f"expect[{i}]"
         _check_subject(expect, file, place)
@@ -178,7 +178,7 @@ def check_expectations(
 
 
 def _given(expect: Expect, fields: Sequence[str]) -> list[str]:
-    """Return the keys, of some fields, that an expectation gives."""
+    """Return the keys, of some fields, that an expectation has."""
     return [_KEYS.get(field, field) for field in fields if getattr(expect, field) is not None]
 
 

@@ -1,7 +1,7 @@
-"""A flight's frames, one after the other, until its time is over or something ends it.
+"""The loop over a flight's frames, until its time is over or something ends it.
 
-Most flights are plain: rig and aircraft, and nothing that asks for a word at every frame. They are
-flown in blocks by one loop of their own (`everyframe.plain_frames`).
+Most flights have rig and aircraft only, without calls between frames. They are flown in blocks by a
+fast loop (`everyframe.plain_frames`).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from coupled.record.record import EndedEarly
 from coupled.rig.placed import Placed
 
 Progress = Callable[[int, int], None]
-_BLOCK = 64  # frames between two words on how far a flight is
+_BLOCK = 64  # frames between two reports of progress
 
 
 class Frames:
-    """The frames of a manoeuvre: how many are `done`, and how they `ended` if before their time.
+    """The frames of a manoeuvre: the number `done`, and `ended` if the flight ended early.
 
-    `looks` are the hands whose pilots look at the motion, and how each looks. `extra` takes the
-    further properties that are asked for, a row a frame.
+    `looks` are the hands whose pilots observe the motion, with their functions. `extra` receives
+    the further properties, a row for each frame.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Frames:
         self.ended: EndedEarly | None = None
 
     def fly(self) -> None:
-        """Fly them all, or up to what ends the flight."""
+        """Fly all frames, or up to the one that ends the flight."""
         listened = self._companion is not None or self._looks or self._served
         eventful = listened or self._manoeuvre.record_properties
         plain = None if eventful else self._airframe.plain_frames(self._placed)
@@ -82,7 +82,7 @@ class Frames:
             motion = read()
             if companion is not None and (why := companion.before(k, motion)):
                 return self._end(why)
-            # Not above it: near the ground, or not a number.
+            # `not >` includes NaN.
             if flown and not motion[ALTITUDE] > safe_m and (why := airframe.trouble()):
                 return self._end(why)
             for state, look in looks:

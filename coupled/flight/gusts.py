@@ -1,11 +1,11 @@
-"""Vertical gusts: air that rises and sinks, as the Dryden spectrum has it.
+"""Vertical gusts with the Dryden spectrum.
 
 White noise through
 
     H(s) = σ·√(L/(π·V))·(1 + √3·(L/V)·s)/(1 + (L/V)·s)²      (MIL-F-8785C, w component)
 
-with L the scale and V the true airspeed, made discrete by the bilinear rule. The air is still
-at the start, where the aircraft is trimmed.
+with L the scale and V the true airspeed, discretised by the bilinear rule. The air is still at the
+start, where the aircraft is trimmed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from coupled.record.channels import SPEED
 from coupled.rig.parameters import Flight
 from coupled.units import FOOT_m
 
-GUST_DOWN = "atmosphere/gust-down-fps"  # beside any wind
+GUST_DOWN = "atmosphere/gust-down-fps"  # in addition to wind
 _BLOCK = 1024  # frames made at a time
 
 
@@ -31,7 +31,7 @@ def dryden(
     top, bottom = dryden_filter(rms_m_per_s, length_m / speed_m_per_s, frame_s)
     (b0, b1, b2), (_, a1, a2) = top, bottom
     rng = np.random.default_rng([seed, 97])
-    later = last = 0.0  # what the frames before leave, in the filter's transposed direct form
+    later = last = 0.0  # state of the filter in its transposed direct form
     while True:
         # Of unit density over 0 < ω < π/frame.
         for hiss in rng.normal(0.0, np.sqrt(np.pi / frame_s), _BLOCK).tolist():
@@ -57,7 +57,7 @@ def dryden_filter(
 
 
 class Gusts(Wrapper):
-    """Gusts drawn from a seed, in a rig that has them, or how fast the air rises each frame."""
+    """Gusts drawn from a seed, if the rig has them, or a given upward speed for each frame."""
 
     def __init__(
         self,
@@ -69,8 +69,8 @@ class Gusts(Wrapper):
         self._flight, self._frame_s, self._seed = flight, frame_s, seed
         self._air = air_m_per_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Let the air over each frame rise: as given, or as the Dryden spectrum has it."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Return a hook that sets the gust of each frame: as given, or from the spectrum."""
         flight, air = self._flight, self._air
         if air is None and flight.gust_rms > 0.0:
             speed = aircraft.motion()[SPEED]

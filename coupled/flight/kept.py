@@ -1,12 +1,12 @@
-"""An aircraft that is kept between the flights of a sweep, put back and trimmed for each.
+"""An aircraft kept between the flights of a sweep, reset and trimmed for each.
 
-To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset spares it, but loses what a model
-says of some things: the limits between which a c172p's stall has hysteresis, and where the
-aerodynamic reference point moves to. No property shows that. So only those models are kept of
-which a test has found that each record is the same to the byte, whatever they flew before
-(`tests/flight/test_kept`), in flights that change nothing of the aircraft but its commands.
-Beside this, all properties are compared with those of the first trim, bit for bit, and a flight
-that ended early leaves no aircraft. Where anything differs, the aircraft is loaded anew.
+To load a T-37 takes an eighth of a flight of 20 s. JSBSim's reset avoids this, but loses some state
+of models that no property shows: the limits of hysteresis of a c172p's stall, and the moving
+aerodynamic reference point. So an aircraft is kept only for models for which a test has found each
+record to be the same to the byte after any earlier flight (`tests/flight/test_kept`), and only for
+flights that change nothing of it but its commands. In addition all properties are compared with
+those of the first trim, bit for bit, and a flight that ended early keeps no aircraft. If anything
+differs, the aircraft is loaded again.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.putback import tells
 from coupled.rig.parameters import Flight
 
-# Of JSBSim's package. A c172p's stall, and an awjsra's trim, are others after a reset.
+# Of JSBSim's package. A c172p's stall and an awjsra's trim differ after a reset.
 PUT_BACK_EXACTLY = frozenset({"737", "B747", "T37", "f16"})
-# What of a flight section does no more than to set where it is trimmed, or changes no aircraft.
+# Keys of a flight section that only set its trim, or change no aircraft.
 _HARMLESS = frozenset(
     {"model", "altitude", "calibrated_airspeed", "flight_path", "direct_controls", "motion_stamp"}
     | {"properties", "gust_length"}
@@ -33,8 +33,8 @@ _HARMLESS = frozenset(
 
 
 @dataclass(frozen=True)
-class Lent:
-    """An aircraft as a flight has it; `kind` is None where it is not kept after it.
+class CachedAircraft:
+    """An aircraft for one flight; `kind` is None if it is not kept afterwards.
 
     `reads` are all its properties, `trimmed` their values in its first trim.
     """
@@ -45,11 +45,11 @@ class Lent:
     trimmed: bytes = b""
 
     def state(self) -> bytes:
-        """Return the properties as they are now, one after another."""
+        """Return the current values of the properties, concatenated."""
         return array("d", [read() for read in self.reads]).tobytes()
 
     def restarted(self) -> bool:
-        """Put the aircraft back and trim it; return whether it is as it was in its first trim."""
+        """Reset and trim the aircraft; return whether its state equals that of its first trim."""
         assert isinstance(self.airframe, JSBSimAirframe)
         try:
             self.airframe.restart()
@@ -58,42 +58,42 @@ class Lent:
         return self.state() == self.trimmed
 
 
-def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> Lent:
-    """Return an aircraft in its first trim, with what that is."""
+def in_trim(airframe: JSBSimAirframe, kind: Hashable) -> CachedAircraft:
+    """Return an aircraft in its first trim, with its state."""
     found = (airframe.reader(name) for name in airframe.names() if tells(name))
-    lent = Lent(airframe, kind, tuple(read for read in found if read is not None))
-    return replace(lent, trimmed=lent.state())
+    cached = CachedAircraft(airframe, kind, tuple(read for read in found if read is not None))
+    return replace(cached, trimmed=cached.state())
 
 
-class Hangar:
-    """Where the aircraft of the last flight waits for another of its kind."""
+class AircraftCache:
+    """A cache of the last flight's aircraft, for another flight of the same kind."""
 
     def __init__(self) -> None:
         self._asked: Hashable = None
-        self._waiting: dict[Hashable, Lent] = {}
+        self._waiting: dict[Hashable, CachedAircraft] = {}
 
-    def lend(self, manoeuvre: Manoeuvre, make: Callable[[], Airframe]) -> Lent:
-        """Return an aircraft for a manoeuvre: the one that waits, put back, or a new one."""
+    def take(self, manoeuvre: Manoeuvre, make: Callable[[], Airframe]) -> CachedAircraft:
+        """Return an aircraft for a manoeuvre: the cached one, reset, or a new one."""
         kind = _kind(manoeuvre)
-        # Taken out, so that no two threads ever fly one aircraft.
+        # Removed from the cache, so that no two threads fly one aircraft.
         waiting = self._waiting.pop(kind, None)
         if waiting is not None and waiting.restarted():
             return waiting
         airframe = make()
-        # To look up its properties takes a while: only once a kind is flown again and again.
+        # Collecting the properties is slow, so it is done only for a kind that is repeated.
         again, self._asked = kind is not None and kind == self._asked, kind
         if not again or not isinstance(airframe, JSBSimAirframe):
-            return Lent(airframe)
+            return CachedAircraft(airframe)
         return in_trim(airframe, kind)
 
-    def take_back(self, lent: Lent) -> None:
-        """Keep an aircraft after a flight that reached its end, in place of any other."""
-        if lent.kind is not None:
-            self._waiting = {lent.kind: lent}
+    def keep(self, cached: CachedAircraft) -> None:
+        """Keep an aircraft after a complete flight, in place of any other."""
+        if cached.kind is not None:
+            self._waiting = {cached.kind: cached}
 
 
 def _kind(manoeuvre: Manoeuvre) -> Hashable:
-    """Return what one aircraft flies of; None where it is not kept."""
+    """Return the key of a manoeuvre's aircraft; None if it is not kept."""
     rig = manoeuvre.rig
     flight = rig.flight
     if flight is None or flight.model not in PUT_BACK_EXACTLY or manoeuvre.conditions.given:

@@ -1,12 +1,11 @@
-"""How an aircraft is loaded: its centre of gravity, its fuel, and its mass.
+"""The loading of an aircraft: its centre of gravity, its fuel, and its mass.
 
-Every model has a point at which its aerodynamic forces act on it, and tanks; few have a mass
-that could be put elsewhere. So the centre of gravity is moved aft by bringing that point
-forward, which leaves mass and inertia as they are, and the arms of gear and engines too. The
-pitching moment changes by the force normal to the fuselage times the way.
+Every model has an aerodynamic reference point and tanks; few have a mass that could be moved. So
+the centre of gravity is moved aft by moving the reference point forward, which does not change
+mass, inertia, or the arms of gear and engines. The pitching moment changes by the force normal to
+the fuselage times the distance.
 
-Mass that an aircraft has more or less than its model is a ballast at the centre of gravity, where
-it adds no moment of inertia.
+A difference from the model's mass is a ballast at the centre of gravity, without moment of inertia.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ _FUEL = re.compile(r"propulsion/tank(\[\d+\])?/contents-lbs").fullmatch
 
 
 class Loading(Wrapper):
-    """The load that a rig's `flight` section asks for."""
+    """The loading by a rig's `flight` section."""
 
     def __init__(self, flight: Flight) -> None:
         self._flight = flight
@@ -41,11 +40,11 @@ class Loading(Wrapper):
 
     @property
     def ballast(self) -> bool:
-        """A mass that is another than the model's is made up by a ballast."""
+        """Whether the mass differs from the model's, so that a ballast is needed."""
         return self._flight.mass != 1.0
 
     def weigh(self, aircraft: Aircraft) -> None:
-        """Put the ballast at the centre of gravity of the aircraft as it is loaded and fuelled."""
+        """Put the ballast at the centre of gravity of the loaded and fuelled aircraft."""
         if not self.ballast:
             return
         found = [match for name in aircraft.names() if (match := _BALLAST(name))]
@@ -73,7 +72,7 @@ class Loading(Wrapper):
 
 
 def _read(aircraft: Aircraft, name: str) -> float:
-    """Return a property that every model has."""
+    """Return a property that exists in every model."""
     read = aircraft.reader(name)
     assert read is not None, name
     return read()

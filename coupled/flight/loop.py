@@ -1,8 +1,8 @@
 """The frame loop: rig and aircraft, coupled.
 
-Each frame the airframe gives q̄, load factor and motion; the rig's compiled frame step
-does the rest; the airframe takes the surface commands for one step. A flight that
-meets the ground, loses a finite state or is interrupted keeps its record so far.
+In each frame the airframe gives q̄, load factor and motion, the rig's compiled frame step computes
+the surface commands, and the airframe is stepped with them. A flight that meets the ground, loses a
+finite state or is interrupted keeps its record so far.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.bench import Airframe, Bench
-from coupled.flight.companion import Aboard, Companion
+from coupled.flight.companion import Companion, FlightAccess
 from coupled.flight.conditions import condition_wrappers
 from coupled.flight.direct import check_direct_controls
 from coupled.flight.frames import Frames, Progress
 from coupled.flight.gusts import Gusts
-from coupled.flight.kept import Hangar, Lent
+from coupled.flight.kept import AircraftCache, CachedAircraft
 from coupled.flight.manifest import manifest
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Action
@@ -55,24 +55,24 @@ def fly(
     progress: Progress | None = None,
     air_m_per_s: Sequence[float] | None = None,
     companion: Companion | None = None,
-    hangar: Hangar | None = None,
+    cache: AircraftCache | None = None,
     stops: bool = False,
 ) -> Record:
     """Fly a manoeuvre and return its record, SI, one row a frame.
 
-    `progress` is called now and then with frames done and frames in all. The manifest says
-    what went in, and under `ended_early` why and when a flight ended before its time.
-    `air_m_per_s` says, in place of the rig's gusts, how fast the air rises at each frame. A
-    `companion` is called before and after each frame. A `hangar` keeps the aircraft for the next
-    flight, unless its air is given. With `stops` the manifest says where the surface of the control
-    that the manoeuvre looks at meets its stop, for an aircraft whose surfaces follow directly.
+    `progress` is called repeatedly with frames done and frames in all. The manifest has the inputs,
+    and under `ended_early` why and when a flight ended early. `air_m_per_s` is the upward speed of
+    the air at each frame, in place of the rig's gusts. A `companion` is called before and after
+    each frame. A `cache` keeps the aircraft for the next flight, unless its air is given. With
+    `stops` the manifest has the stops of the compared control's surface, for an aircraft with
+    direct controls.
     """
     rig = manoeuvre.rig
-    hangar = hangar if air_m_per_s is None else None
+    cache = cache if air_m_per_s is None else None
     make = partial(make_airframe, manoeuvre, air_m_per_s)
     with timed("trim"):
-        lent = Lent(make()) if hangar is None else hangar.lend(manoeuvre, make)
-    airframe = lent.airframe
+        cached = CachedAircraft(make()) if cache is None else cache.take(manoeuvre, make)
+    airframe = cached.airframe
     frames, substeps = manoeuvre.frames, rig.substeps
     h = 1.0 / (rig.frame_rate * substeps)
     actions = _actions(manoeuvre, airframe.motion()[PRESSURE])
@@ -91,20 +91,20 @@ def fly(
     beside = (served, flight.extra)
     if companion is not None:
         so_far = partial(_so_far, manoeuvre, channels, (data, noise), beside)
-        companion.board(
-            Aboard(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
+        companion.begin(
+            FlightAccess(manoeuvre, airframe, channels, controls, script, data, grips, so_far)
         )
     with timed("fly"):
         flight.fly()
     found = _surface_stops(manoeuvre, airframe) if stops and flight.ended is None else {}
-    if hangar is not None and flight.ended is None:
-        hangar.take_back(lent)
+    if cache is not None and flight.ended is None:
+        cache.keep(cached)
     flown = (data[: flight.done], noise)
     return _flown(manoeuvre, channels, flown, beside, flight.ended, noted=found)
 
 
 def _surface_stops(manoeuvre: Manoeuvre, airframe: Airframe) -> dict[str, Any]:
-    """Return what the manifest says of a surface's stops, found after the last frame."""
+    """Return the manifest's entry on a surface's stops, found after the last frame."""
     flown, control = manoeuvre.rig.flight, manoeuvre.control
     if flown is None or not flown.direct_controls or not isinstance(airframe, JSBSimAirframe):
         return {}
@@ -114,7 +114,7 @@ def _surface_stops(manoeuvre: Manoeuvre, airframe: Airframe) -> dict[str, Any]:
 def _looks(
     controls: ControlArray, names: Sequence[str], actions: dict[ControlName, Action]
 ) -> list[tuple[Any, Look]]:
-    """Return the hands whose pilots look at the motion, and how each looks."""
+    """Return the hands whose pilots observe the motion, with their functions."""
     hands = controls["state"]["hand"]
     return [(hands[names.index(n)], a.look) for n, a in actions.items() if a.look]
 
@@ -127,9 +127,9 @@ def _so_far(
     first: int,
     last: int,
 ) -> Record:
-    """Return the record from frame `first` to before `last` of a flight that goes on.
+    """Return the record from frame `first` to before `last` of a flight in progress.
 
-    A channel that is stamped early needs rows that are still to come: the record ends before.
+    A channel with an early time stamp needs later rows, so the record ends before them.
     """
     data, noise = flown
     if noise is None:
@@ -150,7 +150,7 @@ def _flown(
     first: int = 0,
     noted: Mapping[str, Any] = MappingProxyType({}),
 ) -> Record:
-    """Return the record of the frames flown, with their noise, up to the first without a number.
+    """Return the record of the frames flown, with their noise, up to the first NaN.
 
     Its first row is frame `first`.
     """
@@ -170,7 +170,7 @@ def _flown(
 def _finite(
     data: Floats, rate_Hz: float, ended: EndedEarly | None
 ) -> tuple[Floats, EndedEarly | None]:
-    """Return a record up to where its state is lost, and why the flight ended."""
+    """Return a record up to the first row that is not finite, and why the flight ended."""
     finite = np.isfinite(data)
     if finite.all():
         return data, ended
@@ -211,7 +211,7 @@ def make_airframe(manoeuvre: Manoeuvre, air_m_per_s: Sequence[float] | None = No
 
 
 def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Action]:
-    """Return what each pilot does on a control, within reach, at the dynamic pressure of trim."""
+    """Return each pilot's action on a control, within reach, at the dynamic pressure of trim."""
     rig, found = manoeuvre.rig, {}
     for name, pilot in manoeuvre.pilots.items():
         gradient = float(specified_gradient(rig.controls[name].schedule, pressure_Pa))
@@ -224,7 +224,7 @@ def _actions(manoeuvre: Manoeuvre, pressure_Pa: float) -> dict[ControlName, Acti
 
 def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: float) -> Floats:
     """Return the hands' script on all nodes, shape (controls, 2, nodes): N and d."""
-    script = np.zeros((len(names), 2, nodes))  # takes no memory where nothing is written
+    script = np.zeros((len(names), 2, nodes))  # allocated only where written
     for name, action in actions.items():
         force, held = script[names.index(name)]
         if action.force is not None:
@@ -236,18 +236,18 @@ def _script(names: Sequence[str], actions: dict[Any, Action], nodes: int, h: flo
 
 @lru_cache(maxsize=1)
 def _times(nodes: int, h: float) -> Floats:
-    """Return the times of all nodes, s; flights of a campaign share them."""
+    """Return the times of all nodes, s, cached for the flights of a sweep."""
     times: Floats = np.arange(nodes, dtype=np.float64) * h
     times.flags.writeable = False
     return times
 
 
 def _noise(channels: tuple[str, ...], levels: dict[str, float], frames: int, seed: int) -> Floats:
-    """Return a record that holds nothing yet but the noise of its channels."""
+    """Return the array of a record with the noise of its channels only."""
     sigma = np.array([levels.get(channel, 0.0) for channel in channels])
     if not sigma.any():
         return np.zeros((frames, len(channels)))
-    # The hand's own force has none and takes no draw: a seed's noise is that of older records.
+    # The hand's own force has no noise and draws none, so that seeds give the same noise as before.
     drawn = np.array([not channel.endswith("_hand_force_N") for channel in channels])
     hiss = np.zeros((frames, len(channels)))
     hiss[:, drawn] = np.random.default_rng(seed).standard_normal((frames, int(drawn.sum())))

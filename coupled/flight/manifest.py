@@ -1,4 +1,4 @@
-"""What a record says of the flight that made it: rig, seed, files, versions, signs, and its end."""
+"""The manifest of a flight's record: rig, seed, files, versions, signs, and its end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 def input_files(manoeuvre: Manoeuvre) -> list[Path]:
-    """Return the files that a flight reads, if any: run, rig, and a pilot's tables."""
+    """Return the input files of a flight, if any: run, rig, and a pilot's tables."""
     source = manoeuvre.source
     own = [source.run_file, source.rig_file] if source is not None else []
     pilots = manoeuvre.pilots.values()
@@ -34,7 +34,7 @@ def input_files(manoeuvre: Manoeuvre) -> list[Path]:
 def manifest(
     manoeuvre: Manoeuvre, channels: tuple[str, ...], data: Floats, ended: EndedEarly | None
 ) -> dict[str, Any]:
-    """Return the manifest of a flight's record, as JSON takes it."""
+    """Return the manifest of a flight's record for JSON."""
     stops = {}
     for control in manoeuvre.rig.controls:
         met = np.flatnonzero(data[:, channels.index(channel(control, "stop"))])
@@ -73,7 +73,7 @@ _PULLS = {"column": "a pull", "wheel": "clockwise", "pedals": "right foot forwar
 
 
 def _positive(manoeuvre: Manoeuvre) -> dict[str, str]:
-    """Return which way is positive: of each control, and of its surface command."""
+    """Return the positive direction of each control, and of its surface command."""
     found: dict[str, str] = {}
     for name, control in manoeuvre.rig.controls.items():
         sign = "positive" if COMMAND_SIGN[control.surface] > 0 else "negative"
@@ -84,6 +84,6 @@ def _positive(manoeuvre: Manoeuvre) -> dict[str, str]:
 
 @lru_cache(maxsize=1)
 def versions() -> dict[str, str]:
-    """Return the versions of what flies."""
+    """Return the versions of the packages used in flight."""
     found = {"coupled": version("coupled"), "python": platform.python_version()}
     return found | {name: version(name) for name in ("jsbsim", "numpy", "numba", "scipy")}

@@ -1,7 +1,7 @@
-"""A manoeuvre: a rig, a pilot on some of its controls, and for how long. It needs no file.
+"""A manoeuvre: a rig, pilots on some of its controls, and a duration. It needs no file.
 
-It is checked when it is made, as a run file is and with the same errors; what a fault names
-is the run's file where there is one, or else the manoeuvre's name.
+It is checked when it is made, like a run file and with the same errors; a fault names the run's
+file if there is one, or else the manoeuvre's name.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from coupled.schema import Given, Section, build, quantity
 Configuration = Literal[
     "rigid", "uncompensated", "deflection only", "gradient only", "compensated", "calibrated low"
 ]
-# What a comparison flies unless asked for others.
+# Flown by a comparison by default.
 CONFIGURATIONS: tuple[Configuration, ...] = (
     "rigid",
     "uncompensated",
@@ -42,11 +42,10 @@ EVERY_CONFIGURATION: tuple[Configuration, ...] = (*CONFIGURATIONS, "calibrated l
 
 @public
 class PressureProfile(Given):
-    """The dynamic pressure of a bench over time, straight between points and held at the ends.
+    """The dynamic pressure of a bench over time, linear between points and constant beyond.
 
-    On a rig without aircraft; `time_s` must rise, `dynamic_pressure_Pa` has as many values, none
+    For a rig without aircraft; `time_s` must rise, `dynamic_pressure_Pa` has as many values, none
     negative. Raises InputError as a run file does.
-
     >>> import coupled
     >>> rig = coupled.load_rig("t37").changed({"flight": None})
     >>> rise = coupled.PressureProfile(time_s=[0.0, 2.0], dynamic_pressure_Pa=[500.0, 2500.0])
@@ -60,7 +59,7 @@ class PressureProfile(Given):
     dynamic_pressure_Pa: Values = quantity("", min_length=1)
 
     def check(self, file: object) -> None:
-        """Raise InputError for a profile that is none; `file` is named."""
+        """Raise InputError for an invalid profile; `file` is named."""
         if len(self.time_s) != len(self.dynamic_pressure_Pa):
             raise InputError(file, "bench.dynamic_pressure_Pa", "needs as many values as time_s")
         if any(b <= a for a, b in pairwise(self.time_s)):
@@ -70,7 +69,7 @@ class PressureProfile(Given):
 
 
 class Measure(Section):
-    """What a comparison looks at: the control, the change of attitude that is timed, a channel."""
+    """The subject of a comparison: the control, the timed change of attitude, a channel."""
 
     control: ControlName | None = None
     attitude_change: float = quantity("rad", 0.1, gt=0)
@@ -78,7 +77,7 @@ class Measure(Section):
 
 
 class Flown(Section):
-    """The keys of a run file that any manoeuvre has."""
+    """The common keys of all run files."""
 
     name: PlainName
     duration: float = quantity("s", gt=0, le=7200)
@@ -88,7 +87,7 @@ class Flown(Section):
 
 @dataclass(frozen=True)
 class Source:
-    """The files that a manoeuvre was read from, and what its case changes of the rig."""
+    """The files of a manoeuvre, and its case's changes of the rig."""
 
     run_file: Path
     rig_file: Path
@@ -98,21 +97,21 @@ class Source:
 @public
 @dataclass(frozen=True)
 class Manoeuvre:
-    """What is flown: a rig, and a pilot on some of its controls, for `duration_s` seconds.
+    """A flight: a rig, and pilots on some of its controls, for `duration_s` seconds.
 
-    rig                 as `Rig.changed` and `configured` make it
-    pilots              {control: pilot}, as {"column": Step(force_N=50)}; at least one
+    rig                 as made by `Rig.changed` and `configured`
+    pilots              {control: pilot}, for example {"column": Step(force_N=50)}; at least one
     duration_s          up to 7200 s
     seed                of noise, turbulence, gusts and a pilot's remnant
     conditions          wind, gust, turbulence and events; only with an aircraft
-    bench               q̄ over time; only, and always, on a rig without aircraft
+    bench               q̄ over time; required for a rig without aircraft, and only there
     record_properties   JSBSim properties that become channels of the record
-    configurations      those that a comparison flies, of `EVERY_CONFIGURATION`
-    measure             what a comparison looks at
-    expect              what a check holds the flights against
+    configurations      those of a comparison, of `EVERY_CONFIGURATION`
+    measure             the subject of a comparison
+    expect              the expectations of a check
     name, label         of the run, and of its case
-    card                what the run shows, for people
-    source              the files that it was read from, if any
+    card                a description of the run
+    source              the files of the manoeuvre, if any
 
     Raises InputError as a run file does, with its keys.
 
@@ -153,12 +152,12 @@ class Manoeuvre:
 
     @property
     def file(self) -> object:
-        """What a fault of the run names: its file, or else its name."""
+        """The run's name in faults: its file, or else its name."""
         return self.source.run_file if self.source is not None else self.name
 
     @property
     def rig_file(self) -> object:
-        """What a fault of the rig names: its file, or else its name."""
+        """The rig's name in faults: its file, or else its name."""
         return self.source.rig_file if self.source is not None else self.rig.name
 
     @property
@@ -167,12 +166,12 @@ class Manoeuvre:
 
     @property
     def frames(self) -> int:
-        """Rows of the record."""
+        """The number of rows of the record."""
         return max(1, round(self.duration_s * self.rig.frame_rate))
 
     @property
     def control(self) -> ControlName:
-        """The control that a comparison looks at: by default the first that a pilot moves."""
+        """The compared control; by default the first that a pilot moves."""
         if self.measure.control is not None:
             return self.measure.control
         moved = [control for control, pilot in self.pilots.items() if not pilot.rests]
@@ -180,14 +179,14 @@ class Manoeuvre:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of the record."""
+        """The channels of the record."""
         own = record_channels(list(self.rig.controls), self.rig.flight is not None)
         services = [name for control in self.served for name in service_channels(control)]
         return (*own, *services, *self.record_properties)
 
     @property
     def served(self) -> tuple[ControlName, ...]:
-        """The controls of which the rig gives services, or an event leads one."""
+        """The controls with services in the rig, or set by an event."""
         led = {event.control for event in self.conditions.event.values()}
         return tuple(n for n, c in self.rig.controls.items() if n in led or has_services(c))
 
@@ -196,7 +195,7 @@ class Manoeuvre:
         return replace(self, rig=configure(self.rig, configuration))
 
     def _check_kind(self) -> None:
-        """Refuse what only a bench has with an aircraft, and the reverse."""
+        """Refuse keys of a bench for a rig with an aircraft, and the reverse."""
         rig, file, bench = self._rig_name, self.file, self.bench
         if self.rig.flight is not None:
             if bench is not None:
@@ -240,10 +239,10 @@ class Manoeuvre:
 
 
 def configure(rig: Rig, configuration: Configuration) -> Rig:
-    """Return the rig with its structure rigid, or bending with the named corrections on.
+    """Return the rig with a rigid structure, or with a bend and the named corrections on.
 
     Rigid: K = 0 and the host's K̂ = 0, between controls too. Otherwise the rig's own K and K̂.
-    "calibrated low" is the uncompensated rig whose host found S₁ at a low gradient, eq. (7a).
+    "calibrated low" is the uncompensated rig whose S₁ was calibrated at a low gradient, eq. (7a).
     """
     changes: dict[str, Any] = {}
     for name, control in rig.controls.items():
@@ -261,10 +260,10 @@ def configure(rig: Rig, configuration: Configuration) -> Rig:
 
 
 def _calibrated_low(control: Control, d: str) -> dict[str, float]:
-    """Return the scales of a host that takes v₁/δ, read at a low gradient, for S₁: eq. (7a).
+    """Return the scales of a host whose S₁ is v₁/δ, read at a low gradient: eq. (7a).
 
-    While it is read the loader holds F = G₀·δc, so that G₀/(1 + K·G₀) is felt and v₁/δ is
-    S₁/(1 + K·G₀). That Ŝ₁ is in the analog product too (figure 5), as in the host's reading.
+    During the reading the loader holds F = G₀·δc, so that G₀/(1 + K·G₀) is felt and v₁/δ is
+    S₁/(1 + K·G₀). This Ŝ₁ affects the analog product (figure 5) and the host's reading.
     """
     sensing, bend = control.sensing, control.loader.bend
     low = control.gains.low_gradient or min(control.schedule.total_gradient)

@@ -1,16 +1,16 @@
 """A JSBSim model's file, with a part of its aerodynamics scaled.
 
-Of each function F of an axis, the part that is due to one quantity x is F(x) − F(x₀). With a
-factor k that part is k times as large,
+In each function F of an axis, the part due to one quantity x is F(x) − F(x₀). A factor k scales
+that part,
 
     F ← k·F(x) + (1 − k)·F(x₀),
 
-whatever the form of F: a product is its coefficient times k, a table each of its values less that
-at x₀. Functions outside the axis that F refers to are followed, and copied with x₀ for x. At k = 1
-the model is the one that was filed, to the bit. k and x₀ are properties, set once loaded.
+for any form of F: a product has its coefficient scaled, a table its values less that at x₀.
+Functions outside the axis to which F refers are copied with x₀ for x. At k = 1 the model equals the
+filed one to the bit. k and x₀ are properties, set after loading.
 
-JSBSim loads files only, so the new text stands in a temporary folder while it loads, beside links
-to the model's other files. The model's own folder is never written to.
+JSBSim loads files only, so the new text is in a temporary folder during loading, beside links to
+the model's other files. The model's own folder is never written to.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ Element = ElementTree.Element
 
 @dataclass(frozen=True)
 class Scaled:
-    """The part of the aerodynamics that is due to one quantity.
+    """The part of the aerodynamics due to one quantity.
 
-    `quantity` is named by `properties`, JSBSim's, of which a model may use any; `axes` are those
-    in which its part is scaled, all where none is named.
+    `properties` are JSBSim's names of the `quantity`, of which a model may use any; `axes` are
+    those in which its part is scaled, by default all.
     """
 
     name: str
@@ -44,25 +44,25 @@ class Scaled:
 
     @property
     def factor(self) -> str:
-        """The property that holds k."""
+        """The property of k."""
         return f"coupled/{self.name}/factor"
 
     @property
     def rest(self) -> str:
-        """The property that holds 1 − k."""
+        """The property of 1 − k."""
         return f"coupled/{self.name}/rest"
 
     def held(self, name: str) -> str:
-        """Return the property that holds x₀ for one of `properties`."""
+        """Return the property of x₀ for one of `properties`."""
         return f"coupled/{self.name}/held-{self.properties.index(name)}"
 
 
-# A point mass of nothing, last in a model's list, which `loading` gives its weight and its place.
+# A point mass of zero, last in a model's list; `loading` sets its weight and position.
 BALLAST = "coupled-ballast"
 
 
 class NothingToScaleError(Exception):
-    """A model has no aerodynamics that are due to a quantity."""
+    """A model has no aerodynamics due to a quantity."""
 
     def __init__(self, scaled: Scaled) -> None:
         super().__init__(scaled.name)
@@ -74,10 +74,10 @@ class UnreadableModelError(Exception):
 
 
 def parsed(text: bytes, name: str) -> Element:
-    """Return the root of a model's XML. Raises UnreadableModelError, naming the file.
+    """Return the root of a model's XML. Raises UnreadableModelError with the file's name.
 
-    Python's parser says what is no XML by ParseError, an encoding that it does not know by
-    LookupError or ValueError.
+    Python's parser raises ParseError for invalid XML, and LookupError or ValueError for an unknown
+    encoding.
     """
     try:
         return ElementTree.fromstring(text)
@@ -96,7 +96,7 @@ def _is_model(folder: Path) -> bool:
 
 @lru_cache(maxsize=8)
 def catalogue(text: str) -> Mapping[str, str]:
-    """Return what may be done with each property of a model's catalogue: R, W or RW."""
+    """Return the access of each property in a model's catalogue: R, W or RW."""
     return {name: access for name, _, access in (x.rpartition(" (") for x in text.split("\n"))}
 
 
@@ -106,9 +106,9 @@ def loadable(
 ) -> Iterator[Path]:
     """Yield the folder of models from which to load a model, with parts of it scalable.
 
-    With `ballast` it has one point mass more, of no weight yet.
-    Raises NothingToScaleError, UnreadableModelError for a file that is no XML, or OSError where
-    there is no temporary folder to write to.
+    With `ballast` it has one more point mass, of zero weight. Raises NothingToScaleError,
+    UnreadableModelError for a file that is not XML, or OSError if a temporary folder cannot be
+    written.
     """
     if not scaled and not ballast:
         yield models
@@ -131,7 +131,7 @@ def loadable(
 
 
 def _stand_in(place: Path, entry: Path) -> None:
-    """Put a link to a file or folder at a place, or a copy where links are not allowed."""
+    """Create a link to a file or folder, or a copy if links are not allowed."""
     try:
         place.symlink_to(entry, target_is_directory=entry.is_dir())
     except OSError:
@@ -145,7 +145,7 @@ def _stand_in(place: Path, entry: Path) -> None:
 def _scalable(
     folder: Path, scaled: tuple[Scaled, ...], ballast: bool, changed_ns: int, size: int
 ) -> bytes:
-    """Return a model's text with parts of it scalable; `changed_ns` and `size` tell versions."""
+    """Return a model's text with parts of it scalable; `changed_ns` and `size` key the cache."""
     root = _read(folder / f"{folder.name}.xml")
     for one in scaled:
         aerodynamics = _section(root, folder, "aerodynamics")
@@ -164,7 +164,7 @@ def _read(file: Path) -> Element:
 
 
 def _section(root: Element, folder: Path, name: str) -> Element | None:
-    """Return a section of a model, with what stands in a file of its own read into it."""
+    """Return a section of a model, read from its own file if it has one."""
     section = root.find(name)
     if section is not None and (file := section.attrib.pop("file", None)) is not None:
         own = folder / (file if file.endswith(".xml") else f"{file}.xml")
@@ -188,10 +188,10 @@ def _make_scalable(aerodynamics: Element, scaled: Scaled) -> None:
     found = {name: scaled.held(name) for name in scaled.properties}
     held = dict(found)
     copies: list[Element] = []
-    without = set[str]()  # functions that have nothing of the quantity
+    without = set[str]()  # functions independent of the quantity
 
     def depends(function: Element) -> bool:
-        """Tell whether a function has the quantity in it, and copy those that it reaches it by."""
+        """Tell whether a function depends on the quantity; copy the functions in between."""
         hit = False
         for part in function.iter():
             name = _property(part)
@@ -225,24 +225,24 @@ def _make_scalable(aerodynamics: Element, scaled: Scaled) -> None:
 
 
 def _property(element: Element) -> str:
-    """Return the property that an element of a function refers to, or an empty string."""
+    """Return the property that an element of a function names, or an empty string."""
     return (element.text or "").strip().removeprefix("-")
 
 
 def _held_copy(function: Element, held: dict[str, str], name: str = "") -> Element:
-    """Return a copy of a function in which what it refers to is held at x₀."""
+    """Return a copy of a function with its references held at x₀."""
     made = copy.deepcopy(function)
     for part in made.iter():
         if (old := _property(part)) in held:
             part.text = (part.text or "").replace(old, held[old])
-        part.attrib.pop("name", None)  # of a table: no two properties bear one name
+        part.attrib.pop("name", None)  # of a table; names of properties are unique
     if name:
         made.set("name", name)
     return made
 
 
 def _scale(function: Element, scaled: Scaled, held: dict[str, str]) -> None:
-    """Let a function be k times its value, and 1 − k times that at x₀."""
+    """Make a function k times its value, plus 1 − k times that at x₀."""
     bodies = [part for part in function if part.tag != "description"]
     total = Element("sum")
     for factor, terms in (

@@ -1,9 +1,9 @@
 """Trim by Newton's method: angle of attack, thrust and elevator together.
 
-JSBSim's own trim pairs the thrust with the acceleration along the nose, and finds one after the
-other. Where the thrust mostly lifts, as through nozzles that point down, that fails. Here all
-three are moved at once until the three accelerations of the plane of symmetry vanish. The
-aircraft is taken to be symmetric: no roll, no sideslip, ailerons and rudder at neutral.
+JSBSim's own trim pairs the thrust with the acceleration along the nose, and solves one after the
+other. This fails if the thrust mostly lifts, as through nozzles that point down. Here all three are
+varied together until the three accelerations of the plane of symmetry vanish. The aircraft is
+assumed symmetric: no roll, no sideslip, ailerons and rudder at neutral.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _ACCELERATIONS = (
 _NAMES = ("the angle of attack", "the throttle", "the elevator")
 _LOW, _HIGH = np.array([-0.35, 0.0, -1.0]), np.array([0.5, 1.0, 1.0])
 _STEPS = np.array([1e-4, 1e-3, 1e-3])
-_STARTS = (0.7, 0.4)  # throttles; where Newton's method leads out of bounds from one, the other
+_STARTS = (0.7, 0.4)  # throttles; the second is tried if the first leads out of bounds
 _STILL = 1e-7  # ft/s² and rad/s²
 
 
 def newton_trim(fdm: Any, flight: Flight, start_alpha_rad: float = 0.07) -> str:
     """Trim a loaded aircraft on its flight path; return why it cannot be, or an empty string.
 
-    Altitude, flaps and what else the rig sets are to be set before. Systems with a memory stand
-    at their steady state meanwhile.
+    Altitude, flaps and the rig's other settings must be set before. Dynamic systems are kept at
+    their steady state.
     """
     fdm.set_trim_status(True)
     try:
@@ -61,7 +61,7 @@ def _search(fdm: Any, flight: Flight, found: Floats) -> str:
             down = _accelerations(fdm, flight, found - step)
             slopes[:, i] = (up - down) / (2.0 * _STEPS[i])
         if not np.all(np.isfinite(slopes)) or abs(np.linalg.det(slopes)) < 1e-12:
-            return "angle of attack, throttle and elevator do not tell apart"
+            return "angle of attack, throttle and elevator are not separable"
         move = np.linalg.solve(slopes, -left)
         move *= min(1.0, 0.1 / float(np.max(np.abs(move))))
         found = np.clip(found + move, _LOW, _HIGH)
@@ -77,6 +77,6 @@ def _accelerations(fdm: Any, flight: Flight, point: Floats) -> Floats:
     for engine in range(fdm.get_propulsion().get_num_engines()):
         fdm[f"fcs/throttle-cmd-norm[{engine}]"] = throttle
     fdm["fcs/elevator-cmd-norm"] = elevator
-    for _ in range(3):  # the rate of the angle of attack, which damps, is an answer too
+    for _ in range(3):  # the rate of the angle of attack, which damps, depends on the result
         fdm.run_ic()
     return np.array([fdm[name] for name in _ACCELERATIONS])

@@ -1,8 +1,8 @@
-"""A user's own JSBSim model, loaded in a process of its own before this one loads it.
+"""A user's own JSBSim model, first loaded in a process of its own.
 
-JSBSim is compiled code that some faults of a model's files end, past any `except`: a property's
-name that is malformed, a huge index, a section that is missing. Then only that process ends, and
-the fault is one line. What comes with JSBSim, or with this package, is loaded at once.
+JSBSim is compiled code that some faults of a model's files crash beyond any `except`: a malformed
+name of a property, a huge index, a missing section. Then only that process ends, and the fault is
+one line. Models of JSBSim or of this package are loaded directly.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from coupled.files import clear_temporary
 from coupled.resources import aircraft_folder
 from coupled.rig.parameters import Flight
 
-TRIED = "coupled.flight.tryout"  # what loads it there
-REFUSED = 3  # exit code of a process that says what is wrong
+TRIED = "coupled.flight.tryout"  # module of that process
+REFUSED = 3  # exit code of a process that reports the fault itself
 LONGEST_s = 60.0  # a packaged model takes less than 2 s on a slow machine
-# What of a flight section changes which files are loaded, or what is made of them.
+# Keys of a flight section that change the loaded files or their content.
 _LOADED = (
     *("model", "folder", "steps_per_frame", "trim", "mass", "elevator_effectiveness"),
     *("pitch_damping", "pitch_stiffness", "lift_slope", "cg_aft", "fuel"),
@@ -36,9 +36,9 @@ _MOST_FILES = 10_000
 def check_own_model(
     flight: Flight, frame_s: float, controls: Sequence[str], models: Sequence[Path], file: object
 ) -> None:
-    """Refuse a model that ends JSBSim; `file` describes the rig, for faults.
+    """Refuse a model that crashes JSBSim; `file` is the rig's, for faults.
 
-    A model is tried once for each state of its files and of what is asked of it.
+    A model is tried once for each state of its files and each request.
     """
     home = _own_home(flight, models)
     if home is None:
@@ -52,7 +52,7 @@ def check_own_model(
 
 
 class _Request:
-    """What is to be flown; equal to any other, since the rest of a call tells them apart."""
+    """The flight to be tried; equal to any other, so that only other arguments key the cache."""
 
     def __init__(self, flight: Flight, frame_s: float, controls: tuple[str, ...]) -> None:
         self.flight, self.frame_s, self.controls = flight, frame_s, controls
@@ -65,7 +65,7 @@ class _Request:
 
 
 def _own_home(flight: Flight, models: Sequence[Path]) -> Path | None:
-    """Return the folder in which a user's own model lies; None of a model that is shipped."""
+    """Return the folder of a user's own model; None for a shipped model."""
     if flight.folder:
         return Path(flight.folder)
     own = [folder for folder in models if folder != aircraft_folder()]
@@ -73,9 +73,9 @@ def _own_home(flight: Flight, models: Sequence[Path]) -> Path | None:
 
 
 def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
-    """Return the files of a model with their sizes and times, by which a change is seen."""
+    """Return the files of a model with their sizes and times, to detect changes."""
     found = []
-    with suppress(OSError, ValueError):  # a folder that cannot be, which the load refuses
+    with suppress(OSError, ValueError):  # an impossible folder, refused when loading
         for path in sorted(folder.rglob("*.xml"))[:_MOST_FILES]:
             known = path.stat()
             found.append((str(path), known.st_mtime_ns, known.st_size))
@@ -84,9 +84,9 @@ def _state(folder: Path) -> tuple[tuple[str, int, int], ...]:
 
 @lru_cache(maxsize=64)
 def _tried(home: str, state: object, asked: str, request: _Request) -> str:
-    """Return what keeps a model from being loaded; empty where it can be, or is refused here too.
+    """Return why a model cannot be loaded; empty if it can, or if loading it here will refuse it.
 
-    `state` and `asked` tell one model from another.
+    `state` and `asked` key the cache.
     """
     task = {
         "flight": request.flight.model_dump_json(),
@@ -114,8 +114,8 @@ def _tried(home: str, state: object, asked: str, request: _Request) -> str:
     last = next((line for line in reversed(lines) if line), "")[-200:]
     if done.returncode == REFUSED:
         return f"cannot be loaded: {last}"
-    why = f"ends JSBSim as it is loaded ({_how(done.returncode)}): a fault of its files"
-    return f"{why}; JSBSim's last words: {last}" if last else why
+    why = f"crashes JSBSim when loaded ({_how(done.returncode)}): a fault of its files"
+    return f"{why}; JSBSim's last message: {last}" if last else why
 
 
 def _how(code: int) -> str:

@@ -1,9 +1,9 @@
-"""A loaded JSBSim aircraft put back to what it was before its first trim, as far as JSBSim does so.
+"""A reset of a loaded JSBSim aircraft to its state before the first trim, as far as possible.
 
-`reset_to_initial_conditions` alone leaves the initial conditions of the last trim, from which the
-next one starts: a T-37 then stands 2e-9 m higher. So they are put to zero, the models are
-reset about them with a step, and once more without (a B747's fuel flow is known after the step
-only), and they are put to zero again, since the step has moved their last digits.
+`reset_to_initial_conditions` alone keeps the initial conditions of the last trim, from which the
+next one starts: a T-37 is then 2e-9 m higher. So they are set to zero, the models are reset with a
+step, and once more without (a B747's fuel flow is known only after the step), and they are set to
+zero again, since the step has changed their last digits.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from __future__ import annotations
 import re
 from typing import Any
 
-# In this order: airspeed first, so that none is kept over the others; the height three times, of
-# which the first still refers to where the aircraft was.
+# In this order: airspeed first, so that it does not override the others; the height three times,
+# since the first still refers to the aircraft's old position.
 _ZEROS = (
     *("vc-kts", "lat-gc-rad", "long-gc-rad", "terrain-elevation-ft"),
     *("h-sl-ft", "h-sl-ft", "h-sl-ft"),
     *("alpha-rad", "beta-rad", "phi-rad", "theta-rad", "psi-true-rad"),
     *("p-rad_sec", "q-rad_sec", "r-rad_sec", "vn-fps", "ve-fps", "vd-fps"),
 )
-_WITHOUT_RUN = 2  # JSBSim's mode of a reset that takes no step
-# How many steps there were, and memory that JSBSim reads before it sets it.
+_WITHOUT_RUN = 2  # JSBSim's mode of a reset without a step
+# The number of steps, and memory that JSBSim reads before it sets it.
 _TELLS_NOTHING = re.compile(r"simulation/frame|gear/unit(\[\d+\])?/side_friction_coeff").fullmatch
 
 
@@ -38,5 +38,5 @@ def _to_zero(fdm: Any) -> None:
 
 
 def tells(name: str) -> bool:
-    """Tell whether a property says something of the aircraft."""
+    """Tell whether a property is part of the aircraft's state."""
     return not _TELLS_NOTHING(name)

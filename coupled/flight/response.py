@@ -1,9 +1,8 @@
-"""How an aircraft answers one of its controls at one frequency, found by flying it.
+"""The frequency response of an aircraft to one of its controls, found by flying it.
 
-Two aircraft of their own are flown from the trim, one with a small sine on the surface's
-command and one with its negative, faded in; half the difference of their motions, without
-what drifts, is the answer. So it holds whatever the model has between command and
-surface, and an even nonlinearity falls out.
+Two separate aircraft are flown from the trim, one with a small sine on the surface's command and
+one with its negative, faded in. The response is half the difference of their motions, with drift
+removed. So it includes everything between command and surface, and even nonlinearities cancel.
 """
 
 from __future__ import annotations
@@ -34,14 +33,14 @@ from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 
-_SIZE = 0.004  # of the command: linear, and far above rounding
+_SIZE = 0.004  # of the command: within the linear range, and far above rounding
 _FADE, _WAIT, _MEASURED = 2.0, 2.0, 4.0  # periods
-_LEAST_WAIT_s = 10.0  # the short period of the slowest aircraft here has died down by then
-_DRIFT = 3  # order of the polynomial that takes what drifts
+_LEAST_WAIT_s = 10.0  # decay of the short period of the slowest aircraft here
+_DRIFT = 3  # order of the polynomial that removes drift
 
 
 class Response(NamedTuple):
-    """What a unit of a surface's command, JSBSim's ±1, makes of the motion at one frequency.
+    """The response of the motion to a unit of a surface's command, JSBSim's ±1, at one frequency.
 
     Roll, heading and sideslip are 0 on a rig without wheel and pedals, which does not read them.
     """
@@ -121,7 +120,7 @@ def _aircraft(
 
 
 def _fly(airframe: JSBSimAirframe, command: Floats, moved: int, frame_s: float) -> Floats:
-    """Return the motion that a `Response` has under a surface's command, a row a frame."""
+    """Return the motion of a `Response` under a surface's command, a row for each frame."""
     lateral = len(airframe.motion()) > max(ROLL, HEADING, SIDESLIP)
     rows = np.zeros((command.size, 7 if lateral else 4))
     before = airframe.motion()[ALTITUDE]

@@ -1,7 +1,7 @@
-"""A run file: which rig, what the pilot does, for how long, and what is measured.
+"""A run file: the rig, the pilots, the duration, and the measurements.
 
-A run may have several cases: the same run with a few values of rig or pilot changed,
-each named by a dotted key. Every case and pilot is checked before anything flies.
+A run may have several cases: the same run with some values of rig or pilot changed, each by a
+dotted key. Every case and pilot is checked before anything is flown.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from coupled.schema import Section, build, file_keys, known_keys, load_toml, qua
 
 
 class Case(Section):
-    """A variant of the run: dotted keys of rig and pilot, with their values here."""
+    """A variant of the run: dotted keys of rig and pilot, with their new values."""
 
     label: Annotated[
         str, text_like(r"[^\x00-\x1f\x7f]{1,120}", "should be one line of 1 to 120 characters")
@@ -108,9 +108,9 @@ def _checked_run(table: dict[str, Any], keys: dict[str, str], pilots: Any, file:
 def _add_rig_faults(
     table: dict[str, Any], pilots: Any, file: Path, faults: list[InputError]
 ) -> None:
-    """Add what is wrong with the rig that a run names, and with its pilots' controls."""
+    """Add the faults of the rig that a run names, and of its pilots' controls."""
     named = table.get("rig")
-    if isinstance(named, str) and named:  # that it lacks, or is no name, is said already
+    if isinstance(named, str) and named:  # otherwise there is a fault already
         with collected(faults):
             _pilots(pilots, read_rig(find_named(file, "rig", named, shipped_rigs(), "rig")), file)
 
@@ -162,7 +162,7 @@ def _refuse_duplicates(run: RunFile, file: Path) -> None:
 
 
 def _changed_rig(rig_file: Path, case: Case, file: Path, index: int) -> Rig:
-    """Return the rig as a case has it; what only the case makes wrong is blamed on the case."""
+    """Return the rig of a case; faults that only the case causes name the case."""
     for key, value in case.rig.items():
         if isinstance(value, dict) and key in ("flight", "controls"):
             place = f"case[{index}].rig.{key}"
@@ -179,7 +179,7 @@ def _changed_rig(rig_file: Path, case: Case, file: Path, index: int) -> Rig:
 
 
 def _pilots(tables: Any, rig: Rig, file: Path) -> dict[ControlName, Pilot]:
-    """Return the pilots of a run's tables; a force table's file lies beside the run."""
+    """Return the pilots of a run's tables; a force table's file is beside the run."""
     if not isinstance(tables, dict) or not tables:
         raise InputError(file, "pilot", f"needs at least one of {', '.join(rig.controls)}")
     known_keys(tables, dict.fromkeys(CONTROL_NAMES), file, "pilot")

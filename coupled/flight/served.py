@@ -1,4 +1,4 @@
-"""The loaders' services over a flight: led by its events before each frame, noted after it."""
+"""The loaders' services over a flight: set by its events before each frame, recorded after it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 Frame = Callable[[int, tuple[float, ...]], tuple[float, float, float]]
 
 
-# What a service that rests leaves at 0; what is asked of the surface is not of them.
+# Channels that are 0 without an active service; the surface's command is not one.
 _RESTING = [i for i, name in enumerate(SERVICE_CHANNELS) if name != "asked_{d}"]
 
 
 class Served:
-    """What a flight's services do; false where it has none.
+    """The services of a flight; false if it has none.
 
-    `any_led` says that those of any control may be led from outside while it flies.
+    `any_led`: the services of any control may be set from outside during the flight.
     """
 
     def __init__(self, manoeuvre: Manoeuvre, controls: ControlArray, any_led: bool = False) -> None:
@@ -32,7 +32,7 @@ class Served:
         self._controls, self._names = controls, [str(name) for name in rig.controls]
         self._always = manoeuvre.served
         self._which = tuple(rig.controls) if any_led else self._always
-        # From the first frame on, so that what is recorded before an event is true, too.
+        # From the first frame on, so that rows before an event are recorded too.
         recorded = [name in self._which for name in rig.controls]
         controls["state"]["services"]["on"][recorded] = 1
         events = manoeuvre.conditions.event
@@ -44,7 +44,7 @@ class Served:
         return bool(self._which)
 
     def around(self, frame: Frame) -> Frame:
-        """Return the rig's frame with events led before it, and what it recorded noted after."""
+        """Return the rig's frame with events applied before it, and services recorded after it."""
         if not self:
             return frame
         happen, rows = self._happen or (lambda: None), self._rows
@@ -58,9 +58,9 @@ class Served:
         return served
 
     def beside(self, data: Floats, first: int = 0) -> tuple[tuple[str, ...], Floats]:
-        """Return the services' channels, and a record's rows from frame `first` with them behind.
+        """Return the services' channels, and a record's rows from frame `first` with them appended.
 
-        Of a control that has none those are left out, unless one of them was led by then.
+        Channels of a control without services are left out, unless one was set by then.
         """
         flown = self._rows[: first + len(data)]
         rows = flown[first:]

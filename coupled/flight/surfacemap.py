@@ -1,4 +1,4 @@
-"""Where a surface stands for each command, and where it stops, found by flying an aircraft."""
+"""The position of a surface for each command, and its stops, found by flying an aircraft."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from coupled.flight.wrapper import Motion, Step
 from coupled.record.channels import SURFACES, motion_channels
 
 Floats = NDArray[np.float64]
-_BEYOND = (2.0, 2.5)  # commands about trim that no model follows whose command has an end at ±1
+_BEYOND = (2.0, 2.5)  # commands about trim beyond the ±1 at which models limit them
 _SAME_rad = 1e-9  # rounding of a surface's position
 _HALVINGS = 24  # of a command from 0 to 1: to 6e-8
 
 
 @dataclass(frozen=True)
 class SurfaceStop:
-    """Where a surface meets its stop: the command about trim, of ±1, and its position in rad."""
+    """A surface's stop: the command about trim, of ±1, and its position in rad."""
 
     command_norm: float
     position_rad: float
@@ -29,10 +29,10 @@ class SurfaceStop:
 def stops_found(
     step: Step, motion: Motion, controls: Sequence[str], control: str
 ) -> dict[str, dict[str, Any] | None]:
-    """Return where a control's surface meets its stop on either side, within commands of ±1.
+    """Return the stops of a control's surface on either side, within commands of ±1.
 
-    By the sign of the command, `negative` and `positive`, as JSON takes it; None where it does not.
-    For a surface that follows its command within a frame. A frame each is flown, up to some 50.
+    By the sign of the command, `negative` and `positive`, for JSON; None if there is none. For a
+    surface that follows its command within a frame. Up to some 50 frames are flown.
     """
     surface = f"{SURFACES[control]}_rad"
     at = motion_channels(controls, flown=True).index(surface)
@@ -63,9 +63,9 @@ def stops_found(
 def flown_through(
     step: Step, motion: Motion, controls: Sequence[str], surface: str
 ) -> tuple[Floats, Floats]:
-    """Return commands about trim, and where a surface stands for each, rad; a frame each.
+    """Return commands about trim, and a surface's position for each, rad; a frame each.
 
-    601 even commands, and those between at which the surface's slope changes, as at neutral where
+    601 even commands, and those between at which the surface's slope changes, such as neutral if
     its travels up and down differ: linear interpolation is then exact for a piecewise linear law.
     """
     at = motion_channels(controls, flown=True).index(surface)
@@ -88,7 +88,7 @@ def flown_through(
 
 
 def _corners(commands: Floats, positions: Floats) -> Floats:
-    """Return the commands inside a step at which the lines through its two neighbours meet."""
+    """Return the commands inside a step at which the lines through its neighbours intersect."""
     step = commands[1] - commands[0]
     rises = np.diff(positions)
     before, within, after = rises[:-2], rises[1:-1], rises[2:]

@@ -1,7 +1,7 @@
 """The process in which a user's model is loaded, trimmed and flown for some frames (`ownmodel`).
 
-It ends with 0 where that goes well or is refused by a line, which the parent finds again; with
-REFUSED and the reason on the standard error where Python cannot read the model.
+Its exit code is 0 if that succeeds, or fails with a fault that the parent will find as well; and
+REFUSED, with the reason on the standard error, if Python cannot read the model.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _FRAMES = 5
 
 
 def main() -> int:
-    """Fly what the standard input asks for, and return the exit code."""
+    """Fly the request on the standard input, and return the exit code."""
     faulthandler.disable()
     limit_memory()
     task = json.loads(sys.stdin.buffer.read())

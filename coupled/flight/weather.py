@@ -3,11 +3,10 @@
 The wind is a velocity of the air over time, along the aircraft's initial heading and upwards. The
 aircraft is trimmed in still air, where a constant wind has no effect, so the wind starts at zero.
 
-Gusts and turbulence are JSBSim's own. A gust is air that moves as (1 − cos(π·t/rise))/2 of its
-velocity, holds it, and comes to rest in the same way. Turbulence is `milspec`, MIL-F-8785C by its
-discrete approximation, or `tustin`, the same spectra by Tustin's rule. Below 1000 ft above the
-ground its strength is that of the wind at 20 ft, above 2000 ft that of a severity. It acts on all
-axes, and is drawn from the run's seed.
+The velocity of a gust rises as (1 − cos(π·t/rise))/2, is held, and falls in the same way.
+Turbulence is JSBSim's: `milspec`, MIL-F-8785C by its discrete approximation, or `tustin`, the same
+spectra by Tustin's rule. Below 1000 ft above the ground its strength is that of the wind at 20 ft,
+above 2000 ft that of a severity. It acts on all axes, and is drawn from the run's seed.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from coupled.units import FOOT_m
 
 _WINDS = ("atmosphere/wind-north-fps", "atmosphere/wind-down-fps")
 _GUST = "atmosphere/cosine-gust/"
-_LOCAL = 3.0  # JSBSim's number of the frame north, east, down; the aircraft starts northwards
+_LOCAL = 3.0  # JSBSim's number of the frame north, east, down; the initial heading is north
 _STRONGEST = 100.0  # m/s
 _TURBULENCE = "atmosphere/turbulence/milspec/"
 _MODELS = {"milspec": 3.0, "tustin": 4.0}
@@ -40,7 +39,7 @@ class Wind(Section):
 
 
 class Gust(Section):
-    """A discrete gust: how fast the air then moves, a tail wind, from the left, and upwards."""
+    """A discrete gust: the velocity of its air, positive as a tail wind, from the left, upwards."""
 
     at: float = quantity("s", ge=0, le=7200)
     rise: float = quantity("s", gt=0, le=7200)
@@ -76,7 +75,7 @@ def check_wind(wind: Wind, file: object) -> None:
 
 
 def check_gust(gust: Gust, file: object) -> None:
-    """Refuse a gust of no air."""
+    """Refuse a gust of zero velocity."""
     if gust.along == gust.across == gust.up == 0.0:
         problem = "moves no air: give along_m_per_s, across_m_per_s or up_m_per_s"
         raise InputError(file, "gust", problem)
@@ -105,13 +104,13 @@ class MovingAir(Wrapper):
 
 
 class DiscreteGust(Wrapper):
-    """A run's discrete gust, let go at its time; `file` is where it is described."""
+    """A run's discrete gust, started at its time; `file` is the file of its section."""
 
     def __init__(self, gust: Gust, file: object, frame_s: float) -> None:
         self._gust, self._file, self._frame_s = gust, file, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Describe the gust to JSBSim, and start it when its frame comes."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Set the gust in JSBSim, and return a hook that starts it in its frame."""
         gust, file = self._gust, self._file
         velocity = (gust.along / FOOT_m, gust.across / FOOT_m, -gust.up / FOOT_m)
         values = {
@@ -137,13 +136,13 @@ class DiscreteGust(Wrapper):
 
 
 class TurbulentAir(Wrapper):
-    """A run's turbulence, drawn from its seed; `file` is where it is described."""
+    """A run's turbulence, drawn from its seed; `file` is the file of its section."""
 
     def __init__(self, turbulence: Turbulence, file: object, seed: int) -> None:
         self._turbulence, self._file, self._seed = turbulence, file, seed
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Let the air be turbulent from now on; JSBSim does the rest."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Switch on JSBSim's turbulence."""
         values = {
             "atmosphere/randomseed": float(self._seed % 2**31),
             "atmosphere/turb-type": _MODELS[self._turbulence.model],

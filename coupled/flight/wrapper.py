@@ -1,9 +1,8 @@
-"""The one face of all that may be put around a plain aircraft.
+"""The interface of everything that may be added to a plain aircraft.
 
-An aircraft is loaded, trimmed and stepped by `airframe`. What else becomes of it (how it is
-loaded, what of its aerodynamics differs, the air, what fails) is a list of wrappers. Each may act
-at four moments: as the model's file is read, before the trim, there once JSBSim knows its weight,
-and before every frame after it.
+An aircraft is loaded, trimmed and stepped by `airframe`. All else (loading, changed aerodynamics,
+the air, failures) is a list of wrappers. Each may act at four moments: when the model's file is
+read, before the trim, there once JSBSim knows the weight, and before every frame.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ Hook = Callable[[], None]  # called before each frame
 
 
 class Aircraft(Protocol):
-    """What a wrapper may ask of an aircraft."""
+    """The interface of an aircraft for wrappers."""
 
     motion: Motion
     step: Step
 
     def extra(self) -> tuple[float, ...]:
-        """Return the further properties that were asked for."""
+        """Return the further properties that were requested."""
 
     def names(self) -> Iterable[str]:
         """Return the names of all of the model's properties."""
@@ -36,26 +35,26 @@ class Aircraft(Protocol):
         """Tell whether the model has a property."""
 
     def lever(self, name: str, file: object = None, key: str = "model") -> Lever:
-        """Return a property that may be set; a fault is that of a key in a file."""
+        """Return a property that may be set; faults name a key of a file."""
 
     def reader(self, name: str) -> Callable[[], float] | None:
-        """Return what reads a property, in JSBSim's unit; None where the model has none such."""
+        """Return a function that reads a property, in JSBSim's unit; None if it does not exist."""
 
     def fault(self, key: str, problem: str) -> InputError:
         """Return the fault of a key of the rig's `flight` section."""
 
 
 class Wrapper:
-    """Something put around an aircraft; by itself it does nothing."""
+    """An addition to an aircraft; this base class does nothing."""
 
     @property
     def scaled(self) -> tuple[Scaled, ...]:
-        """What it scales of the model's aerodynamics as they are loaded."""
+        """The parts of the model's aerodynamics that it scales at loading."""
         return ()
 
     @property
     def ballast(self) -> bool:
-        """Whether it needs a point mass beside those of the model (`modelfile.BALLAST`)."""
+        """Whether it needs a further point mass (`modelfile.BALLAST`)."""
         return False
 
     def load(self, aircraft: Aircraft) -> None:
@@ -64,8 +63,8 @@ class Wrapper:
     def weigh(self, aircraft: Aircraft) -> None:
         """Act on the aircraft once JSBSim knows its weight, before it is trimmed."""
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Act on the aircraft in trim; return what is to be done before each frame, if anything."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Act on the aircraft in trim; return a hook for each frame, if any."""
 
 
 def led_by(hooks: Sequence[Hook], step: Step) -> Step:

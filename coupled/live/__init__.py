@@ -1,5 +1,5 @@
-"""The real-time host: a flight as `coupled fly` flies it, paced, with what attaches to it.
+"""The real-time host: paced flights with a real or simulated loader, a hand, views and a page.
 
-The frame is the batch flight's own. What is live comes along as its companion: pacing, the loader
-at the other end of a wire, a hand on a stick or on the page, the views, and the page.
+The frame is that of a batch flight (`coupled fly`). All real-time functions are in the flight's
+companion (`host`): pacing, the loader on the network, a stick or the page as the hand, views.
 """

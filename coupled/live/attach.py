@@ -1,4 +1,4 @@
-"""From the words of the command line to what attaches: what is flown, a loader, a hand."""
+"""From the options of the command line to a live flight: run or rig, loader, hand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HANDS = ("pilot", "page", "stick")
 
 
 def needs(package: str, what: str) -> None:
-    """Raise InputError, which says how to get it, where a package of the extra lacks."""
+    """Raise InputError, with the command to install it, if a package of the extra is missing."""
     if importlib.util.find_spec(package) is None:
         problem = f"needs {package}, which is not installed: pip install 'coupled[live]'"
         raise InputError(what, "", problem)
@@ -30,7 +30,7 @@ def needs(package: str, what: str) -> None:
 def open_link(url: str, rig: Rig, lockstep: bool, deflection: bool) -> Link | None:
     """Return the loader at `url`, or None for the simulated one; raises InputError.
 
-    `deflection` says that a loader of the open protocol measures δ.
+    `deflection`: a loader of the open protocol measures δ.
     """
     if url == "sim":
         return None
@@ -43,10 +43,10 @@ def open_link(url: str, rig: Rig, lockstep: bool, deflection: bool) -> Link | No
 
 
 def run_live(run: str, case: str, duration_s: float | None, hand: str) -> Manoeuvre:
-    """Return the case of a run that is flown live, the first unless named.
+    """Return the case of a run that is flown live; by default the first.
 
-    `duration_s` is in place of the run's; `hand` is `pilot` for the run's own, or else every
-    control has a live hand. Raises InputError.
+    `duration_s` replaces the run's; `hand` is `pilot` for the run's own, otherwise every control
+    has a live hand. Raises InputError.
     """
     _check(duration_s, hand)
     cases: Mapping[str, Manoeuvre] = {each.label: each for each in read_run(run)}
@@ -61,10 +61,10 @@ def run_live(run: str, case: str, duration_s: float | None, hand: str) -> Manoeu
 
 
 def rig_live(rig: str, duration_s: float | None) -> Manoeuvre:
-    """Return a rig under a live hand on each control, to be flown until it is stopped.
+    """Return a rig with a live hand on each control, to be flown until it is stopped.
 
-    It ends after `duration_s`, two hours unless given. A bench has the q̄ of its schedule's
-    middle. Raises InputError.
+    It ends after `duration_s`, by default two hours. A bench has the middle q̄ of its schedule.
+    Raises InputError.
     """
     _check(duration_s, "page")
     loaded, bench = load_rig(rig), None

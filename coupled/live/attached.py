@@ -1,4 +1,4 @@
-"""A real loader attached: its answers watched, its orders limited, its forces faded in and out."""
+"""A real loader: its answers are checked, its orders limited, its forces faded in and out."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from typing import Any
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.live.link import FADING, OFF, RUN, Link, Measured, Order, Sample, WATCHDOG_s
 from coupled.live.safety import Fade, Limiter, Limits, Plausibility
 from coupled.record.channels import FADED, FRESH, LOST, REPEATED, channel
 from coupled.rig.placed import Placed
 
-ANSWER_s = 10.0  # how long the host waits for a loader's first answer
-GONE_s = 30.0  # and for one again, before the flight ends
-AT_REST = 0.25  # of the travel: within it a control rests, before a flight
+ANSWER_s = 10.0  # time limit of a loader's first answer
+GONE_s = 30.0  # time without an answer after which the flight ends
+AT_REST = 0.25  # of the travel, within which a control must rest before a flight
 GONE = f"the loader has not answered for {GONE_s:g} s"
 _IDLE = Order(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass
 class Losses:
-    """When a loader could not be used, each from when to when, s.
+    """The times in s at which a loader could not be used, each with start and end.
 
-    `spells` are without an answer, `stale_frames` counts the frames without a new sample, and
-    `implausible` are those in which what a control measured could not be true, and why.
+    `spells` are without an answer, `stale_frames` is the number of frames without a new sample,
+    and `implausible` are those with implausible measurements of a control, with the reason.
     """
 
     spells: list[list[float | None]] = field(default_factory=list)
@@ -38,18 +38,18 @@ class Losses:
 
 
 class Attached:
-    """The loader at the other end of `link`; `warn` hears what a pilot must know at once."""
+    """The loader on `link`; `warn` receives urgent messages for the pilot."""
 
     def __init__(
         self,
         link: Link,
         limits: Limits,
-        aboard: Aboard,
+        access: FlightAccess,
         paced: bool,
         warn: Callable[[str], None],
     ) -> None:
-        self._rig = rig = aboard.manoeuvre.rig
-        self.link, self._aboard, self._paced, self._warn = link, aboard, paced, warn
+        self._rig = rig = access.manoeuvre.rig
+        self.link, self._aboard, self._paced, self._warn = link, access, paced, warn
         self.frame_s = 1.0 / rig.frame_rate
         controls = list(rig.controls.values())
         self._limiters = [
@@ -59,26 +59,26 @@ class Attached:
         self._plausible = [Plausibility(c, self.frame_s, link.measures_force) for c in controls]
         self._faults: list[dict[str, Any] | None] = [None] * len(controls)
         self._fade = Fade(limits.fade_s, self.frame_s)
-        names, at = list(rig.controls), aboard.channels.index
+        names, at = list(rig.controls), access.channels.index
         self._force_at = [at(channel(name, "modifying_force")) for name in names]
         self._gradient_at = [at(channel(name, "gradient")) for name in names]
         self._deflection_at = [at(channel(name, "deflection")) for name in names]
         self._measured: tuple[Measured, ...] = (Measured(0.0, 0.0, 0.0),) * len(names)
         self._orders = (_IDLE,) * len(names)
         self._seen = 0.0
-        self._fresh = False  # the last look brought a new sample
-        self._measures = [False] * len(names)  # whether δ of each control came with it
+        self._fresh = False  # the last call of `listen` received a new sample
+        self._measures = [False] * len(names)  # whether it contained δ, by control
         self.time_s = math.nan  # of the last sample, by the loader's clock
         self.lost = False
         self.losses = Losses()
 
     @property
     def limited_frames(self) -> int:
-        """Return in how many frames the limits cut an order."""
+        """Return the number of frames in which the limits reduced an order."""
         return sum(limiter.limited for limiter in self._limiters)
 
-    def meet(self) -> None:
-        """Wait for the loader's first answer, and let its forces in, the aircraft in trim."""
+    def connect(self) -> None:
+        """Wait for the loader's first answer, and fade its forces in with the aircraft in trim."""
         begun = time.monotonic()
         while (sample := self.link.receive(0.02)) is None:
             self.link.send(self._orders, OFF)
@@ -102,17 +102,15 @@ class Attached:
             self._wait_frame()
             self.listen(0.0)
             if time.monotonic() - self._seen > ANSWER_s:
-                problem = "has stopped answering while its forces came in"
+                problem = "stopped answering while its forces were faded in"
                 raise InputError(self.link.name, "", problem)
 
     def _check_rest(self) -> None:
-        """Refuse to let forces into a control that stands far from its trim."""
+        """Raise InputError if a control is far from its trim before forces are faded in."""
         for (name, control), now in zip(self._rig.controls.items(), self._measured, strict=True):
             if abs(now.computed) > AT_REST * control.travel:
                 share = 100.0 * now.computed / control.travel
-                problem = (
-                    f"the {name} stands at {share:.0f} % of its travel; let it rest at neutral"
-                )
+                problem = f"the {name} is at {share:.0f} % of its travel; let it rest at neutral"
                 raise InputError(self.link.name, "", problem)
 
     def _wait_frame(self) -> None:
@@ -120,7 +118,7 @@ class Attached:
             time.sleep(self.frame_s)
 
     def listen(self, time_s: float) -> str:
-        """Take the loader's newest sample; return why the flight is to end, if it is."""
+        """Take the loader's newest sample; return why the flight must end, or an empty text."""
         sample = self.link.receive(0.0 if self._paced else WATCHDOG_s)
         now = time.monotonic()
         self._fresh = sample is not None
@@ -130,7 +128,7 @@ class Attached:
             if self.lost:
                 self.lost = False
                 self.losses.spells[-1][1] = time_s
-                self._warn("the loader answers again: its forces come back")
+                self._warn("the loader answers again: its forces return")
         else:
             self.losses.stale_frames += 1
             for plausible in self._plausible:
@@ -138,14 +136,14 @@ class Attached:
             if not self.lost and now - self._seen > WATCHDOG_s:
                 self.lost = True
                 self.losses.spells.append([time_s, None])
-                self._warn("the loader does not answer: its forces go, the surface is held")
+                self._warn("the loader does not answer: its forces fade out, the surface is held")
             if now - self._seen > GONE_s:
                 return GONE
         self._put(self._aboard.controls)
         return ""
 
     def _take(self, sample: Sample) -> None:
-        """Take what was measured; where δ was not, the last one stands."""
+        """Take a sample; δ that was not measured keeps its last value."""
         self._seen, self.time_s = time.monotonic(), sample.time_s
         self._measures = [math.isfinite(now.deflection) for now in sample.controls]
         self._measured = tuple(
@@ -156,10 +154,10 @@ class Attached:
         )
 
     def _judge(self, sample: Sample, time_s: float) -> None:
-        """Fade the forces while what a control measures cannot be true, and say so once."""
+        """Find implausible measurements, which fade the forces, and warn once of each."""
         for i, (name, now) in enumerate(zip(self._rig.controls, sample.controls, strict=True)):
             known = now if self.link.measures_deflection else now._replace(deflection=math.nan)
-            before, found = self._faults[i], self._plausible[i].look(known)
+            before, found = self._faults[i], self._plausible[i].update(known)
             if found == ("" if before is None else before["why"]):
                 continue
             if before is not None:
@@ -168,31 +166,31 @@ class Attached:
                 spell = {"control": str(name), "why": found, "from_s": time_s, "to_s": None}
                 self._faults[i] = spell
                 self.losses.implausible.append(spell)
-                self._warn(f"all forces go: the {name} cannot be trusted, since {found}")
+                self._warn(f"all forces fade out: implausible measurement of the {name}: {found}")
             else:
                 self._faults[i] = None
-                self._warn(f"what the {name} measures agrees again: the forces come back")
+                self._warn(f"the measurements of the {name} are plausible again: the forces return")
 
     def measured_now(self, i: int) -> bool:
-        """Tell whether the last look brought a new sample of control i, with its δ."""
+        """Tell whether the last call of `listen` received a new sample of control i, with δ."""
         return self._fresh and self._measures[i]
 
     def validity(self) -> int:
-        """Return how far the frame's row can be used, as `coupled.record.channels` lists it."""
+        """Return the validity of the frame's row (`coupled.record.channels`)."""
         if not self._fresh:
             return LOST if self.lost else REPEATED
         held = self._fade.share < 1.0 or any(limiter.cut for limiter in self._limiters)
         return FADED if held else FRESH
 
     def _put(self, controls: Any) -> None:
-        """Give the kernels what was measured; a loader that is lost stays where it was."""
+        """Write the measurements to the kernels' state; without a loader they stay unchanged."""
         state = controls["state"]
         for i, measured in enumerate(self._measured):
             state["hand"]["force"][i] = measured.force
             state["loader"]["computed"][i] = measured.computed
 
     def order(self, controls: Any, row: Any) -> None:
-        """Send what a frame asks of the loader; the row gets what was sent, and δ as measured."""
+        """Send the orders of a frame; write the orders sent and the measured δ to the row."""
         share, orders = self._fade.move(not self.lost and not any(self._faults)), []
         for i, limiter in enumerate(self._limiters):
             m = controls["state"]["modification"][i]
@@ -213,8 +211,8 @@ class Attached:
         self._orders = tuple(orders)
         self.link.send(self._orders, RUN if share == 1.0 else FADING if share > 0.0 else OFF)
 
-    def farewell(self) -> None:
-        """Fade the loader's forces out, however the flight ended, and say that they are off."""
+    def shut_down(self) -> None:
+        """Fade the loader's forces out, send that they are off, and close the link."""
         asked = self._orders
         while self._fade.share > 0.0:
             self._wait_frame()

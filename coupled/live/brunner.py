@@ -1,4 +1,4 @@
-"""The address of a Brunner loader: `cls2sim://HOST:PORT?WORD=VALUE&…`, checked word by word."""
+"""The address of a Brunner loader, `cls2sim://HOST:PORT?WORD=VALUE&…`, parsed and checked."""
 
 from __future__ import annotations
 

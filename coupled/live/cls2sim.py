@@ -16,8 +16,8 @@ Sources, each cited where it is used:
 
 No source that we have gives: the unit of a force, in either protocol; which way an axis counts;
 what a scale factor of 1 is; the rudder's bit in v2; what CLS2Sim does when packets stop; how the
-answer for several axes is laid out; v1's packets. What of it is needed has to be measured and given
-(`docs/live.md`); without it the loader is refused, and nothing is guessed.
+answer for several axes is laid out; v1's packets. What is needed of these has to be measured and
+given (`docs/live.md`); otherwise the loader is refused.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ MOST_COUNTS = 2**31 - 1
 
 
 class _Cls2Sim:
-    """What both protocols have in common: one set of questions is out at a time."""
+    """The common part of both protocols: requests are answered before the next ones are sent."""
 
     measures_force = False
     measures_deflection = False
-    round_trips: RoundTrips | None = None  # no source gives a number that an answer repeats
+    round_trips: RoundTrips | None = None  # an answer does not repeat a number of its request
 
     def __init__(self, name: str, wire: Transport, rig: Rig, given: Given) -> None:
         self.name, self._wire, self._given = name, wire, given
@@ -58,10 +58,10 @@ class _Cls2Sim:
         self._controls = [str(control) for control in rig.controls]
         self._travels = [control.travel for control in rig.controls.values()]
         self._reaches = reaches(rig)
-        self._asked = -math.inf  # when the host last asked, s
+        self._asked = -math.inf  # time of the last request, s
 
     def receive(self, wait_s: float) -> Sample | None:
-        """Return the newest sample since the last call, waiting for one so long at most."""
+        """Return the newest sample since the last call; wait for it at most so long."""
         until = time.monotonic() + wait_s
         while True:
             found = self._drain()
@@ -74,7 +74,7 @@ class _Cls2Sim:
         raise NotImplementedError
 
     def _sign(self, i: int) -> float:
-        """Return −1 for a control whose axis counts the other way, positions and forces alike."""
+        """Return −1 for a control with reversed axis (positions and forces), else 1."""
         return -1.0 if self._controls[i] in self._given.turn else 1.0
 
     def _place(self, i: int, share: float) -> float:
@@ -91,11 +91,11 @@ class _Cls2Sim:
         return Sample(tuple(measured), came_s if math.isfinite(came_s) else self._asked)
 
     def own_load(self, i: int, computed: float) -> float:
-        """Return the load that the host makes for the loader, N."""
+        """Return the load that the host computes for the loader, N."""
         raise NotImplementedError
 
     def ordered_gradient(self, i: int) -> float:
-        """Return 0: what is ordered of the loader's spring is in its load."""
+        """Return 0: the order for the loader's spring is included in its load."""
         return 0.0
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
@@ -108,9 +108,9 @@ class _Cls2Sim:
 
 
 class External(_Cls2Sim):
-    """CLS2Sim's external (low level) control: the host makes the whole load, 0xAF [2].
+    """CLS2Sim's external (low level) control: the host computes the whole load, 0xAF [2].
 
-    No force is measured: F is what the host orders, which is the hand's at rest.
+    No force is measured: F is the order, which equals the hand's force at rest.
     """
 
     def __init__(self, name: str, wire: Transport, rig: Rig, given: Given) -> None:
@@ -139,7 +139,7 @@ class External(_Cls2Sim):
         return found
 
     def own_load(self, i: int, computed: float) -> float:
-        """Return what the loader does not make itself: F_L of eq. (8), and damping, N."""
+        """Return the host's part of the load, F_L of eq. (8) and damping, N."""
         loader = self._loaders[i]
         rate, self._last[i] = (computed - self._last[i]) / self._frame_s, computed
         sign = math.copysign(1.0, computed) if computed != 0.0 else 0.0
@@ -147,7 +147,7 @@ class External(_Cls2Sim):
         return elastic + loader.breakout * sign + loader.damping * rate
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Send the load of each axis: it pushes back, so against the deflection."""
+        """Send the load of each axis, which acts against the deflection."""
         counts = [0, 0, 0, 0]
         for i, (name, order) in enumerate(zip(self._controls, orders, strict=True)):
             wanted = -self._sign(i) * order.force * self._given.counts_per_N
@@ -166,7 +166,7 @@ class Version2(_Cls2Sim):
         super().__init__(name, wire, rig, given)
         self._basic = [control.assumed_basic_gradient for control in rig.controls.values()]
         self._bytes = b""
-        self._due: deque[tuple[str, int]] = deque()  # what is asked for: kind, control
+        self._due: deque[tuple[str, int]] = deque()  # pending requests: kind, control
         self._read = [[0.0, 0.0] for _ in self._controls]
         self._scales = [0] * len(self._controls)
         for i in range(len(self._controls)):
@@ -213,10 +213,10 @@ class Version2(_Cls2Sim):
         return Measured(force, self._place(i, share) if abs(share) <= 1.05 else math.nan)
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Ask for force and position, and set the scale where it has changed.
+        """Request force and position, and set the scale if it has changed.
 
-        Answers do not say what they answer: they come in the order of the questions, however late.
-        So nothing more is asked for while an answer is due.
+        Answers do not identify their request, but come in the order of the requests. So no more
+        requests are sent while an answer is pending.
         """
         if self._due:
             return

@@ -1,7 +1,7 @@
 """A view in FlightGear: its native FDM packets, version 24, 408 bytes in network order.
 
 The layout is FlightGear's own, `src/Network/net_fdm.hxx` with FG_NET_FDM_VERSION = 24; the units
-are those of its fields. What this host does not know of (engines, tanks) is sent as none of them.
+are those of its fields. Engines, tanks and wheels are sent as zero in number.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def pack(p: Picture, unix_s: int, visibility_m: float = 20000.0) -> bytes:
 
 
 def start_line(port: int, rate_Hz: float = RATE_Hz) -> str:
-    """Return the line that starts FlightGear as a view."""
+    """Return the command that starts FlightGear as a view."""
     return (
         f"fgfs --fdm=null --native-fdm=socket,in,{rate_Hz:g},,{port},udp --timeofday=noon"
         " --disable-real-weather-fetch --disable-terrasync"

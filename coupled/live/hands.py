@@ -1,8 +1,8 @@
-"""The hand of one who flies live: where a stick, or the mouse on the page, wants the grip.
+"""The hand of a live flight: a stick, or the mouse on the page, gives the grip's position.
 
-A stick without force says a place. The rig's hand takes the grip there as a clamp does, by an
-impedance that inverts the rig's own mass, damping and gradient, so that the force is what the
-loader asks for that place: what a pilot would have to hold. A real loader has a real hand.
+A stick without force feedback gives a position only. The simulated hand moves the grip there by an
+impedance, like a clamp, computed from the rig's own mass, damping and gradient. The force is then
+what a pilot would need to hold that position. With a real loader the hand is real.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from coupled.rig.packing import Hand
 from coupled.rig.rig import Rig
 
 BANDWIDTH_rad_per_s = 10.0  # of the hand that follows a stick
-SMOOTH_s = 0.04  # a stick's reading is led to the hand so slowly: it comes in steps
+SMOOTH_s = 0.04  # time constant of the filter on a stick's reading, which comes in steps
 
 
 class Wishes(Protocol):
-    """Where a hand wants the controls: a stick, or the page."""
+    """A source of hand positions: a stick or the page."""
 
     name: str
 
     def read(self, control: str) -> float:
-        """Return the place wanted now, −1 to 1 of the travel, a pull positive."""
+        """Return the position of a control, −1 to 1 of the travel, a pull positive."""
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
 
 
 class LiveHand(Pilot):
-    """A hand whose place comes while flying; on a real loader, none of the simulation's."""
+    """A hand with positions given in flight; with a real loader, no simulated hand at all."""
 
     kind: Literal["live"] = "live"
     real: bool = False
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
-        """Return the impedance of the hand; its place is written frame by frame."""
+        """Return the impedance of the hand; its position is written frame by frame."""
         if self.real:
             return Action()
         w, loader = BANDWIDTH_rad_per_s, rig.controls[control].loader
@@ -47,7 +47,7 @@ class LiveHand(Pilot):
 
 
 class Follower:
-    """Leads one control's hand to the places wanted: smooth, within the travel in d."""
+    """Filters the positions of one control's hand, within the travel in d."""
 
     def __init__(self, travel: float, frame_s: float) -> None:
         self._travel = travel
@@ -55,7 +55,7 @@ class Follower:
         self.at = 0.0
 
     def move(self, wanted: float) -> float:
-        """Return where the hand is after a frame, d; `wanted` is a share of the travel."""
+        """Return the hand's position after a frame, d; `wanted` is a share of the travel."""
         if math.isfinite(wanted):
             place = self._travel * min(max(wanted, -1.0), 1.0)
             self.at += self._gain * (place - self.at)

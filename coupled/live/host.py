@@ -1,8 +1,8 @@
-"""The host computer of a live flight: what goes along with the frames of a batch flight.
+"""The companion of a live flight, which acts before and after each frame of a batch flight.
 
-Before frame k it waits for the frame's deadline, makes the changes that were asked for, and takes
-what the loader or the hand says. The batch flight's own kernel then does the host's part of the
-frame. After it the orders go to the loader, and what was flown to estimate, views and page.
+Before frame k it waits for the frame's deadline, executes requests of the user, and takes the
+measurement of the loader or the position of the hand. The batch flight's kernel then computes the
+frame. After it, the companion sends orders to the loader, and data to estimators, views and page.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.live.attached import Attached
 from coupled.live.hands import Follower, Wishes
 from coupled.live.link import Link
@@ -30,15 +30,15 @@ from coupled.record.record import Record
 from coupled.rig.serving import check_led, lead, led, services_of
 
 STOPPED = "stopped"
-SAVE_EVERY_s = 5.0  # to write a record takes a part of the processor that frames need, too
+SAVE_EVERY_s = 5.0  # writing a record takes processor time from the frames
 Motion = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Word:
-    """A word of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
+class Request:
+    """A request of the user: `stop`, `mark`, `save`, `set` of a switch or `lead` of a service.
 
-    `text` names the switch or the service, of a `control`; it is also a mark's text.
+    `text` names the switch or the service of a `control`, or is the text of a mark.
     """
 
     what: str
@@ -48,16 +48,16 @@ class Word:
 
 
 class Watcher(Protocol):
-    """What looks on, a view or the page: it neither waits nor raises."""
+    """An observer of the flight, such as a view or the page: it neither waits nor raises."""
 
-    def board(self, host: Host) -> None:
-        """Begin."""
+    def begin(self, host: Host) -> None:
+        """Start."""
 
-    def look(self, host: Host, k: int) -> None:
-        """Take what frame k was."""
+    def observe(self, host: Host, k: int) -> None:
+        """Observe frame k."""
 
-    def words(self) -> Sequence[Word]:
-        """Return what its user asked for since the last call."""
+    def requests(self) -> Sequence[Request]:
+        """Return the user's requests since the last call."""
 
     def close(self) -> None:
         """End."""
@@ -65,12 +65,12 @@ class Watcher(Protocol):
 
 @dataclass
 class Plan:
-    """What a live flight is flown with; without anything it is a batch flight in real time.
+    """The equipment of a live flight; by default a batch flight in real time.
 
-    `paced` is real time, else lock-step: as fast as the loader answers. `link` is a real loader;
-    without it `wishes` moves the hands on the simulated one. `adapt` gives K of service to the
-    compensation. `warn` hears what a pilot must know at once; `save` takes a record so far, in a
-    thread, and may raise InputError.
+    `paced` is real time; otherwise lock-step: as fast as the loader answers. `link` is a real
+    loader; without it `wishes` moves the hands on the simulated one. `adapt` sets the
+    compensation's K̂ to the estimated K. `warn` receives urgent messages for the pilot. `save`
+    writes a record so far, in a thread, and may raise InputError.
     """
 
     paced: bool = True
@@ -84,13 +84,13 @@ class Plan:
 
 
 @dataclass
-class Happened:
-    """What was done and found on a live flight; times in s."""
+class FlightEvents:
+    """The events of a live flight; times in s."""
 
     marks: list[tuple[float, str]] = field(default_factory=list)
     led: list[tuple[float, str, str, float]] = field(default_factory=list)  # control, service, to
-    alarms: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K
-    adapted: list[tuple[float, str, float]] = field(default_factory=list)  # when, whose, K̂
+    alarms: list[tuple[float, str, float]] = field(default_factory=list)  # time, control, K
+    adapted: list[tuple[float, str, float]] = field(default_factory=list)  # time, control, K̂
 
 
 class Host:
@@ -100,26 +100,26 @@ class Host:
         self.plan = plan
         self.elsewhere = plan.link is not None
         self.leads = plan.link is None and bool(plan.watchers)
-        self.happened = Happened()
+        self.events = FlightEvents()
         self.attached: Attached | None = None
         self.time_s = 0.0
-        self.first_place = False  # whether the system granted real-time priority
-        self.aboard: Aboard | None = None
+        self.real_time_priority = False  # whether the system granted real-time priority
+        self.access: FlightAccess | None = None
         self._saving: threading.Thread | None = None
         self._next_save_s = 0.0
 
-    def board(self, aboard: Aboard) -> None:
-        """Begin, with the aircraft in trim: meet the loader and let its forces in."""
-        plan, rig = self.plan, aboard.manoeuvre.rig
-        self.aboard, self.frame_s = aboard, 1.0 / rig.frame_rate
+    def begin(self, access: FlightAccess) -> None:
+        """Start with the aircraft in trim: connect to the loader and fade its forces in."""
+        plan, rig = self.plan, access.manoeuvre.rig
+        self.access, self.frame_s = access, 1.0 / rig.frame_rate
         self.names = [str(name) for name in rig.controls]
         self.substeps, controls = rig.substeps, list(rig.controls.values())
-        self.switches = Switches(rig, aboard.controls, aboard.hands, self.elsewhere)
-        self.pacer = Pacer(self.frame_s, len(aboard.data))
-        self.rows = Rows(len(aboard.data), plan.link is not None, plan.paced)
+        self.switches = Switches(rig, access.controls, access.hands, self.elsewhere)
+        self.pacer = Pacer(self.frame_s, len(access.data))
+        self.rows = Rows(len(access.data), plan.link is not None, plan.paced)
         self._followers = [Follower(control.travel, self.frame_s) for control in controls]
         self._columns = [
-            [aboard.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
+            [access.channels.index(channel(name, q)) for q in ("force", "computed", "deflection")]
             for name in self.names
         ]
         measured = plan.link is None or plan.link.measures_deflection
@@ -132,18 +132,18 @@ class Host:
             if plan.adapt
         }
         if plan.link is not None:
-            self.attached = Attached(plan.link, plan.limits, aboard, plan.paced, plan.warn)
-            self.attached.meet()
+            self.attached = Attached(plan.link, plan.limits, access, plan.paced, plan.warn)
+            self.attached.connect()
         for watcher in plan.watchers:
-            watcher.board(self)
+            watcher.begin(self)
 
     def before(self, k: int, motion: Motion) -> str:
-        """Wait for the frame, and take what user, loader and hand say."""
+        """Wait for the frame's deadline, and take requests, measurements and hand positions."""
         self.time_s = k * self.frame_s
         if self.plan.paced:
             self.pacer.wait()
         for watcher in self.plan.watchers:
-            for word in watcher.words():
+            for word in watcher.requests():
                 if word.what == "stop":
                     return STOPPED
                 self._obey(word)
@@ -153,11 +153,11 @@ class Host:
             self._lead(self.plan.wishes, k)
         return ""
 
-    def _obey(self, word: Word) -> None:
+    def _obey(self, word: Request) -> None:
         if word.what == "save":
             self._save()
         elif word.what == "mark":
-            self.happened.marks.append((self.time_s, word.text[:200]))
+            self.events.marks.append((self.time_s, word.text[:200]))
         elif word.what == "lead":
             self._lead_service(word)
         elif word.what == "set":
@@ -166,35 +166,35 @@ class Host:
             except InputError as error:
                 self.plan.warn(str(error))
 
-    def _lead_service(self, word: Word) -> None:
-        """Lead a service of a simulated loader, as an event of a run does."""
-        assert self.aboard is not None
+    def _lead_service(self, word: Request) -> None:
+        """Set a service of a simulated loader, as an event of a run does."""
+        assert self.access is not None
         control, service, value = word.control, word.text, word.value
         try:
             if self.elsewhere:
-                raise InputError("service", service, "is done by the real loader itself; ask it")
+                raise InputError("service", service, "belongs to the real loader; set it there")
             check_led(self.switches.rig, control, service, value, "service", service)
         except InputError as error:
             self.plan.warn(str(error))
             return
-        lead(self.aboard.controls, self.names, control, service, value)
-        self.happened.led.append((self.time_s, control, service, value))
+        lead(self.access.controls, self.names, control, service, value)
+        self.events.led.append((self.time_s, control, service, value))
 
     def services(self) -> dict[str, dict[str, float]]:
-        """Return what may be led of each simulated control, and how it stands."""
-        if self.elsewhere or self.aboard is None:
+        """Return the services of each simulated control that can be set, and their values."""
+        if self.elsewhere or self.access is None:
             return {}
         found: dict[str, dict[str, float]] = {}
         for name in self.names:
             for service in services_of(name):
                 with contextlib.suppress(InputError):
                     check_led(self.switches.rig, name, service, 0.0, "service", service)
-                    stands = led(self.aboard.controls, self.names, name, service)
+                    stands = led(self.access.controls, self.names, name, service)
                     found.setdefault(name, {})[service] = stands
         return found
 
     def _save(self) -> None:
-        """Let the record so far be written, beside the flight; one at a time."""
+        """Write the record so far in a thread; one at a time."""
         rows, save = round(self.time_s / self.frame_s), self.plan.save
         busy = self._saving is not None and self._saving.is_alive()
         if save is None or rows < 2 or busy or self.time_s < self._next_save_s:
@@ -211,14 +211,14 @@ class Host:
         self._saving.start()
 
     def so_far(self, first: int, last: int) -> Record:
-        """Return the record from frame `first` to before `last` of the flight that goes on."""
-        assert self.aboard is not None
-        return self.kept(self.aboard.so_far(first, last), True, first)
+        """Return the record from frame `first` to before `last` of the current flight."""
+        assert self.access is not None
+        return self.kept(self.access.so_far(first, last), True, first)
 
     def kept(self, record: Record, stopped: bool, first: int = 0) -> Record:
-        """Return a record, which begins with frame `first`, with what is known of the live flight.
+        """Return a record that begins with frame `first`, with the data of the live flight.
 
-        A flight that was `stopped` by its user has not ended early.
+        A flight `stopped` by its user does not count as ended early.
         """
         manifest: dict[str, Any] = {**record.manifest, "live": self.as_dict()}
         manifest["live"]["stopped"] = stopped
@@ -230,21 +230,21 @@ class Host:
         return self.rows.beside(kept, first)
 
     def _lead(self, wishes: Wishes, k: int) -> None:
-        """Write the hands' way over the frame to come."""
-        assert self.aboard is not None
+        """Write the hands' positions over the next frame."""
+        assert self.access is not None
         first, last = k * self.substeps, (k + 1) * self.substeps
         for i, (name, follower) in enumerate(zip(self.names, self._followers, strict=True)):
             before = follower.at
             way = np.linspace(before, follower.move(wishes.read(name)), last - first + 1)
-            self.aboard.script[i, 1, first + 1 : last + 1] = way[1:]
+            self.access.script[i, 1, first + 1 : last + 1] = way[1:]
 
     def after(self, k: int, commands: tuple[float, float, float]) -> None:
-        """Send the orders; take the frame into account."""
-        assert self.aboard is not None
-        row, attached = self.aboard.data[k], self.attached
+        """Send the orders, and pass the frame to estimators and watchers."""
+        assert self.access is not None
+        row, attached = self.access.data[k], self.attached
         validity = FRESH
         if attached is not None:
-            attached.order(self.aboard.controls, row)
+            attached.order(self.access.controls, row)
             validity = attached.validity()
             self.rows.loader_time_s[k] = attached.time_s
         switched = validity == FRESH and self.switches.differs
@@ -254,30 +254,30 @@ class Host:
                 new = attached is None or attached.measured_now(i)
                 self._serve(name, new, *(float(row[column]) for column in at))
         for watcher in self.plan.watchers:
-            watcher.look(self, k)
+            watcher.observe(self, k)
 
     def _serve(
         self, name: str, new: bool, force: float, computed: float, deflection: float
     ) -> None:
         estimator = self.service[name]
         alarmed = estimator.now.alarm
-        found = estimator.look(force, computed, deflection, fresh=new)
+        found = estimator.update(force, computed, deflection, fresh=new)
         if found.alarm and not alarmed and found.bend is not None:
-            self.happened.alarms.append((self.time_s, name, found.bend))
-            self.plan.warn(f"K of the {name} is no longer the calibrated one")
+            self.events.alarms.append((self.time_s, name, found.bend))
+            self.plan.warn(f"K of the {name} differs from the calibrated one")
         if name in self._adaptations:
-            assumed = self._adaptations[name].look(self.time_s, found)
+            assumed = self._adaptations[name].update(self.time_s, found)
             if assumed is not None:
                 self.switches.put(name, "assumed_bend", assumed)
-                self.happened.adapted.append((self.time_s, name, assumed))
+                self.events.adapted.append((self.time_s, name, assumed))
 
-    def farewell(self) -> None:
-        """Fade the loader's forces out, and end what looks on; called however a flight ended."""
+    def shut_down(self) -> None:
+        """Fade the loader's forces out, and close all devices; called at every end of a flight."""
         try:
             if self._saving is not None:
                 self._saving.join()
             if self.attached is not None:
-                self.attached.farewell()
+                self.attached.shut_down()
             elif self.plan.link is not None:
                 self.plan.link.close()
         finally:
@@ -287,17 +287,17 @@ class Host:
                 self.plan.wishes.close()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what the manifest holds of the live flight beside a batch flight's."""
+        """Return the section `live` of the manifest."""
         link, attached = self.plan.link, self.attached
         found: dict[str, Any] = {
             "paced": self.plan.paced,
-            "real_time_priority": self.first_place,
+            "real_time_priority": self.real_time_priority,
             "loader": "sim" if link is None else link.name,
             "lateness": self.pacer.result().as_dict() if self.plan.paced else None,
             "switched": [asdict(change) for change in self.switches.changes],
             "bend_in_service": {n: e.now.as_dict() for n, e in self.service.items()},
             "adapt": self.plan.adapt,
-            **{what: list(events) for what, events in vars(self.happened).items()},
+            **{what: list(events) for what, events in vars(self.events).items()},
         }
         if link is not None and attached is not None:
             found |= {

@@ -9,17 +9,17 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from coupled.live.host import Word
+from coupled.live.host import Request
 
 if TYPE_CHECKING:
     from coupled.live.host import Host
 
-EVERY = 12  # frames between two looks
+EVERY = 12  # frames between two reads
 STOP = b"qQ\x1b"
 
 
 class Keys:
-    """Reads single keys where the standard input is a terminal that allows it."""
+    """Reads single keys, if the standard input is a terminal that allows it."""
 
     def __init__(self) -> None:
         self._before: Any = None
@@ -31,16 +31,16 @@ class Keys:
             self._before = self._termios.tcgetattr(sys.stdin)
             importlib.import_module("tty").setcbreak(sys.stdin)
         except (ImportError, OSError):
-            return  # another kind of terminal: Ctrl-C remains
+            return  # no such terminal: Ctrl-C still works
 
-    def board(self, host: Host) -> None:
-        """Begin."""
+    def begin(self, host: Host) -> None:
+        """Start."""
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing at a frame."""
 
-    def words(self) -> Sequence[Word]:
-        """Return what was typed since the last look."""
+    def requests(self) -> Sequence[Request]:
+        """Return the requests typed since the last call."""
         self._count += 1
         if self._before is None or self._count % EVERY:
             return ()
@@ -48,11 +48,11 @@ class Keys:
             return ()
         typed = os.read(sys.stdin.fileno(), 64)
         if not typed or any(key in STOP for key in typed):
-            return (Word("stop"),)
-        return [Word("mark") for key in typed if key in b"mM"]
+            return (Request("stop"),)
+        return [Request("mark") for key in typed if key in b"mM"]
 
     def close(self) -> None:
-        """Give the terminal back as it was."""
+        """Restore the terminal's settings."""
         if self._before is not None:
             self._termios.tcsetattr(sys.stdin, self._termios.TCSADRAIN, self._before)
             self._before = None

@@ -1,4 +1,4 @@
-"""What passes between host and loader, whatever the wire: what is measured, what is ordered."""
+"""The interface between host and loader, for any protocol: measurements and orders."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import NamedTuple, Protocol
 from coupled.errors import InputError
 from coupled.live.roundtrip import RoundTrips
 
-WATCHDOG_s = 0.1  # without a valid packet for so long, the loader is lost
+WATCHDOG_s = 0.1  # time without a valid packet after which the loader counts as lost
 
 
 class Measured(NamedTuple):
-    """One control at the loader: F in N, δc and δ in d; δ is NaN where it is not measured."""
+    """Measurements of one control: F in N, δc and δ in d; δ is NaN if not measured."""
 
     force: float
     computed: float
@@ -22,10 +22,10 @@ class Measured(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What a loader measured at one time, a control each, in the rig's order.
+    """The measurements of a loader at one time, by control in the rig's order.
 
-    `time_s` is that time by the loader's own clock. On a wire that does not give it, it is when the
-    host's system took the answer in, or where the system does not tell, when the host asked.
+    `time_s` is by the loader's own clock. If the protocol does not give it, it is the time of
+    arrival by the system's stamp, or without stamps the time of the host's request.
     """
 
     controls: tuple[Measured, ...]
@@ -33,10 +33,10 @@ class Sample(NamedTuple):
 
 
 class Order(NamedTuple):
-    """What the host asks of one control over the frame to come; d is m, or rad for a wheel.
+    """The orders for one control over the next frame; d is m, or rad for a wheel.
 
-    F_mod(δc) = ΔG·δc up to the break and with the second slope beyond it, and `breakout` in the
-    direction of δc; `force` is that at the δc that the host has, for a loader without multiplier.
+    F_mod(δc) = ΔG·δc up to the break and with the second slope beyond it, plus `breakout` in the
+    direction of δc; `force` is F_mod at the host's δc, for a loader without multiplier.
     """
 
     gradient: float  # ΔG, N/d
@@ -45,18 +45,18 @@ class Order(NamedTuple):
     breakout: float  # F_extra, N
     force: float  # F_mod at t_k, N
     total: float  # G_T, N/d
-    trim: float  # the δc at which the loader is to rest, d
+    trim: float  # the δc at which the loader rests, d
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What a real control cannot exceed, so that a packet beyond it is a fault of the wire."""
+    """Bounds of a real control; a packet beyond them is a fault of the connection."""
 
     force_N: float
     deflection: float  # d
 
     def holds(self, measured: Measured) -> bool:
-        """Tell whether a control's measurements are numbers within reach."""
+        """Tell whether a control's measurements are finite and within the bounds."""
         force, computed, deflection = measured
         if not (abs(force) <= self.force_N and abs(computed) <= self.deflection):
             return False  # neither is NaN
@@ -64,11 +64,11 @@ class Reach:
 
 
 class Link(Protocol):
-    """A loader at the other end of a wire.
+    """A connection to a loader.
 
-    `dropped` counts the packets that were not used, by reason; `measures_force` and
-    `measures_deflection` say whether F and δ are the loader's own; `round_trips` is None on a
-    wire whose answers do not say which order they answer.
+    `dropped` counts the packets that were not used, by reason. `measures_force` and
+    `measures_deflection`: the loader measures F and δ. `round_trips` is None if answers do not
+    identify the order that they answer.
     """
 
     name: str
@@ -78,28 +78,28 @@ class Link(Protocol):
 
     @property
     def round_trips(self) -> RoundTrips | None:
-        """How long orders take to be answered."""
+        """The times from orders to their answers."""
 
     def receive(self, wait_s: float) -> Sample | None:
-        """Return the newest valid sample since the last call, waiting for one so long at most."""
+        """Return the newest valid sample since the last call; wait for it at most so long."""
 
     def own_load(self, i: int, computed: float) -> float:
-        """Return the load at δc in d that control i's loader leaves to the host, N.
+        """Return the host's part of the load of control i at δc in d, N.
 
-        0 for a loader with a spring of its own. It is asked once a frame.
+        0 for a loader with its own spring. It is called once a frame.
         """
 
     def ordered_gradient(self, i: int) -> float:
-        """Return the gradient that the host orders of control i beside ΔG, N/d.
+        """Return the gradient that the host orders of control i in addition to ΔG, N/d.
 
         0 for a loader whose own spring the host does not order.
         """
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Send the orders of a frame; `mode` says whether forces are on, fading or off."""
+        """Send the orders of a frame; `mode` is RUN, FADING or OFF."""
 
     def close(self) -> None:
-        """Let go of the wire."""
+        """Close the connection."""
 
 
 RUN, FADING, OFF = 1, 2, 3  # modes
@@ -114,7 +114,7 @@ def split_address(url: str) -> tuple[str, str, int]:
 
 
 def split_place(place: str, option: str) -> tuple[str, int]:
-    """Return host and port of `host:port`, as an option gives it; raises InputError."""
+    """Return host and port of an option's `host:port`; raises InputError."""
     host, colon, port = place.rpartition(":")
     host = host.strip("[]")  # of an IPv6 address
     if not colon or not host:

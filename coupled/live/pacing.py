@@ -1,12 +1,12 @@
-"""Real time: frames at absolute deadlines, and by how much each was late.
+"""Real time: frames at absolute deadlines, and their lateness.
 
 Frame k is due at t₀ + k·T. A late frame is flown at once, and the next keeps its own deadline, so
-lateness does not add up. A frame that is late by more than a whole frame moves t₀ by the frames
-that were missed: they are counted, and not made up for by frames in a rush, which a pilot would
-feel as a burst of speed.
+lateness does not accumulate. A frame that is late by more than a whole frame moves t₀ by the
+missed frames. They are counted and not made up for, since a burst of frames would be a burst of
+speed for the pilot.
 
-Most late frames are late because of other work on the machine. Under Linux a thread of the class
-SCHED_FIFO runs before all ordinary ones; root may ask for it, and whoever has a limit `rtprio`.
+Other work of the machine delays frames. Under Linux a thread of the class SCHED_FIFO runs before
+all ordinary ones; root and users with a limit `rtprio` may request it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 
 Clock = Callable[[], float]  # s, from any origin
 Sleep = Callable[[float], object]
-# Edges of the histogram, ms; what is later than the last is counted with `over`.
+# Edges of the histogram, ms; the last bin has no upper edge.
 EDGES_ms = (0.0, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 PRIORITY = 40  # of 1 to 99: before all ordinary work, after the kernel's own interrupts at 50
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late the frames of a flight began, and how long their work took.
+    """The lateness of a flight's frames, and their computing times.
 
     `late_ms` and `work_ms` have shape (frames,); `missed` counts the deadlines that passed
     without a frame; `frame_ms` is the time between two deadlines.
@@ -44,7 +44,7 @@ class Lateness:
     frame_ms: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures for manifest and page; None where no frame was paced."""
+        """Return the figures for manifest and page; None if no frame was paced."""
         late, edges = self.late_ms, np.array([*EDGES_ms, math.inf])
         counts = np.histogram(late, edges)[0].tolist()
         return {
@@ -78,7 +78,7 @@ def _percentile(values: NDArray[np.float32], share: float) -> float | None:
 
 
 class Pacer:
-    """Waits for each frame's deadline; `frames` is how many there can be."""
+    """Waits for each frame's deadline; `frames` is their largest number."""
 
     def __init__(
         self,
@@ -124,17 +124,17 @@ class Pacer:
         return Lateness(late, work, self.missed, 1e3 * self._frame_s).as_dict()
 
     def result(self) -> Lateness:
-        """Return how late the frames were so far."""
+        """Return the lateness of the frames so far."""
         done = self._frames
-        work = self._work[: max(done - 1, 0)]  # the last frame's has no end
+        work = self._work[: max(done - 1, 0)]  # the last frame's is not complete
         return Lateness(self._late[:done], work, self.missed, 1e3 * self._frame_s)
 
 
 @contextmanager
-def first_place(wanted: bool = True) -> Iterator[bool]:
-    """Give this thread real-time priority within, and tell whether the system granted it.
+def real_time_priority(wanted: bool = True) -> Iterator[bool]:
+    """Give this thread real-time priority in the context; yield whether the system granted it.
 
-    Threads that it starts meanwhile, as the page's, run as ordinary ones.
+    Threads started in the context, such as the page's, run with ordinary priority.
     """
     if sys.platform != "linux" or not wanted:
         yield False

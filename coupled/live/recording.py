@@ -1,8 +1,8 @@
-"""The record on disk while a flight goes on: rows are appended every second.
+"""The record on disk during a flight: rows are appended every second.
 
-A host that is killed, or a machine that loses its power, leaves a record that is complete up to the
-last second. A disk that is full ends the recording, not the flight: the file is cut back to its
-last whole row. A thread does the writing, so that a slow disk does not make a frame late.
+After a crash of the host or a loss of power the record is complete up to the last second. A full
+disk ends the recording, not the flight: the file is cut after its last whole row. A thread writes,
+so that a slow disk does not delay frames.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from coupled.files import json_text, unfinished_name
 from coupled.record.record import FORMAT, Record, manifest_path
 
 if TYPE_CHECKING:
-    from coupled.live.host import Host, Word
+    from coupled.live.host import Host, Request
 
 EVERY_s = 1.0
 UNFINISHED = "the host, or its recording, was stopped before the flight was over"
 
 
 def recording_path(path: Path) -> Path:
-    """Return where a record is written while its flight goes on.
+    """Return the path of a record during its flight.
 
-    A CSV file grows in its own place. A Parquet file cannot be appended to: until it is written at
-    the end, its rows are in a CSV file beside it.
+    A CSV file is written in place. A Parquet file cannot be appended to: until the end of the
+    flight its rows are in a CSV file beside it.
     """
     return path if path.suffix.lower() == ".csv" else path.with_name(f"{path.stem}-in-flight.csv")
 
 
 class Recording:
-    """A watcher that appends what is flown to the file of `recording_path(path)`.
+    """A watcher that appends rows to the file of `recording_path(path)`.
 
-    `warn` takes a line when the recording has to end before the flight.
+    `warn` receives a line if the recording ends before the flight.
     """
 
     def __init__(self, path: Path, warn: Callable[[str], None]) -> None:
@@ -47,30 +47,30 @@ class Recording:
         self.recorded_s = 0.0  # of the flight, in the file
         self.problem = ""  # why the recording ended before the flight
         self._channels: tuple[str, ...] = ()
-        self._stops: dict[str, float] = {}  # when a control first met its stop, s
+        self._stops: dict[str, float] = {}  # when a control first reached its stop, s
         self._bytes = self._rows = self._due = self._done = 0
         self._wake, self._ended = threading.Condition(), False
         self._thread: threading.Thread | None = None
 
-    def board(self, host: Host) -> None:
-        """Begin."""
+    def begin(self, host: Host) -> None:
+        """Start the thread."""
         self._host, self._every = host, max(2, round(EVERY_s / host.frame_s))
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def look(self, host: Host, k: int) -> None:
-        """Let the rows before frame k be written, once a second."""
+    def observe(self, host: Host, k: int) -> None:
+        """Write the rows before frame k, once a second."""
         if k and k % self._every == 0:
             with self._wake:
                 self._due = k
                 self._wake.notify()
 
-    def words(self) -> Sequence[Word]:
-        """Return nothing: a file asks for nothing."""
+    def requests(self) -> Sequence[Request]:
+        """Return no requests."""
         return ()
 
     def close(self) -> None:
-        """Stop appending: the whole record is written next."""
+        """Stop appending; the caller writes the whole record next."""
         if self._thread is not None:
             with self._wake:
                 self._ended = True
@@ -78,14 +78,14 @@ class Recording:
             self._thread.join()
 
     def instead_of(self, error: InputError) -> InputError:
-        """Return the fault of a whole record that could not be written, and what is kept."""
+        """Return the error of a whole record that could not be written, with what is kept."""
         if not self._rows:
             return error
         problem = f"{error.problem}; {self.path} keeps the first {self.recorded_s:.0f} s"
         return InputError(error.file, error.key, problem)
 
     def forget(self) -> None:
-        """Remove the file beside a Parquet record that is whole now."""
+        """Remove the CSV file beside a complete Parquet record."""
         if self._rows and self.path != self._whole:
             for path in (self.path, manifest_path(self.path)):
                 with suppress(OSError):
@@ -113,10 +113,10 @@ class Recording:
                 os.truncate(self.path, self._bytes)
         self.problem = why
         kept = f"{self.path} keeps its first {self.recorded_s:.0f} s" if self._rows else "none"
-        self._warn(f"the recording ended: {why}; {kept}; the flight goes on")
+        self._warn(f"the recording ended: {why}; {kept}; the flight continues")
 
     def _append(self, due: int) -> None:
-        """Write the rows before frame `due` that the file lacks, and the manifest."""
+        """Write the rows before frame `due` that are not in the file yet, and the manifest."""
         part = self._host.so_far(self._rows, due)
         if not len(part):
             return
@@ -128,7 +128,7 @@ class Recording:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             _put(self.path, _csv(part, header=True))
         self._put_manifest(part, rows)
-        if not anew:  # its manifest first: what was switched is known of every row
+        if not anew:  # the manifest first, so that the switches of every row are known
             with self.path.open("r+b") as file:
                 file.seek(self._bytes)
                 file.write(_csv(part, header=False))
@@ -147,7 +147,7 @@ class Recording:
 
 
 def _put(path: Path, content: bytes) -> None:
-    """Put a file in place whole, such that it is there after a loss of power."""
+    """Write a file atomically, synchronised to the disk."""
     part = path.with_name(unfinished_name(path.suffix))
     try:
         with part.open("wb") as file:
@@ -164,7 +164,7 @@ def _sync(file: BufferedWriter | BufferedRandom) -> None:
 
 
 def _csv(record: Record, header: bool) -> bytes:
-    """Return rows as `write_record` would write them."""
+    """Return rows in the format of `write_record`."""
     text = io.BytesIO()
     record.to_polars().write_csv(text, include_header=header)
     return text.getvalue()

@@ -1,4 +1,4 @@
-"""The channels that a live flight records and a batch flight does not, and the reverse."""
+"""The channels of a live flight in addition to a batch flight's, one value a frame."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from coupled.rig.rig import Rig
 
 
 class Rows:
-    """How far each row can be used, and the time of its sample by the loader's clock.
+    """The validity of each row, and the time of its sample by the loader's clock.
 
-    `always` records the validity even where every row is fresh; `timed` records the loader's time,
-    which means nothing in lock-step.
+    `always` records the validity even if every row is fresh; `timed` records the loader's time,
+    which has no meaning in lock-step.
     """
 
     def __init__(self, frames: int, always: bool, timed: bool) -> None:
@@ -26,9 +26,9 @@ class Rows:
         self.loader_time_s = np.full(frames, math.nan)
 
     def beside(self, record: Record, first: int) -> Record:
-        """Return a record with these channels behind; its first row is frame `first`.
+        """Return a record with these channels appended; its first row is frame `first`.
 
-        A simulated loader's validity is left out while no row differs from fresh.
+        A simulated loader's validity is left out if all rows are fresh.
         """
         rows = slice(first, first + len(record))
         added: dict[str, Any] = {}

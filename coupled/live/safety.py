@@ -1,13 +1,12 @@
-"""What the host may ask of a loader, and whether what the loader measures can be true.
+"""Limits of a loader's orders, and plausibility of its measurements.
 
-Limits: ΔG over the whole travel and the breakout together, and F_mod, stay within `force_N`, and
-none changes faster than `rate_N_per_s`. Where the host orders the loader's own spring as well, that
-spring is in the sum. Forces fade by a share that rises from 0 to 1 over `fade_s`, and falls as
-long. Without a valid packet for the watchdog's time the share falls to 0; it rises again when the
-loader is back.
+Limits: |ΔG|·travel + breakout, and |F_mod|, stay within `force_N`, and none changes faster than
+`rate_N_per_s`. If the host also orders the loader's own spring, the spring is included in the sum.
+Forces are faded by a factor that rises from 0 to 1 over `fade_s` and falls likewise. Without a
+valid packet for the watchdog's time the factor falls to 0; it rises again when the loader answers.
 
-Plausibility: a gauge that reads the same number while the control moves has failed, and δ has to
-agree with x + K·F, x being the servo's answer to δc. While either fails, the share falls to 0.
+Plausibility: a force gauge that is constant while the control moves has failed, and δ must agree
+with x + K·F, x being the servo's answer to δc. While either test fails, the factor falls to 0.
 """
 
 from __future__ import annotations
@@ -24,20 +23,20 @@ FASTEST_N_per_s = 5000.0
 STRONGEST_N = 600.0  # 14 CFR 25.143(d) allows two hands 75 lbf on the column, both feet 150 lbf
 FADE_s = 0.5
 
-# A force that is held, as after a step, stays the same while the control still moves: until the
-# loader has come to rest, some tenths of a second. A gauge with any noise does not repeat at all.
+# A force held after a step is constant while the control still moves, for some tenths of a second
+# until the loader rests. A gauge with noise does not repeat values at all.
 STUCK_s = 2.0  # F unchanged for so long, and in the second half of that time
 MOVED = 0.05  # of the travel moved by δc
-# δ may differ from x + K·F by this share of the travel, as by play and zeros, and by all of K·F,
-# since a structure may have softened to twice its K. Both are beyond what a calibration leaves.
+# Tolerance of δ − x − K·F: this share of the travel, for backlash and zeros, plus all of K·F, since
+# a structure may have softened to twice its K. Both exceed the error of a calibration.
 APART = 0.05
-APART_s = 0.2  # for so long: a blow on the grip is over before
-AGAIN_s = 1.0  # without a fault, until the forces come back
+APART_s = 0.2  # duration of a disagreement; longer than a blow on the grip
+AGAIN_s = 1.0  # time without a fault until the forces return
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The largest F_mod in N, its fastest change in N/s, and how long a fade takes in s."""
+    """The largest F_mod in N, its largest rate in N/s, and the duration of a fade in s."""
 
     force_N: float = STRONGEST_N
     rate_N_per_s: float = FASTEST_N_per_s
@@ -45,31 +44,31 @@ class Limits:
 
 
 class Fade:
-    """The share of the forces that is on: 0 to 1, straight in time."""
+    """The factor on the forces: 0 to 1, linear in time."""
 
     def __init__(self, fade_s: float, frame_s: float) -> None:
         self._step = frame_s / fade_s if fade_s > 0.0 else 1.0
         self.share = 0.0
 
     def move(self, on: bool) -> float:
-        """Move the share for a frame towards on or off, and return it."""
+        """Advance the factor by a frame towards on or off, and return it."""
         step = self._step if on else -self._step
         self.share = min(max(self.share + step, 0.0), 1.0)
         return self.share
 
 
 class Limiter:
-    """Keeps one control's orders within the limits.
+    """Limits one control's orders.
 
-    `travel` is in d; `own` is the gradient in N/d that the host orders beside ΔG.
+    `travel` is in d; `own` is the gradient in N/d that the host orders in addition to ΔG.
     """
 
     def __init__(self, limits: Limits, travel: float, frame_s: float, own: float = 0.0) -> None:
         self._force, self._travel, self._own = limits.force_N, travel, own
         self._step = limits.rate_N_per_s * frame_s
         self._last: Order | None = None
-        self.limited = 0  # frames in which an order was cut
-        self.cut = False  # in the last frame
+        self.limited = 0  # frames with a reduced order
+        self.cut = False  # the order of the last frame was reduced
 
     def _within(self, wanted: float, last: float, low: float, high: float, step: float) -> float:
         if math.isnan(wanted):
@@ -78,12 +77,12 @@ class Limiter:
         return min(max(bounded, last - step), last + step)
 
     def total(self, order: Order) -> float:
-        """Return the most that an order can ask for within the travel, N."""
+        """Return the largest force of an order within the travel, N."""
         steepest = max(abs(self._own + order.gradient), abs(self._own + order.second))
         return steepest * self._travel + abs(order.breakout)
 
     def order(self, asked: Order, share: float) -> Order:
-        """Return what is sent of an order that was asked for, with that share of it on."""
+        """Return the order to be sent for a wanted order, faded by `share`."""
         last = self._last or Order(0.0, 0.0, asked.break_at, 0.0, 0.0, asked.total, asked.trim)
         wanted = asked._replace(
             gradient=share * asked.gradient,
@@ -99,10 +98,10 @@ class Limiter:
         return sent
 
     def _shared(self, wanted: Order) -> Order:
-        """Return an order whose total is within the limit, its parts in the same proportion."""
+        """Return an order scaled so that its total is within the limit."""
         total = self.total(wanted)
         if not self._force < total < math.inf:
-            return wanted  # what is no number is dealt with one by one
+            return wanted  # NaN and infinity are limited part by part
         factor = self._force / total
         return wanted._replace(
             gradient=factor * (self._own + wanted.gradient) - self._own,
@@ -111,7 +110,7 @@ class Limiter:
         )
 
     def _each(self, wanted: Order, last: Order) -> Order:
-        """Return an order each part of which is within the limits of size and rate."""
+        """Return an order whose parts are within the limits of size and rate."""
         size, step, steepest = self._force, self._step, self._force / self._travel
         low, high, turn = -steepest - self._own, steepest - self._own, step / self._travel
         return wanted._replace(
@@ -122,9 +121,9 @@ class Limiter:
         )
 
     def _together(self, sent: Order, last: Order) -> Order:
-        """Return an order whose total is within the limit while its parts still move.
+        """Return an order whose total is within the limit during changes of its parts.
 
-        A part that would raise the total waits for the others, which fall at their rate.
+        A part that would raise the total keeps its last value until the others have fallen.
         """
         if self.total(sent) <= self._force:
             return sent
@@ -142,7 +141,7 @@ class Limiter:
 class Plausibility:
     """Whether one control's measurements agree with one another.
 
-    `gauge` says that the loader measures F.
+    `gauge`: the loader measures F.
     """
 
     def __init__(self, control: Control, frame_s: float, gauge: bool) -> None:
@@ -150,7 +149,7 @@ class Plausibility:
         self._bend = max(control.loader.bend, control.compensation.bend)
         self._travel, self._frame_s = control.travel, frame_s
         self._stuck_frames = round(STUCK_s / frame_s)
-        self._force, self._same = math.nan, 0  # the last F, and in how many samples it was so
+        self._force, self._same = math.nan, 0  # the last F, and the number of equal samples
         self._places: deque[float] = deque(maxlen=self._stuck_frames // 2)
         self._stuck = False
         self._apart_s, self._well_s = 0.0, AGAIN_s
@@ -160,8 +159,8 @@ class Plausibility:
         """Take a frame without a new sample."""
         self._servo.miss()
 
-    def look(self, measured: Measured) -> str:
-        """Take a new sample; return what is wrong with it, or an empty text."""
+    def update(self, measured: Measured) -> str:
+        """Take a new sample; return its fault, or an empty text."""
         found = self._stuck_gauge(measured) or self._apart(measured)
         self._well_s = 0.0 if found else self._well_s + self._frame_s
         if found or self._well_s >= AGAIN_s:
@@ -178,7 +177,7 @@ class Plausibility:
             self._stuck = self._stuck and same
         elif max(self._places) - min(self._places) > MOVED * self._travel:
             self._stuck = True
-        return "its force gauge reads the same while the control moves" if self._stuck else ""
+        return "the force gauge is constant while the control moves" if self._stuck else ""
 
     def _apart(self, measured: Measured) -> str:
         position = self._servo.move(measured.computed)

@@ -1,16 +1,14 @@
-"""K in service: the structure's bend, estimated while flying from F, δc and δ.
+"""K in service: the structure's bend, estimated in flight from F, δc and δ.
 
-The grip stands at δ = x + K·F, x being the servo's answer to δc. Servo and δc are known, so
+The grip is at δ = x + K·F, x being the servo's answer to δc. Servo and δc are known, so
 
     y = δ − x = K·F + b
 
-is a line whose slope is K and whose intercept is the transducer's zero. It is fitted by recursive
-least squares with forgetting: the sums of the normal equations, each of which loses a share of
-itself a frame (Ljung and Söderström 1983, ch. 2; here in information form). The variance is that of
-weighted least squares with equal noise, A⁻¹·B·A⁻¹ with B the sums of squared weights, times
-(1 + ρ)/(1 − ρ) for residuals whose neighbours correlate by ρ. Where the hand does too little
-nothing is learned and nothing is forgotten, nor from a sample that is repeated because no new one
-came.
+is a line with slope K and the transducer's zero as intercept. It is fitted by recursive least
+squares with exponential forgetting (Ljung and Söderström 1983, ch. 2; here in information form).
+The variance is that of weighted least squares with equal noise, A⁻¹·B·A⁻¹ with B the sums of
+squared weights, times (1 + ρ)/(1 − ρ) for residuals with lag-one correlation ρ. The fit pauses,
+without forgetting, if the hand moves too little or no new sample came.
 """
 
 from __future__ import annotations
@@ -24,26 +22,26 @@ import numpy as np
 from coupled.live.servo import Servo
 from coupled.rig.parameters import Control
 
-MEMORY_s = 10.0  # time constant of the forgetting, of time in which the hand moves
-LEAST_N = 3.0  # standard deviation of F over a second below which nothing is learned
-FIRST_s = 2.0  # of moving time before an estimate is given
-ALARM = 4.0  # standard errors: a healthy rig passes 2 now and then in an hour
-ALARM_SHARE = 0.05  # of the calibrated K, which servo and play as filed may be wrong by
+MEMORY_s = 10.0  # time constant of the forgetting, counted while the hand moves
+LEAST_N = 3.0  # standard deviation of F over a second below which the fit pauses
+FIRST_s = 2.0  # time of motion before the first estimate
+ALARM = 4.0  # standard errors: a healthy rig exceeds 2 now and then in an hour
+ALARM_SHARE = 0.05  # of the calibrated K, for errors of servo and backlash in the rig file
 ALARM_AFTER_s = 1.0
 ADAPT_EVERY_s = 0.25
-ADAPT_TIME_s = 4.0  # with which K̂ follows
-ADAPT_SHARE_per_s = 0.05  # of the calibrated K, at the most
-ADAPT_SURE = 0.1  # half an interval over K, above which K̂ stays
+ADAPT_TIME_s = 4.0  # time constant of K̂
+ADAPT_SHARE_per_s = 0.05  # largest rate of K̂, of the calibrated K
+ADAPT_SURE = 0.1  # half an interval over K, above which K̂ is not changed
 ADAPT_BOUNDS = (0.5, 2.0)  # on the calibrated K
 STABLE = 0.8  # K̂·G_T
 
 
 @dataclass(frozen=True)
 class ServiceBend:
-    """K as estimated now: d/N, with its standard error; None before there is an estimate.
+    """The estimate of K: d/N, with its standard error; None before the first estimate.
 
-    `excitation_N` is the standard deviation of F over what is remembered; `frozen` says that
-    the hand does too little now; `alarm` that K is no longer the calibrated one.
+    `excitation_N` is the weighted standard deviation of F; `frozen`: the fit pauses; `alarm`: K
+    differs from the calibrated one.
     """
 
     bend: float | None
@@ -53,7 +51,7 @@ class ServiceBend:
     alarm: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for manifest and page, with the 95 % interval."""
+        """Return the JSON for manifest and page, with the 95 % interval."""
         found: dict[str, Any] = dict(vars(self))
         if self.bend is not None and self.error is not None:
             found |= {"low": self.bend - 1.96 * self.error, "high": self.bend + 1.96 * self.error}
@@ -61,7 +59,7 @@ class ServiceBend:
 
 
 class BendEstimator:
-    """Estimates K of one control; `control` is its section of the rig, which gives the servo."""
+    """Estimates K of one control; `control` is its section of the rig, with the servo."""
 
     def __init__(self, control: Control, frame_s: float, memory_s: float = MEMORY_s) -> None:
         found = control.calibration
@@ -79,12 +77,12 @@ class BendEstimator:
         self._started = self._alarm = False
         self.now = ServiceBend(None, None, 0.0, True, False)
 
-    def look(
+    def update(
         self, force: float, computed: float, deflection: float, *, fresh: bool = True
     ) -> ServiceBend:
         """Take a frame's F in N, δc and δ in d, and return the estimate.
 
-        A frame that is not `fresh` holds the sample before it again: nothing is learned from it.
+        A frame that is not `fresh` repeats the sample before it and is not used.
         """
         if not fresh:
             self._servo.miss()
@@ -134,7 +132,7 @@ class BendEstimator:
         square, product, _ = self._apart
         alike = min(max(product / square, 0.0), 0.99) if square > 0.0 else 0.0
         n2, f2, ff2 = self._squares.tolist()
-        # The row of A⁻¹ that gives the slope is (−f, n)/(n·ff − f²); B is of the squared weights.
+        # The row of A⁻¹ for the slope is (−f, n)/(n·ff − f²); B is of the squared weights.
         across = (f * f * n2 - 2.0 * f * n * f2 + n * n * ff2) / (n * ff - f * f) ** 2
         error = math.sqrt(square / n * across * (1.0 + alike) / (1.0 - alike))
         away = abs(slope - self.calibrated)
@@ -147,7 +145,7 @@ class BendEstimator:
 
 
 class Adaptation:
-    """Gives the K of service to the compensation, slowly and within bounds.
+    """Moves the compensation's K̂ to the estimated K, slowly and within bounds.
 
     `stiffest` is the schedule's largest G_T in N/d.
     """
@@ -158,8 +156,8 @@ class Adaptation:
         self._low, self._high = low * calibrated, min(high * calibrated, STABLE / stiffest)
         self._due_s = 0.0
 
-    def look(self, time_s: float, found: ServiceBend) -> float | None:
-        """Return the K̂ to be used from now on, d/N; None where it stays as it is."""
+    def update(self, time_s: float, found: ServiceBend) -> float | None:
+        """Return the new K̂, d/N; None if it does not change."""
         if time_s < self._due_s:
             return None
         self._due_s = time_s + ADAPT_EVERY_s

@@ -1,4 +1,4 @@
-"""The servo's answer x to δc, frame by frame, as the rig file describes the servo."""
+"""The servo's answer x to δc, frame by frame, by the servo's parameters in the rig file."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 from coupled.rig.linkage import weights_of_servo
 from coupled.rig.parameters import Control
 
-BRIDGED_s = 0.025  # a gap in the samples up to which δc is taken to run straight
+BRIDGED_s = 0.025  # longest gap in the samples over which δc is interpolated
 
 
 class Servo:
     """The servo of one control.
 
-    A sample that did not come is bridged by a straight line to the next one. After a longer gap
-    the servo starts again at rest at δc, and x counts only after `settle_s`.
+    Missing samples are interpolated linearly to the next one. After a longer gap the servo
+    restarts at rest at δc, and x is valid only after `settle_s`.
     """
 
     def __init__(self, control: Control, frame_s: float) -> None:
@@ -22,17 +22,17 @@ class Servo:
         self._a, self._b = (row.tolist() for row in weights_of_servo(loader, frame_s))
         omega, ratio = 2.0 * math.pi * loader.servo_frequency, loader.servo_damping_ratio
         slowest = ratio if ratio <= 1.0 else ratio - math.sqrt(ratio * ratio - 1.0)
-        # Five time constants of its slowest part: less than 1 % of a wrong start is left.
+        # Five time constants of its slowest part: less than 1 % of an initial error remains.
         # Without a servo the position is δc itself.
         self._settle_s = 5.0 / (omega * slowest) if omega > 0.0 else 0.0
         self._frame_s = frame_s
         self._speed = self._before = self.position = 0.0
         self._missed = 0
-        self._left_s: float | None = None  # until x counts; None before the first sample
+        self._left_s: float | None = None  # time until x is valid; None before the first sample
 
     @property
     def settled(self) -> bool:
-        """Whether x no longer holds what was not known at the start."""
+        """Whether the initial error of x has decayed."""
         return self._missed == 0 and self._left_s is not None and self._left_s <= 0.0
 
     def miss(self) -> None:

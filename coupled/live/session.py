@@ -1,4 +1,4 @@
-"""A live flight from begin to end: fly, fade out, and the record in a batch flight's format."""
+"""A live flight from start to end, and its record in a batch flight's format."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.live.hands import LiveHand
 from coupled.live.host import STOPPED, Host, Plan
-from coupled.live.pacing import Lateness, first_place
+from coupled.live.pacing import Lateness, real_time_priority
 from coupled.live.roundtrip import RoundTrips
 from coupled.record.record import Record
 from coupled.rig.parameters import Sensing
@@ -25,30 +25,33 @@ INTERRUPTED = "interrupted"
 
 @dataclass(frozen=True)
 class LiveFlight:
-    """A live flight: its record, the rig as last switched, and how late its frames were."""
+    """A live flight: its record, the rig as last switched, and the lateness of its frames."""
 
     record: Record
     rig: Rig
-    since_s: float  # of the last change of a switch: what follows was flown with `rig`
+    since_s: float  # of the last change of a switch; the rest was flown with `rig`
     lateness: Lateness | None
     stopped: bool  # by the user
-    round_trips: RoundTrips | None = None  # of a loader whose answers say what they answer
+    round_trips: RoundTrips | None = None  # if answers identify their orders
 
 
 def fly_live(manoeuvre: Manoeuvre, plan: Plan, progress: Progress | None = None) -> LiveFlight:
-    """Fly a manoeuvre live and return the flight, whole up to the frame at which it ended.
+    """Fly a manoeuvre live and return the flight, complete up to the frame at which it ended.
 
     In lock-step, with the simulated loader and the manoeuvre's own pilots, the record is that of
-    `fly` to the bit. Raises InputError where the loader does not answer.
+    `fly` to the bit. Raises InputError if the loader does not answer.
     """
     host = Host(plan)
     real = manoeuvre if plan.link is None else as_measured(manoeuvre)
     try:
-        with undisturbed(), first_place(plan.paced) as host.first_place:
+        with (
+            without_garbage_collection(),
+            real_time_priority(plan.paced) as host.real_time_priority,
+        ):
             record = fly(real, progress, companion=host)
     finally:
-        host.farewell()
-    if host.aboard is None:
+        host.shut_down()
+    if host.access is None:
         raise InputError(manoeuvre.file, "", "was not flown")
     ended = record.ended_early
     stopped = ended is not None and ended.reason in (STOPPED, INTERRUPTED)
@@ -84,8 +87,8 @@ _MULTIPLIER = ("multiplier_offset_N", "multiplier_drift_N_per_s")
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
-    """Collect no garbage within: a collection takes longer than a frame may be late."""
+def without_garbage_collection() -> Iterator[None]:
+    """Disable garbage collection in the context, since a collection would delay frames."""
     was = gc.isenabled()
     gc.collect()
     gc.disable()

@@ -1,8 +1,7 @@
 """A stick, yoke or gamepad, read by pygame-ce; it needs no screen.
 
-pygame-ce reads by SDL what Linux, macOS and Windows know of as joysticks, in one way and with no
-driver of its own. `hidapi` would leave the decoding of each device's reports to us, and `inputs` is
-no longer kept up.
+SDL, through pygame-ce, supports the joysticks of Linux, macOS and Windows without a driver of its
+own. `hidapi` would require decoding of each device's reports, and `inputs` is not maintained.
 """
 
 from __future__ import annotations
@@ -13,26 +12,26 @@ from typing import Any, Protocol
 
 from coupled.errors import InputError
 
-AXES = "1,0,3"  # of column, wheel and pedals, as most sticks with a twist have them
+AXES = "1,0,3"  # of column, wheel and pedals: the usual axes of a stick with a twist
 _CONTROLS = ("column", "wheel", "pedals")
-DEAD = 0.02  # share of the way about the middle that is none: potentiometers do not rest at 0
+DEAD = 0.02  # dead zone about neutral, of full deflection: potentiometers do not rest at 0
 
 
 class Device(Protocol):
-    """What is read of a stick."""
+    """The interface of a stick."""
 
     def get_name(self) -> str:
         """Return its name."""
 
     def get_numaxes(self) -> int:
-        """Return how many axes it has."""
+        """Return its number of axes."""
 
     def get_axis(self, number: int, /) -> float:
-        """Return where an axis stands, −1 to 1."""
+        """Return the position of an axis, −1 to 1."""
 
 
 def axes_of(words: str) -> dict[str, tuple[int, float]]:
-    """Return {control: (axis, sign)} of `1,0,3`; a minus turns an axis. Raises InputError."""
+    """Return {control: (axis, sign)} of `1,0,3`; a minus reverses an axis. Raises InputError."""
     found = {}
     for control, word in zip(_CONTROLS, words.split(","), strict=False):
         number = word.strip().removeprefix("-")
@@ -44,10 +43,10 @@ def axes_of(words: str) -> dict[str, tuple[int, float]]:
 
 
 class Stick:
-    """A stick as the hands' wishes: a pull, right wheel and right pedal are positive.
+    """A stick as a source of hand positions: a pull, right wheel and right pedal are positive.
 
-    `number` counts the sticks that are plugged in; `device` is one that is open already.
-    Raises InputError where there is none.
+    `number` counts the connected sticks; `device` is one that is open already. Raises InputError
+    if there is none.
     """
 
     def __init__(self, axes: str = AXES, number: int = 0, device: Device | None = None) -> None:
@@ -74,7 +73,7 @@ class Stick:
         return device
 
     def read(self, control: str) -> float:
-        """Return where a control is wanted, −1 to 1; 0 for one without an axis."""
+        """Return the position of a control, −1 to 1; 0 for one without an axis."""
         if control not in self._axes:
             return 0.0
         axis, sign = self._axes[control]
@@ -84,7 +83,7 @@ class Stick:
         return 0.0 if abs(place) < DEAD else place
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
         if self._pygame is not None:
             self._pygame.joystick.quit()
             self._pygame.display.quit()

@@ -1,8 +1,8 @@
-"""What may be changed while flying: corrections, K and K̂, friction and breakout.
+"""Parameters that may be changed in flight: corrections, K and K̂, friction and breakout.
 
-A change is one of a key of the rig file, checked as the file is and packed as at the start, so
-that a flight goes on as a batch flight of the changed rig would. K, friction and breakout are the
-simulated loader's; a real loader has its own, and only the host's side can be changed.
+A change sets a key of the rig file. It is checked like the file, so the flight continues as a batch
+flight of the changed rig would. K, friction and breakout are those of the simulated loader; with a
+real loader only the host's parameters can be changed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from coupled.rig.control import ControlArray
 from coupled.rig.packing import Hand, pack
 from coupled.rig.rig import Rig
 
-# By the words of the page: the keys of the rig file, d being the control's unit.
+# By the name on the page: the keys of the rig file, d being the control's unit.
 KEYS: dict[str, tuple[str, ...]] = {
     "deflection": ("compensation.deflection",),
     "gradient": ("compensation.gradient",),
@@ -28,13 +28,13 @@ KEYS: dict[str, tuple[str, ...]] = {
 }
 YES_NO = ("deflection", "gradient")
 HARDWARE = ("bend", "friction", "breakout")
-_BESIDE = {"bend": None, "friction": 0.0}  # what the second key of a word is set to
+_BESIDE = {"bend": None, "friction": 0.0}  # value of the second key
 _WIDEST = {"friction": 200.0, "breakout": 200.0}  # N
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change made in flight, at `time_s`: `what` of a control, to `value` in SI."""
+    """A change in flight, at `time_s`: `what` of a control, to `value` in SI."""
 
     time_s: float
     control: str
@@ -43,11 +43,11 @@ class Change:
 
 
 class Switches:
-    """A flight's switches.
+    """The switches of a flight.
 
-    `rig` is what is flown, `controls` the same as the kernels hold it, `hands` those of its
-    pilots, and `elsewhere` whether its loader is real. `set_rig` is the rig as the last change by
-    the user made it, and `differs` whether `rig` has other settings than at the start.
+    `rig` is the current rig, `controls` the same in the kernels' arrays, `hands` those of its
+    pilots; `elsewhere`: the loader is real. `set_rig` is the rig after the user's last change.
+    `differs`: `rig` has other settings than at the start.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Switches:
         self.differs = False
 
     def values(self, control: str) -> dict[str, float | bool]:
-        """Return what stands now of a control, SI."""
+        """Return the current values of a control, SI."""
         data = self.rig.controls[self._control(control)]
         return {
             "deflection": data.compensation.deflection,
@@ -71,13 +71,13 @@ class Switches:
         }
 
     def set(self, time_s: float, control: str, what: str, value: float | bool) -> None:
-        """Make a change, and remember it; raise InputError for one that cannot be made."""
+        """Make a change and store it; raises InputError if it cannot be made."""
         self.put(control, what, value)
         self.changes.append(Change(time_s, control, what, value))
         self.set_rig = self.rig
 
     def put(self, control: str, what: str, value: float | bool) -> None:
-        """Make a change that is not remembered, as an adaptation makes them."""
+        """Make a change without storing it, as an adaptation does."""
         name, place = self._control(control), f"{control}.{what}"
         if what not in KEYS:
             raise InputError("switch", place, f"is no switch; {nearest(what, KEYS)}")

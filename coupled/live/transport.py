@@ -1,4 +1,4 @@
-"""CLS2Sim's connection, by TCP or UDP, and what a user has to say of the loader behind it."""
+"""CLS2Sim's connection, by TCP or UDP, and the user's data on the loader."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from coupled.live.udp import resolved
 
 @dataclass(frozen=True)
 class Given:
-    """What a user has to say of a loader, for which no source has it.
+    """Data on a loader that no source gives and the user has to measure.
 
-    counts_per_N  the protocol's number for a newton; negative where it counts the other way
-    turn          the controls whose axis counts the other way: positions and forces
+    counts_per_N  force counts per newton; negative if they count against positions
+    turn          controls with reversed axis: positions and forces
     profile       gradient of the loader's own force profile, N/d, at `scale`; v2 only
     """
 
@@ -29,7 +29,7 @@ class Given:
 
 
 class Transport:
-    """A connection by TCP or UDP; bytes that came, in their order."""
+    """A connection by TCP or UDP."""
 
     def __init__(self, kind: str, host: str, port: int, name: str) -> None:
         family, address = resolved(host, port, name)
@@ -49,10 +49,10 @@ class Transport:
         self._socket.setblocking(False)
         self.closed = False  # by the other end of a stream
         self._stamped = ask_for_stamps(self._socket)
-        self.came_s = math.nan  # when the system took in what was received last; NaN if unknown
+        self.came_s = math.nan  # arrival of the last data by the system's stamp; NaN if unknown
 
     def send(self, packet: bytes) -> None:
-        """Send; a wire that takes none drops it."""
+        """Send a packet; it is dropped if the connection does not accept it."""
         with contextlib.suppress(OSError):
             self._socket.send(packet)
 
@@ -69,10 +69,10 @@ class Transport:
         return None if self.closed else packet
 
     def wait(self, seconds: float) -> None:
-        """Wait until something comes, so long at most."""
-        # A stream that was closed is always readable: to select it would not wait.
+        """Wait until data arrive, at most so long."""
+        # A closed stream is always readable, so select would return at once.
         select.select([] if self.closed else [self._socket], [], [], max(0.0, seconds))
 
     def close(self) -> None:
-        """Close it."""
+        """Close the connection."""
         self._socket.close()

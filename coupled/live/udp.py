@@ -1,4 +1,4 @@
-"""A loader that speaks the open protocol (`wire`) over UDP."""
+"""A loader with the open protocol (`wire`) over UDP."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from coupled.live.wire import ORDER, BadPacketError, Header, newer, pack_orders,
 from coupled.rig.rig import Rig
 
 LARGEST_bytes = 512
-# Taken in one look: more than Linux's default receive buffer holds of the smallest packets (212,992
-# bytes of 768 each), so that none waits for the next frame; a flood must not hold up the frame.
+# Read in one frame: more than Linux's default receive buffer contains of the smallest packets
+# (212,992 bytes of 768 each), so that none waits for the next frame. It also bounds a flood.
 MOST_PACKETS = 512
-STRONGEST_N = 2500.0  # beyond what a person holds, F is a fault
-BEYOND = 1.25  # of the travel: δ passes δc's stop by what the structure bends
+STRONGEST_N = 2500.0  # a larger F exceeds a person's strength and is a fault
+BEYOND = 1.25  # of the travel: δ exceeds δc's stop by the bend of the structure
 
 
 def reaches(rig: Rig) -> list[Reach]:
-    """Return what no measurement of a rig's controls exceeds, in the rig's order."""
+    """Return the bounds of the measurements of a rig's controls, in the rig's order."""
     return [
         Reach(STRONGEST_N, BEYOND * control.travel + 200.0 * control.loader.bend)
         for control in rig.controls.values()
@@ -43,10 +43,9 @@ def resolved(host: str, port: int, name: str) -> tuple[int, tuple[object, ...]]:
 
 
 class UdpLink:
-    """The host's end of the open protocol; it binds a free port and hears one address only.
+    """The host's side of the open protocol; it binds a free port and accepts one address only.
 
-    `deflection` says that the loader measures δ; in `lockstep` only the answer to the last orders
-    is taken.
+    `deflection`: the loader measures δ. In `lockstep` only the answer to the last orders is used.
     """
 
     measures_force = True
@@ -63,15 +62,15 @@ class UdpLink:
         self._session = secrets.randbits(32)
         self._sequence = 0
         self._last: int | None = None  # sequence number of the last valid state
-        self._echo = 0  # which order that state answered
-        self._came_s = 0.0  # when it came, by the host's clock
+        self._echo = 0  # the order that this state answered
+        self._came_s = 0.0  # its time of arrival by the host's clock
         family, self._address = resolved(host, port, self.name)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self.round_trips.stamped = ask_for_stamps(self._socket)
 
     def receive(self, wait_s: float) -> Sample | None:
-        """Return the newest valid sample since the last call, waiting for one so long at most."""
+        """Return the newest valid sample since the last call; wait for it at most so long."""
         until = time.monotonic() + wait_s
         found = self._drain()
         while found is None and (left := until - time.monotonic()) > 0.0:
@@ -89,7 +88,7 @@ class UdpLink:
                 )
             except BlockingIOError:
                 break
-            except OSError:  # the other end refused a packet: it is not there yet, or any more
+            except OSError:  # the other end refused a packet: it is not running
                 continue
             try:
                 found = self._taken(packet, sender, came_ns)
@@ -108,38 +107,38 @@ class UdpLink:
         if not counts_on and not self._restarted(header, now_s):
             raise BadPacketError("replayed or late")
         self._last, self._echo, self._came_s = header.sequence, header.echo, now_s
-        self.round_trips.hear(header.echo, came_ns)
+        self.round_trips.record_answer(header.echo, came_ns)
         if self._lockstep and header.echo != self._sequence:
             raise BadPacketError("answers older orders")
         return sample
 
     def _restarted(self, header: Header, now_s: float) -> bool:
-        """Tell whether a state with an older sequence number is of a loader that was restarted.
+        """Tell whether a state with an older sequence number is of a restarted loader.
 
-        A restarted loader counts from its start again. Its state answers an order that was sent
-        after the last one answered, which a repeated or delayed packet does not. The sequence
-        numbers start anew only after the loader was silent for the watchdog's time.
+        A restarted loader counts from 1 again. Its state answers an order that was sent after the
+        last one answered, unlike a repeated or delayed packet. Sequence numbers may restart only
+        after silence for the watchdog's time.
         """
         silent = now_s - self._came_s > WATCHDOG_s
         sent = header.echo == self._sequence or newer(self._sequence, header.echo)
         return silent and sent and newer(header.echo, self._echo)
 
     def own_load(self, i: int, computed: float) -> float:
-        """Return 0: the loader has its basic gradient, damping and breakout itself."""
+        """Return 0: basic gradient, damping and breakout are the loader's own."""
         return 0.0
 
     def ordered_gradient(self, i: int) -> float:
-        """Return 0: the loader has its basic gradient itself."""
+        """Return 0: the basic gradient is the loader's own."""
         return 0.0
 
     def send(self, orders: tuple[Order, ...], mode: int) -> None:
-        """Send the orders of a frame; a wire that takes none drops them."""
+        """Send the orders of a frame; they are dropped if the network does not accept them."""
         self._sequence = (self._sequence + 1) % (1 << 32)
         now = time.monotonic_ns() // 1000
         numbers = (self._session, self._sequence, self._last or 0, now)
         header = Header(ORDER, len(orders), mode, *numbers)
         packet = pack_orders(header, orders)
-        self.round_trips.send(self._sequence, time.time_ns())
+        self.round_trips.record_order(self._sequence, time.time_ns())
         with contextlib.suppress(OSError):
             self._socket.sendto(packet, self._address)
 

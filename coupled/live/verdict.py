@@ -1,4 +1,4 @@
-"""What was flown, held against its rig, in a few words and rows for the page."""
+"""The diagnosis of a live flight, in a few words and rows for the page."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from coupled.api.gaps import diagnose
 from coupled.errors import InputError
 from coupled.live.session import LiveFlight
 
-LEAST_s = 5.0  # of a record that is worth judging
+LEAST_s = 5.0  # of a record that is diagnosed
 
 
 def diagnosed(flight: LiveFlight) -> dict[str, Any]:
-    """Return the diagnosis of what was flown with the switches as they stood last.
+    """Return the diagnosis of the flight since the last change of a switch.
 
     `summary` is a sentence, `rows` the effects found, in words and numbers.
     """

@@ -1,4 +1,4 @@
-"""What a live flight looks like, and a view that it is sent to over UDP, frame by frame."""
+"""The picture of a live flight, and views that receive it over UDP, frame by frame."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from coupled.live.udp import resolved
 from coupled.units import FOOT_m
 
 if TYPE_CHECKING:
-    from coupled.live.host import Host, Word
+    from coupled.live.host import Host, Request
 
 RATE_Hz = 60.0  # at most; a view draws no faster
 
 
 class Picture(NamedTuple):
-    """What a view shows: JSBSim's properties, each in its field's unit."""
+    """The data of a view: JSBSim's properties, each in its field's unit."""
 
     longitude_rad: float
     latitude_rad: float
@@ -84,18 +84,18 @@ assert len(PROPERTIES) == len(Picture._fields)
 
 
 class Pictures:
-    """Reads the pictures of a host's aircraft; what its model has no property for is 0."""
+    """Reads the pictures of a host's aircraft; properties that its model lacks are 0."""
 
     def __init__(self, host: Host) -> None:
-        assert host.aboard is not None
+        assert host.access is not None
         read: Callable[[str], Callable[[], float] | None]
-        read = getattr(host.aboard.airframe, "reader", lambda name: None)
+        read = getattr(host.access.airframe, "reader", lambda name: None)
         found = [(read(name), factor) for name, factor in PROPERTIES]
         self._reads = [(one, factor) for one, factor in found if one is not None]
         self._at = [i for i, (one, _) in enumerate(found) if one is not None]
 
     def now(self) -> Picture:
-        """Return the picture as it is."""
+        """Return the current picture."""
         values = [0.0] * len(PROPERTIES)
         for i, (read, factor) in zip(self._at, self._reads, strict=True):
             values[i] = factor * read()
@@ -103,7 +103,7 @@ class Pictures:
 
 
 class View:
-    """Sends pictures to `host:port`, each packed by `packet`; it never waits for an answer."""
+    """Sends pictures to `host:port`, each packed by `packet`; it does not wait for answers."""
 
     def __init__(self, name: str, host: str, port: int, packet: Callable[[Picture], bytes]) -> None:
         family, self._address = resolved(host, port, f"{name} {host}:{port}")
@@ -111,19 +111,19 @@ class View:
         self._socket.setblocking(False)
         self._packet = packet
 
-    def board(self, host: Host) -> None:
-        """Begin."""
+    def begin(self, host: Host) -> None:
+        """Start."""
         self._pictures = Pictures(host)
         self._every = max(1, round(1.0 / (host.frame_s * RATE_Hz)))
 
-    def look(self, host: Host, k: int) -> None:
-        """Send the picture; a view that is not there misses it."""
+    def observe(self, host: Host, k: int) -> None:
+        """Send the picture; errors of the network are ignored."""
         if k % self._every == 0:
             with contextlib.suppress(OSError, OverflowError, struct.error):
                 self._socket.sendto(self._packet(self._pictures.now()), self._address)
 
-    def words(self) -> Sequence[Word]:
-        """Return nothing: a view asks for nothing."""
+    def requests(self) -> Sequence[Request]:
+        """Return no requests."""
         return ()
 
     def close(self) -> None:

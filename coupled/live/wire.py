@@ -9,8 +9,8 @@ for each control in the rig's order, and the CRC-32 (IEEE 802.3, as zlib's) of a
     order    kind 2, host → loader: ΔG, ΔG beyond the break, δc of the break, breakout, F_mod,
              G_T, trim
 
-The session is a number that the host draws for a flight, and the loader repeats; the sequence rises
-by one or more from packet to packet. `docs/live.md` has the page.
+The host draws a session number for each flight, and the loader repeats it; the sequence rises by
+one or more from packet to packet. `docs/live.md` documents the protocol.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MAGIC, VERSION = b"CPLD", 1
 STATE, ORDER = 1, 2
 HEADER = struct.Struct("<4sBBBBIIIQ")
 _STATE, _ORDER, _CRC = struct.Struct("<3f"), struct.Struct("<7f"), struct.Struct("<I")
-HALF = 1 << 31  # a sequence that is less than half its range ahead is newer
+HALF = 1 << 31  # a sequence number less than half its range ahead is newer
 
 
 class BadPacketError(ValueError):
@@ -36,7 +36,7 @@ class BadPacketError(ValueError):
 
 @dataclass(frozen=True)
 class Header:
-    """What precedes the controls of a packet."""
+    """The header of a packet."""
 
     kind: int
     controls: int
@@ -48,7 +48,7 @@ class Header:
 
 
 def newer(sequence: int, last: int) -> bool:
-    """Tell whether a sequence number comes after another; it begins anew after 2³² − 1."""
+    """Tell whether a sequence number is newer than another; it wraps after 2³² − 1."""
     return 0 < (sequence - last) % (1 << 32) < HALF
 
 
@@ -72,7 +72,7 @@ def pack_orders(header: Header, orders: Sequence[Order]) -> bytes:
 
 
 def _header(packet: bytes, kind: int, controls: int) -> Header:
-    """Return a packet's header, its length and CRC checked; raises BadPacketError."""
+    """Return a packet's header after a check of length and CRC; raises BadPacketError."""
     block = (_STATE if kind == STATE else _ORDER).size
     if len(packet) < HEADER.size + _CRC.size or packet[:4] != MAGIC:
         raise BadPacketError("no packet of the protocol")
@@ -90,9 +90,9 @@ def _header(packet: bytes, kind: int, controls: int) -> Header:
 
 
 def unpack_state(packet: bytes, reaches: Sequence[Reach]) -> tuple[Header, Sample]:
-    """Return what a loader's packet holds; raises BadPacketError for one that is not used.
+    """Return the content of a loader's packet; raises BadPacketError if it cannot be used.
 
-    `reaches` has one element a control: what a measurement cannot exceed.
+    `reaches` has the bounds of each control's measurements.
     """
     header = _header(packet, STATE, len(reaches))
     found = []
@@ -106,7 +106,7 @@ def unpack_state(packet: bytes, reaches: Sequence[Reach]) -> tuple[Header, Sampl
 
 
 def unpack_orders(packet: bytes, controls: int) -> tuple[Header, tuple[Order, ...]]:
-    """Return what a host's packet holds; raises BadPacketError for one that is not used."""
+    """Return the content of a host's packet; raises BadPacketError if it cannot be used."""
     header = _header(packet, ORDER, controls)
     orders = tuple(
         Order(*_ORDER.unpack_from(packet, HEADER.size + i * _ORDER.size)) for i in range(controls)

@@ -1,9 +1,9 @@
 """A view in X-Plane 11 or later: its UDP message VEHX, 45 bytes, little-endian.
 
-The layout is as XPPython3's documentation describes it ("VEHX - Drive X-Planes Visuals"), and as
-libXPlane-UDP-Client's issue 3 packs it: which aircraft, latitude, longitude and elevation, true
-heading, pitch and roll. By the former X-Plane then no longer flies that aircraft itself. Laminar
-Research's own text was not read, and this was not tried with X-Plane.
+The layout is that of XPPython3's documentation ("VEHX - Drive X-Planes Visuals") and of issue 3 of
+libXPlane-UDP-Client: aircraft, latitude, longitude and elevation, true heading, pitch and roll.
+According to the former, X-Plane then no longer flies that aircraft itself. Laminar Research's own
+text was not read, and this was not tried with X-Plane.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The names of controls, and of a record's channels; each channel ends in its unit.
 
-Those of a control come from the rig, those of the motion from the airframe. A bench
-record has of the motion only the dynamic pressure that the host was given. Channels of
-sensors hold what is read; `hand_force` is what the pilot feels, whatever the gauge reads.
+The channels of a control come from the rig, those of the motion from the airframe. A bench record
+has no motion except the dynamic pressure given to the host. Channels of sensors hold readings;
+`hand_force` is the true force of the hand.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ def unit_of(control: str) -> str:
 
 TIME = "time_s"
 
-# Of a live record: how far each row can be used, and the loader's own time of its sample.
+# Of a live record: the validity of each row, and the loader's own time of its sample.
 VALIDITY = "validity"
 LOADER_TIME = "loader_time_s"
-# Values of the channel `validity`, the first that applies from the left: of a row that is
-# LOST      the loader was silent for longer than the watchdog's time: its last sample is repeated
-# REPEATED  no new sample came since the row before: its sample is repeated
-# FADED     the forces ordered were not those of the rig: they faded, or a limit held them
-# SWITCHED  flown with other settings than the flight began with, which the manifest lists
+# Values of the channel `validity`; the first that applies from the left:
+# LOST      no answer of the loader for longer than the watchdog's time: its last sample is repeated
+# REPEATED  no new sample since the row before: its sample is repeated
+# FADED     the forces ordered were not those of the rig: they were faded or limited
+# SWITCHED  flown with other settings than at the start, which the manifest lists
 FRESH, REPEATED, LOST, FADED, SWITCHED = range(5)
 
 # In the order in which the frame kernel writes them; d is m, or rad for a wheel.
@@ -43,14 +43,14 @@ _CONTROL = (
     "estimate_{d}",
     "gradient_N_per_{d}",
     "modifying_force_N",
-    "force_step_N",  # the jump of F_mod at this frame, which the hand feels
-    "surface_norm",  # command about trim over the frame to come, JSBSim's sign
-    "stop",  # the stop met over the frame before: −1, 0 or +1
-    "hand_force_N",  # F as the hand holds it; `force` is what the strain gauge says of it
+    "force_step_N",  # the jump of F_mod at this frame
+    "surface_norm",  # command about trim over the next frame, JSBSim's sign
+    "stop",  # the stop reached over the frame before: −1, 0 or +1
+    "hand_force_N",  # the true F of the hand; `force` is the strain gauge's reading
 )
 _NOISY = (0, 1, 2, 5)
 
-# What a control turns the aircraft about, as a rate and as an angle.
+# The aircraft's rotation by each control, as a rate and as an angle.
 RATE: dict[ControlName, str] = {
     "column": "pitch_rate_rad_per_s",
     "wheel": "roll_rate_rad_per_s",
@@ -72,7 +72,7 @@ LONGITUDINAL = (
     "true_airspeed_m_per_s",
     "altitude_m",
 )
-# Their places in the motion, which the airframe gives in this order.
+# Their indices in the motion, which the airframe gives in this order.
 PRESSURE = LONGITUDINAL.index("dynamic_pressure_Pa")
 LOAD = LONGITUDINAL.index("load_factor")
 ELEVATOR = LONGITUDINAL.index("elevator_rad")
@@ -90,7 +90,7 @@ LATERAL = (
     "roll_rad",
     "heading_rad",
 )
-WHOLE_MOTION = len(LONGITUDINAL) + len(LATERAL)  # what the rig's frame is given, on any rig
+WHOLE_MOTION = len(LONGITUDINAL) + len(LATERAL)  # input of the rig's frame, on any rig
 # In the motion of a rig with wheel or pedals they follow the longitudinal ones.
 ROLL = len(LONGITUDINAL) + LATERAL.index("roll_rad")
 HEADING = len(LONGITUDINAL) + LATERAL.index("heading_rad")
@@ -111,7 +111,7 @@ def control_channels(control: str) -> tuple[str, ...]:
 
 
 def channel(control: str, quantity: str) -> str:
-    """Return the channel of a control's quantity, as `channel("wheel", "computed")`."""
+    """Return the channel of a control's quantity, for example `channel("wheel", "computed")`."""
     for name, plain in zip(control_channels(control), _CONTROL, strict=True):
         if plain.split("_{d}")[0].split("_N")[0] == quantity:
             return name
@@ -127,13 +127,13 @@ def record_channels(controls: Sequence[str], flown: bool) -> tuple[str, ...]:
 
 
 def noisy_channels(controls: Sequence[str], flown: bool) -> list[str]:
-    """Return the channels that a sensor reads, and that noise may be given for."""
+    """Return the channels of sensors, for which noise may be given."""
     names = [control_channels(control)[i] for control in controls for i in _NOISY]
     return names + list(motion_channels(controls, flown))
 
 
 def control_named(word: str, file: object) -> ControlName:
-    """Return the control of a word; raise InputError for another, naming a file."""
+    """Return the control of a word; raises InputError for another, with the file."""
     for name in CONTROL_NAMES:
         if name == word:
             return name

@@ -1,4 +1,4 @@
-"""Tables of numbers from and to CSV and Parquet; a fault names the file, the column, the row."""
+"""Tables of numbers in CSV and Parquet; a fault names the file, the column and the row."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ Floats = NDArray[np.float64]
 def read_columns(path: Path, gaps: bool = False, torn: bool = False) -> dict[str, Floats]:
     """Return a table's columns by name, as doubles.
 
-    An empty cell is NaN where `gaps` are allowed, and a fault where not. A `torn` CSV file is one
-    that was being written when its program or machine stopped: a last line that is not whole is
-    left out.
+    An empty cell is NaN if `gaps` are allowed, and otherwise a fault. A `torn` CSV file may end in
+    an incomplete line, since its writer was stopped; that line is left out.
     """
     import polars as pl
 
@@ -47,7 +46,7 @@ def read_columns(path: Path, gaps: bool = False, torn: bool = False) -> dict[str
 
 
 def write_table(frame: pl.DataFrame, path: Path) -> None:
-    """Write a table whole, as Parquet where the file's extension says so, else as CSV."""
+    """Write a table atomically, as Parquet by the file's extension, else as CSV."""
     import polars as pl
 
     def write(part: Path) -> None:
@@ -57,19 +56,19 @@ def write_table(frame: pl.DataFrame, path: Path) -> None:
                     frame.write_parquet(file)
                 else:
                     frame.write_csv(file)
-            except pl.exceptions.PolarsError as error:  # so it calls a full disk
+            except pl.exceptions.PolarsError as error:  # also raised for a full disk
                 raise OSError(first_line(error)) from None
 
     write_whole(path, write)
 
 
 def first_line(error: BaseException) -> str:
-    """Return the first line of what an error says, or its kind where it says nothing."""
+    """Return the first line of an error's text, or its class if the text is empty."""
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def check_numeric(path: Path, name: str, column: pl.Series) -> None:
-    """Refuse a column that holds neither numbers nor text: lists, dates, bytes, categories."""
+    """Refuse a column with neither numbers nor text: lists, dates, bytes, categories."""
     import polars as pl
 
     kind = column.dtype
@@ -87,8 +86,8 @@ def numbers(
 ) -> Floats:
     """Return a column as doubles, shape (rows,).
 
-    Text is read as numbers; an empty cell is NaN where `gaps` are allowed. `line` tells
-    where a row, counted from 0, stands in the file; no number may exceed `largest`.
+    Text is parsed as numbers; an empty cell is NaN if `gaps` are allowed. `line` returns the line
+    in the file of a row counted from 0. No number may exceed `largest`.
     """
     import polars as pl
 

@@ -1,7 +1,7 @@
 """A record: the time history of a flight or of a rig, its channels named with their units.
 
-CSV by default, Parquet by extension. A manifest beside it, in JSON, says what made
-it: versions, the hashes of what went in, the seed, and what happened on the way.
+CSV by default, Parquet by extension. A manifest beside it, in JSON, has its origin: versions,
+hashes of the inputs, the seed, and events.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet")
-FORMAT = 1  # of a record and its manifest; one without is from before this was written
+FORMAT = 1  # of a record and its manifest; earlier ones have none
 
 
 @runtime_checkable
@@ -67,10 +67,9 @@ class EndedEarly:
 class Record:
     """Channels over time: `data` has shape (rows, channels), SI, one row a frame.
 
-    `record["column_force_N"]` is a channel, shape (rows,); a name that is not there raises an
-    InputError, which is a KeyError too, with the nearest. Each channel's unit ends its name; a
-    pull, right wheel and right pedal are positive. `manifest` says what made the record.
-
+    `record["column_force_N"]` is a channel, shape (rows,); an unknown name raises an InputError,
+    which is also a KeyError, with the nearest name. Each channel's unit ends its name; a pull,
+    right wheel and right pedal are positive. `manifest` is the origin of the record.
     >>> import coupled
     >>> record = coupled.fly("t37", column=coupled.Step(force_N=20), duration_s=2).record
     >>> record
@@ -99,10 +98,10 @@ class Record:
 
     @classmethod
     def from_frame(cls, frame: DataFrame) -> Record:
-        """Return the record of a DataFrame of polars or pandas, a column a channel, SI.
+        """Return the record of a DataFrame of polars or pandas, a column for each channel, SI.
 
-        `time_s` is a column or the index, and must rise; a null is NaN. Raises InputError, naming
-        the column.
+        `time_s` is a column or the index, and must rise; a null is NaN. Raises InputError with the
+        column.
 
         >>> import coupled, polars
         >>> frame = polars.DataFrame({"time_s": [0.0, 0.01], "column_force_N": [0.0, 1.5]})
@@ -142,7 +141,7 @@ class Record:
 
     @property
     def ended_early(self) -> EndedEarly | None:
-        """Why and when the flight ended before its time, by the manifest; None if it did not."""
+        """Why and when the flight ended early, by the manifest; None if it did not."""
         ended = self.manifest.get("ended_early")
         if not isinstance(ended, Mapping):
             return None
@@ -157,25 +156,25 @@ class Record:
         return Record(self.channels, self.data[rows], self.manifest)
 
     def rows(self, first: int, last: int) -> Record:
-        """Return the rows from number `first`, counted from 0, to before `last`."""
+        """Return the rows from `first`, counted from 0, to before `last`."""
         return Record(self.channels, self.data[first:last], self.manifest)
 
     def to_polars(self) -> pl.DataFrame:
-        """Return the rows as a polars DataFrame, a column a channel, SI."""
+        """Return the rows as a polars DataFrame, a column for each channel, SI."""
         import polars as pl
 
         return pl.DataFrame(self.data, schema=list(self.channels), orient="row")
 
     def to_pandas(self) -> Any:
-        """Return the rows as a pandas DataFrame; raises InputError where pandas lacks."""
+        """Return the rows as a pandas DataFrame; raises InputError without pandas."""
         return pandas_frame(self.to_polars())
 
     def plot(self, *channels: str, title: str = "") -> Figure:
         """Return a matplotlib Figure of the channels over time, one below the other.
 
-        Without channels: each control's force and deflection, its surface, and the motion, in
-        the units of the field. A notebook shows what is returned; `.savefig(path)` writes it.
-        Raises InputError for a channel that is not there.
+        By default: each control's force and deflection, its surface, and the motion, in usual
+        units. A notebook shows the returned figure; `.savefig(path)` writes it. Raises InputError
+        for an unknown channel.
         """
         from coupled.plots.histories import draw_channels, draw_record
 
@@ -190,7 +189,7 @@ def frame_of(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
 
 
 def pandas_frame(frame: pl.DataFrame) -> Any:
-    """Return a frame of polars as one of pandas; raises InputError where pandas lacks."""
+    """Return a polars DataFrame as a pandas one; raises InputError without pandas."""
     try:
         pandas: Any = importlib.import_module("pandas")
     except ImportError:
@@ -200,12 +199,12 @@ def pandas_frame(frame: pl.DataFrame) -> Any:
 
 
 def manifest_path(path: Path) -> Path:
-    """Return where the manifest of a record lies."""
+    """Return the path of a record's manifest."""
     return path.with_suffix(".manifest.json")
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a record's path whose extension names no format."""
+    """Refuse a record's path with an extension of another format."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(path, "", f"a record ends in {' or '.join(SUFFIXES)}")
 
@@ -221,7 +220,7 @@ def write_record(record: Record, path: Path) -> None:
 
 
 def read_record(path: Path) -> Record:
-    """Return the record of a file, with its manifest where there is one."""
+    """Return the record of a file, with its manifest if there is one."""
     check_suffix(path)
     manifest = _read_manifest(manifest_path(path))
     live = manifest.get("live")
@@ -273,7 +272,7 @@ def _with_gaps(values: NDArray[Any], name: str) -> Floats:
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
-    """Return a record's manifest; nothing where there is none, or one of another program."""
+    """Return a record's manifest; empty if there is none, or one of another program."""
     try:
         path.lstat()
     except OSError:

@@ -1,1 +1,1 @@
-"""The control-loading rig: its data and its physics, one module a stage of the signal chain."""
+"""The control-loading rig: its data and its physics, one module for each stage of the chain."""

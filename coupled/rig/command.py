@@ -1,6 +1,6 @@
-"""Command: what the servo is given of δc: as it runs, or as set points, and how late.
+"""Command: the servo's input from δc, continuous or as set points, with its delay.
 
-A digital servo takes a set point once a frame and holds it; a bus and its own cycle make it late.
+A digital servo takes a set point once a frame and holds it; a bus and the servo's cycle delay it.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from coupled.rig.delay import DelayParameters, DelayState, delayed, start_delay
 
 
 class CommandParameters(DelayParameters, Protocol):
-    """How the servo is commanded; `delay_substeps` is its dead time over the substep."""
+    """The servo's command; `delay_substeps` is its dead time over the substep."""
 
     held: int  # as set points, each held over a frame
 
 
 class CommandState(DelayState, Protocol):
-    """What the servo has been given; `delayed` is the latest, d."""
+    """The servo's input; `delayed` is the latest, d."""
 
     set_point: float  # of this frame, d
 
 
 @stage
 def start_command(p: CommandParameters, s: CommandState, computed: float) -> None:
-    """Begin where the servo has stood at δc for long, d."""
+    """Start with the servo at rest at δc, d."""
     s.set_point = computed
     start_delay(p, s, computed, computed)
 
 
 @stage
 def take_set_point(p: CommandParameters, s: CommandState, computed: float) -> None:
-    """Give the servo its set point for a frame, d."""
+    """Set the servo's set point for a frame, d."""
     s.set_point = computed
 
 
@@ -40,7 +40,7 @@ def take_set_point(p: CommandParameters, s: CommandState, computed: float) -> No
 def commanded(
     p: CommandParameters, s: CommandState, computed_before: float, computed: float
 ) -> tuple[float, float]:
-    """Return what the servo is given at both ends of a substep, d, straight between.
+    """Return the servo's input at both ends of a substep, d, linear between them.
 
     A new set point is reached over the first substep of its frame.
     """

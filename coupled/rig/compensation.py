@@ -2,8 +2,8 @@
 
 δ̂ = δc + K̂·F      eq. (1) solved for δ, with the host's own K̂
 
-A host may miss frames, each with the same chance. In one that it misses it reads nothing and sets
-nothing: G_T, and so ΔG, a digital product, and δ̂ stay those of the frame before.
+A host may miss frames at random. In a missed frame it reads nothing and sets nothing: G_T, and so
+ΔG, a digital product, and δ̂ keep their last values.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ true_deflection = stage(equations.true_deflection)
 
 
 class CompensationParameters(Protocol):
-    """What the host assumes of the bend."""
+    """The host's assumptions on the bend."""
 
-    bend: float  # K̂, d/N; 0 where the deflection correction is off
+    bend: float  # K̂, d/N; 0 if the deflection correction is off
     missed_share: float  # of the host's frames
 
 
 class CompensationState(Protocol):
-    """What the host had and made in the last frame that it did not miss."""
+    """The host's inputs and outputs of the last frame that it did not miss."""
 
     first: float  # G_T, N/d, and that beyond the break
     second: float
     computed: float  # δc as read, d
     estimated: float  # δ̂, d
-    drawn: int  # the last number drawn; 0 before the first frame
+    drawn: int  # the last random number; 0 before the first frame
 
 
 COMPENSATION = Declaration(
@@ -47,9 +47,9 @@ SEED = 20011
 
 @stage
 def misses(p: CompensationParameters, s: CompensationState) -> bool:
-    """Tell whether the host misses the frame that begins, by the next number of its generator.
+    """Tell whether the host misses the next frame, by the next number of its generator.
 
-    Each flight draws the same; the first frame is never missed.
+    The sequence is the same in each flight; the first frame is never missed.
     """
     if p.missed_share == 0.0:
         return False

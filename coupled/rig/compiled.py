@@ -1,10 +1,9 @@
 """How the stages are compiled.
 
-Two decorators: `stage` for a function that other kernels call, `entry` for one
-that Python calls and whose machine code is kept on disk. numba looks only at an
-entry's own file to see whether its cache is stale, which would fly old physics
-after an edit of a stage; so the cache lies in a folder named by a hash of all
-sources in `coupled/rig`, and of those beside the entry.
+Two decorators: `stage` for a function that other kernels call, `entry` for one that Python calls,
+whose machine code is cached on disk. numba checks only an entry's own file to invalidate its cache,
+and would use old code after an edit of a stage. So the cache is in a folder named by a hash of all
+sources in `coupled/rig` and of those beside the entry.
 """
 
 from __future__ import annotations
@@ -28,22 +27,22 @@ from numba.extending import intrinsic
 
 from coupled.timing import timed
 
-# Below this a decaying state is at rest; further down subnormal numbers slow the processor.
+# A smaller state of a decay is at rest; subnormal numbers would slow the processor.
 TINY = 1e-100
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _call(stage: Any, *arguments: Any) -> Any:
-    """Call a stage from Python: it is compiled once more, by itself."""
+    """Call a stage from Python, which compiles it separately."""
     if not hasattr(stage, "alone"):
         stage.alone = numba.njit(stage.py_func)
     return stage.alone(*arguments)
 
 
-# A function that is inlined into the entries, without what only a call from Python needs. LLVM by
-# itself inlines less, and loads a control's numbers anew at every call: a frame takes 1.3 times as
-# long. The interface to Python would be a quarter of the time and the memory of a compilation.
+# A function inlined into the entries, without its interface to Python. LLVM by itself inlines less,
+# and reloads a control's numbers at every call: a frame takes 1.3 times as long. The interface to
+# Python would take a quarter of the time and the memory of a compilation.
 _Stage: Any = type("_Stage", (CPUDispatcher,), {"__call__": _call})
 _INLINED = {
     "nopython": True,
@@ -61,16 +60,16 @@ def stage(function: F) -> F:
 
 
 def seldom(function: F) -> F:
-    """Compile a stage that few rigs need: what it does is not in the way of what all do."""
+    """Compile a stage that few rigs need, not inlined, so as not to slow the common path."""
     if config.DISABLE_JIT:
         return function
     return cast(F, _Stage(py_func=function, targetoptions={**_INLINED, "forceinline": False}))
 
 
 def entry(function: F, nogil: bool = False) -> F:
-    """Compile a function that Python calls, and keep the result on disk.
+    """Compile a function that Python calls, and cache the result on disk.
 
-    Where no folder can be written (a read-only install without a writable home, and no
+    If no folder can be written (a read-only install without a writable home, and no
     NUMBA_CACHE_DIR set) it is compiled at its first call in every process instead.
     """
     chosen = config.CACHE_DIR
@@ -79,22 +78,22 @@ def entry(function: F, nogil: bool = False) -> F:
         dispatcher = numba.njit(function, nogil=nogil)
         dispatcher._cache = _kept(function)
         return cast(F, dispatcher)
-    except RuntimeError:  # numba's, for a function without a place for its cache
+    except RuntimeError:  # numba's, if there is no place for a cache
         return cast(F, numba.njit(function, nogil=nogil))
     finally:
         config.CACHE_DIR = chosen
 
 
 def long_entry(function: F) -> F:
-    """Compile an entry during which other threads run; a short one would lose by handing over."""
+    """Compile an entry that releases the GIL; not worthwhile for a short one."""
     return entry(function, nogil=True)
 
 
 def _kept(function: Callable[..., Any]) -> Any:
-    """Return a cache that loads machine code without what only a compilation needs.
+    """Return a cache that loads machine code without the data of a compilation.
 
-    numba first loads all that it knows of types and of linear algebra, which takes longer than
-    the rest of a start; machine code needs none of it but the functions of its memory.
+    numba first loads all that it knows of types and of linear algebra, which takes longer than the
+    rest of a start; machine code needs only the functions of its memory.
     """
     cache: Any = FunctionCache(function)
 
@@ -111,8 +110,8 @@ def _kept(function: Callable[..., Any]) -> Any:
 def bound(kernel: F, *arguments: Any) -> F:
     """Return an entry's machine code for arguments of these types.
 
-    Calling it saves numba's search by the arguments' types, which at every frame costs as
-    much as the physics. It takes arguments of just these types and no others.
+    Calling it avoids numba's dispatch by the arguments' types, which at every frame costs as much
+    as the physics. It accepts only arguments of these types.
     """
     dispatcher: Any = kernel
     with timed("kernels"):
@@ -147,7 +146,7 @@ carray: Any = numba.carray
 
 
 def machine_code(kernel: Any, *arguments: Any) -> int:
-    """Return where an entry's machine code lies, for `call_at`; it raises no error."""
+    """Return the address of an entry's machine code, for `call_at`; it raises no error."""
     bound(kernel, *arguments)
     compiled = kernel.overloads[tuple(_type_of(argument) for argument in arguments)]
     name = compiled.fndesc.llvm_cfunc_wrapper_name
@@ -155,7 +154,7 @@ def machine_code(kernel: Any, *arguments: Any) -> int:
 
 
 def _type_of(argument: Any) -> Any:
-    """Return an argument's type; numba takes milliseconds over the layout of a control."""
+    """Return an argument's type, cached; numba takes milliseconds for a control's layout."""
     if isinstance(argument, np.ndarray) and argument.flags.c_contiguous:
         return _type_of_array(argument.dtype, argument.ndim)
     return numba.typeof(argument)
@@ -167,7 +166,7 @@ def _type_of_array(dtype: np.dtype[Any], dimensions: int) -> Any:
 
 
 def _cache_folder(chosen: str, beside: Path) -> str:
-    """Folder for this version of the physics, or numba's own choice if ours is read-only."""
+    """Return the folder of this version of the physics, or numba's own if ours is read-only."""
     folder = _folder_of_version(chosen, beside)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -177,7 +176,7 @@ def _cache_folder(chosen: str, beside: Path) -> str:
 
 
 def compiled_before(kernel: Any) -> bool:
-    """Tell whether an entry's machine code is on disk, so that no compilation is to come."""
+    """Tell whether an entry's machine code is on disk, so that it need not be compiled."""
     cache = getattr(kernel, "_cache", None)
     folder = Path(str(getattr(cache, "cache_path", "")))
     return any(folder.glob(f"*.{kernel.py_func.__name__}-*.nbc"))

@@ -1,8 +1,8 @@
-"""One control of the rig as the kernels hold it: its stages, listed once.
+"""One control of the rig in the kernels: its stages, listed once.
 
-`ControlParameters` is that list, in the order of the signal chain: each stage's parameters, and
-the declaration that says how they are laid out and from what they are made. `ControlState` says
-to the type checker what the kernels see of those that have a state.
+`ControlParameters` is that list, in the order of the signal chain: each stage's parameters, with
+the declaration of their layout and origin. `ControlState` has the stages with a state, for the type
+checker.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from coupled.rig.declaration import Declaration
 
 
 class Clock(Protocol):
-    """How the loader's time divides a frame."""
+    """The loader's time step within a frame."""
 
     substeps: int
     substep: float  # s
@@ -46,7 +46,7 @@ CLOCK = Declaration(
 
 
 class ControlParameters(Protocol):
-    """Parameters of every stage, and its declaration, in the order of the signal chain."""
+    """Parameters of every stage, with their declarations, in the order of the signal chain."""
 
     clock: Annotated[Clock, CLOCK]
     hand: Annotated[hand.HandParameters, hand.HAND]
@@ -84,7 +84,7 @@ class ControlState(Protocol):
 
 
 class Control(Protocol):
-    """One control, whole."""
+    """One control: its parameters and its state."""
 
     parameters: ControlParameters
     state: ControlState
@@ -98,5 +98,5 @@ CONTROL_PARAMETERS = np.dtype([(name, one.parameters) for name, one in STAGES.it
 CONTROL_STATE = np.dtype([(n, one.state) for n, one in STAGES.items() if one.state is not None])
 CONTROL = np.dtype([("parameters", CONTROL_PARAMETERS), ("state", CONTROL_STATE)])
 
-# An array of that layout, one element a control; a kernel sees an element as a `Control`.
+# An array of that layout, one element for each control; a kernel sees an element as a `Control`.
 ControlArray = NDArray[np.void]

@@ -1,14 +1,14 @@
-"""Crossing: what other controls' forces bend at this one, and what the host adds for it.
+"""Crossing: the bend at this control by forces on others, and the host's correction for it.
 
     δ_i = x_i + K_ii·F_i + Σ_j K_ij·F_j        the structure's part, in `linkage`
     δ̂_i = δc_i + K̂_ii·F_i + Σ_j K̂_ij·F_j       the host's, in its estimate
 
-A share of another control's force may reach this loader, too (crosstalk): of the wheel's, which
-sits on the column and pulls at the pedals; on the wheel, of the column's. Where the rig has not
-that one, it is the third's; the gauge reads none of it.
+A share of another control's force may also act on this loader (crosstalk): of the wheel's force,
+since the wheel is mounted on the column, on column and pedals; on the wheel, of the column's. If
+the rig lacks that control, the share is of the third's. The gauge does not measure it.
 
-At every node of the loaders, one control after the other, each with the others' latest forces
-(Gauss and Seidel's order: it settles between stiff hands for every structure that takes work).
+It is computed at every node of the loaders, one control after the other, each with the others'
+latest forces (Gauss-Seidel, which converges between stiff hands for every passive structure).
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ MOST = 3  # controls of a rig
 
 
 class CrossingParameters(Protocol):
-    """One row of the structure's compliance, controls in the rig's order; its own place 0."""
+    """One row of the structure's compliance, controls in the rig's order; its own element is 0."""
 
     joined: int  # whether any control of the rig has such a term
     bends: NDArray[np.float64]  # K_ij, d/N
-    assumed: NDArray[np.float64]  # K̂_ij, d/N; 0 where the deflection correction is off
-    leaks: NDArray[np.float64]  # the shares of their forces that reach this loader
+    assumed: NDArray[np.float64]  # K̂_ij, d/N; 0 if the deflection correction is off
+    leaks: NDArray[np.float64]  # shares of their forces that act on this loader
 
 
 class CrossingState(Protocol):
-    """What the host has of the others at t_k."""
+    """The host's data on the other controls at t_k."""
 
     read: float  # F of this control as the host reads it, N
     estimated: float  # Σ_j K̂_ij·F_j, d
@@ -55,7 +55,7 @@ CROSSING = Declaration(
 
 
 def leaking(control: str) -> tuple[ControlName, ControlName]:
-    """Return the controls whose force may leak into a control's loader, the likeliest first."""
+    """Return the controls whose force may act on a control's loader, the first choice first."""
     first: dict[str, tuple[ControlName, ControlName]] = {
         "column": ("wheel", "pedals"),
         "wheel": ("column", "pedals"),
@@ -65,7 +65,7 @@ def leaking(control: str) -> tuple[ControlName, ControlName]:
 
 
 def leaks(control: str, share: float, names: Sequence[str]) -> tuple[float, ...]:
-    """Return the share of each named control's force that reaches a control's loader."""
+    """Return the share of each named control's force that acts on a control's loader."""
     source = next((one for one in leaking(control) if one in names), None)
     return tuple(share if name == source else 0.0 for name in names)
 

@@ -1,9 +1,8 @@
-"""How a stage declares its part of a control: its numbers, and where each comes from.
+"""A stage's declaration of its part of a control: its numbers and their origin.
 
-A stage's kernels see two classes of numbers, its parameters and its state. A parameter that
-has the name of a field of the rig's section is that field; any other is derived by a function
-that stands beside the stage. `control` lists the declarations, once; layouts, packing and what
-else goes through all stages follow from that list.
+A stage's kernels see two classes of numbers, its parameters and its state. A parameter with the
+name of a field of the rig's section is that field; any other is computed by a function of the
+stage's module. `control` lists the declarations once; layouts and packing follow from that list.
 """
 
 from __future__ import annotations
@@ -18,17 +17,16 @@ from numpy.typing import ArrayLike
 
 from coupled.rig.parameters import Control
 
-Ends = tuple[float, float]  # where a control stops, at its travel or sooner: least and greatest, d
+Ends = tuple[float, float]  # stops of a control, at its travel or within it: least and greatest, d
 
 
 @dataclass(frozen=True)
 class Hand:
-    """The impedance of a hand on one control; all zero is a hand that only pushes.
+    """The impedance of a hand on one control; all zero is a hand with a given force only.
 
-    stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s.
-    `mass`, kg (N per d/s²), is the arm's at the grip.
-    `strongest` (0: no limit) and `lasting`, N, can be held for `endurance_s` and for any time.
-    `reach`, d (0: none), is how far it goes.
+    stiffness in N/d, damping in N·s/d, integral in N/(d·s), muscle lag in s. `mass`, kg (N per
+    d/s²), is the arm's at the grip. `strongest` (0: no limit) can be held for `endurance_s`,
+    `lasting` for any time, N. `reach`, d (0: none), is the hand's largest deflection.
     """
 
     stiffness: float = 0.0
@@ -44,17 +42,17 @@ class Hand:
 
 @dataclass(frozen=True)
 class Given:
-    """What a control's parameters are made from; times in s, the substep being the loader's."""
+    """The inputs of a control's parameters; times in s, the substep being the loader's."""
 
     control: Control
     hand: Hand
     frame_s: float
     substep_s: float
     substeps: int
-    joined: bool = False  # a control's force acts at another, or its host thinks so
-    bends: tuple[float, ...] = ()  # d/N that each control's force bends here, its own left out
-    assumed: tuple[float, ...] = ()  # and what the host takes them for
-    leaks: tuple[float, ...] = ()  # the shares of their forces that reach this loader
+    joined: bool = False  # forces act between controls, in the structure or for the host
+    bends: tuple[float, ...] = ()  # d/N, bend here by each control's force, its own left out
+    assumed: tuple[float, ...] = ()  # the same as assumed by the host
+    leaks: tuple[float, ...] = ()  # shares of their forces that act on this loader
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class Declaration:
     fixed: tuple[str, ...] = ()
 
     def value(self, name: str, given: Given) -> ArrayLike:
-        """Return the value of a parameter; AttributeError where the rig has none of that name."""
+        """Return the value of a parameter; AttributeError if the rig has no such name."""
         if name in self.derived:
             return self.derived[name](given)
         value: ArrayLike = getattr(self._holder(given), name)
@@ -88,7 +86,7 @@ class Declaration:
         return tuple([own[n](given) if n in own else getattr(holder, n) for n in names])
 
     def _holder(self, given: Given) -> Any:
-        """Return the part of the rig that the stage's own parameters are fields of."""
+        """Return the part of the rig whose fields are the stage's own parameters."""
         holder: Any = given
         for part in self.section.split("."):
             holder = getattr(holder, part)
@@ -96,5 +94,5 @@ class Declaration:
 
 
 def first_order_gain(lag_s: float, step_s: float) -> float:
-    """Return the share of the way that a first-order lag goes in a step; 1 without lag."""
+    """Return the step response of a first-order lag after one step; 1 without lag."""
     return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Delay: what a stage is given reaches it late, straight between past nodes."""
+"""Delay: a stage's input with a dead time, linear between past nodes."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from coupled.rig.parameters import DELAY_SLOTS
 
 
 class DelayParameters(Protocol):
-    """How late it is."""
+    """The dead time."""
 
     delay_substeps: float  # the delay over the substep
 
 
 class DelayState(Protocol):
-    """What is on its way."""
+    """The history of the delayed signal."""
 
-    delayed: float  # as the stage has it
-    before_start: float  # what was there before the first node
+    delayed: float  # latest output
+    before_start: float  # value before the first node
     node: int  # substeps since the start
     history: NDArray[np.float64]  # at past nodes
 
 
 @stage
 def start_delay(p: DelayParameters, s: DelayState, given: float, before: float) -> None:
-    """Begin with what is given at the first node, and what was there before it."""
+    """Start with the input at the first node, and the value before it."""
     s.history[0] = given
     s.before_start = before
     s.delayed = given if p.delay_substeps == 0.0 else before
@@ -36,7 +36,7 @@ def start_delay(p: DelayParameters, s: DelayState, given: float, before: float) 
 
 @stage
 def delayed(p: DelayParameters, s: DelayState, given: float) -> float:
-    """Return what is given at the next node as the stage gets it."""
+    """Return the delayed input at the next node."""
     s.node += 1
     if p.delay_substeps == 0.0:
         return given

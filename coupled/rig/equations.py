@@ -5,9 +5,9 @@
     (8)  F_L = G_B·δc              (9)  F_mod = F − F_L      (10) F_mod = G_T·δ − G_B·δc
     (11) F_mod = ΔG·δc             (12) ΔG = G_T/(1 − K·G_T) − G_B
 
-Each works on numbers and on arrays; the kernels compile the same functions (`stage`), so
-none stands anywhere else. d is m, or rad for a wheel: δ and δc in d, F in N, gradients in
-N/d, K in d/N. This module does without a compiler, so that a reader of data has it at once.
+Each works on numbers and on arrays. The kernels compile the same functions (`stage`), so that each
+equation is in one place only. d is m, or rad for a wheel: δ and δc in d, F in N, gradients in N/d,
+K in d/N. This module needs no compiler, so that it is imported quickly.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ N = TypeVar("N", float, Floats)
 
 
 def specified_gradient(schedule: Schedule, pressure_Pa: N) -> N:
-    """Return the G_T in N/d that a rig's table specifies at q̄; of the shape of q̄.
+    """Return the G_T in N/d of a rig's table at q̄; of the shape of q̄.
 
-    Linear between the table's rows and held at its ends; below the break, where there is one.
-    The table as it is: what may be wrong with its use (`slope`, `pressure_scale`) is left out.
+    Linear between the table's rows and constant beyond; below the break, if there is one. The
+    table as filed: faults of its use (`slope`, `pressure_scale`) are left out.
     """
     return _looked_up(schedule.dynamic_pressure, schedule.total_gradient, pressure_Pa)
 
 
 def second_gradient(schedule: Schedule, pressure_Pa: N) -> N:
-    """Return the slope in N/d specified beyond the break; G_T where there is one segment."""
+    """Return the slope in N/d of the table beyond the break; G_T if there is one segment."""
     table = schedule.second_gradient or schedule.total_gradient
     return _looked_up(schedule.dynamic_pressure, table, pressure_Pa)
 
@@ -73,7 +73,7 @@ def true_deflection(computed: N, force: N, bend: float) -> N:
 
 
 def seen_deflection(deflection: N, bend: float, gradient: float) -> N:
-    """Return δc in d where the pilot feels F = `gradient`·δ: eq. (7)."""
+    """Return δc in d if the pilot feels F = `gradient`·δ: eq. (7)."""
     return computed_deflection(deflection, gradient * deflection, bend)
 
 
@@ -88,7 +88,7 @@ def volts_of_computed(scale: float, deflection: N, force: N, bend: float) -> N:
 
 
 def bend_loss(bend: float, gradient: N) -> N:
-    """Return the share of the deflection lost when the pilot feels `gradient`: eq. (7a).
+    """Return the lost share of the deflection if the pilot feels `gradient`: eq. (7a).
 
     K in d/N, G_T in N/d, without unit; the host takes δc for δ.
     """
@@ -96,23 +96,23 @@ def bend_loss(bend: float, gradient: N) -> N:
 
 
 def low_calibration_loss(bend: float, gradient: N, low: float) -> N:
-    """Return the share lost by a host whose S₁ was found at a low gradient: eq. (7a) as flown.
+    """Return the lost share for a host whose S₁ was calibrated at a low gradient: eq. (7a).
 
-    Where `low` G₀ is felt, v₁ = S₁·(1 − K·G₀)·δ; taken for the scale of δ, that has the bend at
-    G₀ in it. Where `gradient` G_T is felt, K·(G_T − G₀)/(1 − K·G₀) of δ is lost: nothing at G₀,
-    and below it the surface goes further than asked (a negative loss). Without unit, for K in
-    d/N and felt gradients in N/d; G₀ = 0 is `bend_loss`.
+    At a felt gradient `low` G₀, v₁ = S₁·(1 − K·G₀)·δ; taken for the scale of δ, it includes the
+    bend at G₀. At a felt `gradient` G_T the share K·(G_T − G₀)/(1 − K·G₀) of δ is lost: zero at G₀,
+    and negative below, where the surface exceeds the command. Without unit, for K in d/N and
+    felt gradients in N/d; with G₀ = 0 it is `bend_loss`.
     """
     return bend_loss(bend, gradient - low) / (1.0 - bend_loss(bend, low))
 
 
 def uncompensated_loss(bend: float, gradient: N) -> N:
-    """Return the share lost when the loader holds F = G_T·δc: K·G_T/(1 + K·G_T)."""
+    """Return the lost share if the loader holds F = G_T·δc: K·G_T/(1 + K·G_T)."""
     return bend * felt_gradient(gradient, bend)
 
 
 def felt_gradient(gradient: N, bend: float) -> N:
-    """Return F/δ in N/d where the loader holds F = `gradient`·δc: eqs. (1) and (8)."""
+    """Return F/δ in N/d if the loader holds F = `gradient`·δc: eqs. (1) and (8)."""
     return gradient / (1.0 + bend * gradient)
 
 
@@ -132,15 +132,15 @@ def modifying_force(gradient: N, bend: float, basic: float, computed: N) -> N:
 
 
 def basic_force(basic: float, computed: N) -> N:
-    """Return the force that the loader gives of itself, N: eq. (8)."""
+    """Return the loader's own force, N: eq. (8)."""
     return basic * computed
 
 
 def added_force(force: N, available: N) -> N:
-    """Return the F_mod needed, N, for a force wanted and the one available: eq. (9)."""
+    """Return the required F_mod, N, for a wanted force and the available one: eq. (9)."""
     return force - available
 
 
 def needed_force(gradient: N, deflection: N, basic: float, computed: N) -> N:
-    """Return the F_mod needed at δ, where the loader is at δc, N: eq. (10)."""
+    """Return the required F_mod at δ with the loader at δc, N: eq. (10)."""
     return added_force(gradient * deflection, basic_force(basic, computed))

@@ -1,6 +1,6 @@
-"""What ends a smooth stretch of the loader's motion, and when: rest, a stop, or neutral.
+"""Events that end a smooth interval of the loader's motion: rest, a stop, or neutral.
 
-Within a stretch the acceleration is constant, so an event is the root of a parabola.
+Within an interval the acceleration is constant, so the time of an event is the root of a parabola.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ NOTHING, REST, STOP, NEUTRAL = 0, 1, 2, 3
 
 @stage
 def sign(x: float) -> float:
-    """Return the side of a number, 0 of none."""
+    """Return the sign of a number, 0 for 0."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
 @stage
 def crossing(x0: float, v0: float, acceleration: float, target: float, span: float) -> float:
-    """Return the first time in (0, span] at which x0 + v0·t + a·t²/2 meets `target`."""
+    """Return the first time in (0, span] at which x0 + v0·t + a·t²/2 reaches `target`."""
     gap = target - x0
     root = v0 * v0 + 2.0 * acceleration * gap
     speed = math.sqrt(root) if root > 0.0 else 0.0
@@ -34,9 +34,9 @@ def crossing(x0: float, v0: float, acceleration: float, target: float, span: flo
 def first_event(
     x: float, v: float, dry: bool, breakout: float, halfway: float, span: float, ends: Ends
 ) -> tuple[float, int]:
-    """Return when a step of `span` seconds first meets an event, s, and which.
+    """Return the time of the first event in a step of `span` seconds, s, and its kind.
 
-    The step begins at δc = x at the rate v; `halfway` is the rate at its middle.
+    The step begins at δc = x with the rate v; `halfway` is the rate at its middle.
     """
     acceleration = 2.0 * (halfway - v) / span
     end, event = x + span * halfway, NOTHING

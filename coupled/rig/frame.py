@@ -1,7 +1,7 @@
 """One frame of the rig, all controls together, in the order of the signal chain.
 
-At t_k the host reads q̄, δc and F, sets ΔG and commands the surface; over the frame
-that follows, hand, loader and linkage run on at the loader's own rate.
+At t_k the host reads q̄, δc and F, sets ΔG and commands the surface. Over the following frame,
+hand, loader and linkage are stepped at the loader's own rate.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from coupled.rig.surface import command_surface
 
 Floats = NDArray[np.float64]
 
-# What the kernel records of each control, in this order; `record` names the channels.
+# Recorded by the kernel for each control, in this order; `record` names the channels.
 CHANNELS_PER_CONTROL = 10
-_ROUNDS = 24  # in which grips at their reach settle: terms of half the bends leave 1e-14 of a step
+_ROUNDS = 24  # iterations for grips at their reach: terms of half the bends leave 1e-14 of a step
 
 
 @stage
@@ -45,9 +45,9 @@ def set_product(
 ) -> float:
     """Set F_mod for the frame, through the host's converter, and return it at t_k in N.
 
-    A digital host sends the product of δc as it reads it, to be held; a hybrid one sends ΔG,
-    and the multiplier takes v₁ as the electronics make it of δc, whose scale `set_gradients`
-    has in ΔG (figure 5).
+    A digital host sends the product with δc as it reads it, to be held. A hybrid one sends ΔG, and
+    the multiplier uses the electronics' v₁, whose scale is included in ΔG by `set_gradients`
+    (figure 5).
     """
     if p.modification.digital:
         product = modifying_force(m, computed_read)
@@ -61,7 +61,7 @@ def set_product(
 
 @stage
 def sampled_force(p: ControlParameters, s: ControlState) -> float:
-    """Return the force that the host's converter has at t_k: the gauge's, as sampled, N."""
+    """Return the force in the host's converter at t_k: the gauge's, as sampled, N."""
     if p.sensing.skewed:
         return s.sensing.force
     return s.gauge.force if p.gauge.present else s.hand.force
@@ -76,11 +76,11 @@ def host_frame(
     pressure: float,
     out: Floats,
 ) -> float:
-    """Do what host and recorder do at t_k; return the surface command over the frame.
+    """Run host and recorder at t_k; return the surface command over the frame.
 
-    `out` are the channels of one control: F, δc, δ, δ̂, G_T, F_mod, the step that F_mod makes
-    here, the surface command, the stop met since the last frame, and the hand's own force. It
-    comes holding the noise of each: the first F is what the strain gauge reads.
+    `out` are the channels of one control: F, δc, δ, δ̂, G_T, F_mod, the jump of F_mod here, the
+    surface command, the stop reached since the last frame, and the hand's own force. On entry it
+    contains the noise of each. The first F is the strain gauge's reading.
     """
     computed, neutral = s.loader.computed, s.loader.neutral
     m = s.modification
@@ -131,7 +131,7 @@ def host_frame(
 def angle_of_attack(motion: tuple[float, ...]) -> float:
     """Return α of a motion, rad; 0 on a bench, whose motion has none."""
     alpha = 0.0
-    for i in range(len(motion)):  # an index beyond a bench's would not compile
+    for i in range(len(motion)):  # a constant index beyond a bench's motion would not compile
         if i == ALPHA:
             alpha = motion[i]
     return alpha
@@ -139,7 +139,7 @@ def angle_of_attack(motion: tuple[float, ...]) -> float:
 
 @stage
 def serve_frame(controls: ControlArray, motion: tuple[float, ...], load_factor: float) -> None:
-    """Set what the hosts' services hold over the frame."""
+    """Set the hosts' services for the frame."""
     for i in range(len(controls)):
         p, s = controls[i].parameters.services, controls[i].state.services
         if s.on:
@@ -148,7 +148,7 @@ def serve_frame(controls: ControlArray, motion: tuple[float, ...], load_factor: 
 
 @seldom
 def read_others(controls: ControlArray, row: Floats) -> None:
-    """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row holds the noise."""
+    """Read all forces at t_k for the hosts' estimates: Σ_j K̂_ij·F_j. The row has the noise."""
     for j in range(len(controls)):
         p, s = controls[j].parameters, controls[j].state
         noise = row[1 + CHANNELS_PER_CONTROL * j]
@@ -162,7 +162,7 @@ def read_others(controls: ControlArray, row: Floats) -> None:
 
 @seldom
 def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: float) -> None:
-    """Run all controls of one structure over frame k, node by node."""
+    """Run all controls of a common structure over frame k, node by node."""
     substeps = controls[0].parameters.clock.substeps
     begun = k * substeps
     for i in range(len(controls)):
@@ -179,10 +179,10 @@ def run_joined(controls: ControlArray, script: Floats, k: int, load_factor: floa
 
 @seldom
 def settle_others(controls: ControlArray) -> None:
-    """Let the controls of one structure stand as all forces at the frame's end have them.
+    """Update the controls of a common structure to all forces at the frame's end.
 
-    A grip at its reach is stopped again, which changes its force and so the others' place: rounds
-    of Gauss and Seidel, which converge for every structure that takes work.
+    A grip at its reach is stopped again, which changes its force and thereby the others' position:
+    Gauss-Seidel iterations, which converge for every passive structure.
     """
     reaches = False
     for i in range(len(controls)):
@@ -199,7 +199,7 @@ def settle_others(controls: ControlArray) -> None:
 
 @seldom
 def start_controls(controls: ControlArray, script: Floats) -> None:
-    """Begin with each hand on its grip: gauge, delay and structure have its first force."""
+    """Start with each hand on its grip: gauge, delay and structure have its first force."""
     for i in range(len(controls)):
         p, s = controls[i].parameters, controls[i].state
         free(s.reach)
@@ -216,10 +216,10 @@ def start_controls(controls: ControlArray, script: Floats) -> None:
 def host_frames(
     controls: ControlArray, row: Floats, motion: tuple[float, ...]
 ) -> tuple[float, float, float]:
-    """Do what host and recorder do at t_k for all controls; return the surface commands."""
+    """Run host and recorder at t_k for all controls; return the surface commands."""
     first_command = second_command = third_command = 0.0
     pressure_at = 1 + CHANNELS_PER_CONTROL * len(controls)
-    # Here, not after the flight: a frame then leaves no object behind.
+    # Copied here, not after the flight, so that a frame allocates no object.
     for i in range(min(len(motion), len(row) - pressure_at)):
         row[pressure_at + i] += motion[i]
     if controls[0].parameters.crossing.joined != 0:
@@ -249,14 +249,14 @@ def step_frame(
     motion: tuple[float, ...],
     load_factor: float,
 ) -> tuple[float, float, float]:
-    """Run frame k of all controls, write row k but for its time, return the surface commands.
+    """Run frame k of all controls, write row k without its time, return the surface commands.
 
     controls  shape (n,), n ≤ 3
     script    shape (n, 2, frames·substeps + 1): the hand's force in N and held deflection
-    record    shape (frames, channels): t, 10 a control, the motion; comes holding the noise
-              that is added to what is read
-    motion    of the airframe at t_k, q̄ in Pa first; the record takes as much as it has room for
-    The commands are in ±1, one a control, 0 for a control that is absent.
+    record    shape (frames, channels): t, 10 for each control, the motion; on entry it contains
+              the noise of the readings
+    motion    of the airframe at t_k, q̄ in Pa first; the record takes as many channels as it has
+    The commands are in ±1, one for each control, 0 for a missing control.
     """
     if k == 0:
         start_controls(controls, script)

@@ -1,25 +1,25 @@
-"""Dry friction of the loader: Coulomb, Stribeck with its breakaway, and contacts that yield.
+"""Dry friction of the loader: Coulomb, Stribeck with breakaway, and presliding friction.
 
-Running friction opposes the motion; from rest the control holds until the net
-force exceeds the breakaway. Between the two, friction falls with speed as
-F_c + (F_s − F_c)·exp(−(v/v_s)²) (Armstrong-Hélouvry, Dupont and Canudas de Wit,
-Automatica 30, 1994, their Stribeck term with exponent 2). It is set-valued at rest:
-a control left inside the band stays exactly where it is.
+Running friction opposes the motion; from rest the control sticks until the net force exceeds the
+breakaway. Between the two, friction falls with speed as F_c + (F_s − F_c)·exp(−(v/v_s)²)
+(Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30, 1994, their Stribeck term with
+exponent 2). It is set-valued at rest: a control inside the friction band does not move.
 
-A contact with a stiffness yields before it slips. Its bristles bend by z: in the direction of
-motion as the way, up to a share of z_c = F/stiffness, and from there towards z_c by
-dz/dx = (z_c − z)/(z_c − share·z_c); turned back, they give back all that they have bent
-(elastoplastic: Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002, their α a straight
-line). Below its share the contact is a spring: nothing creeps, whatever the force does. The force
-is stiffness·z, and a damping that fades with speed, which lets a stuck control come to rest.
+A contact with a stiffness has presliding: its bristles deflect by z. In the direction of motion
+they deflect with the displacement, up to a share of z_c = F/stiffness, and from there towards z_c
+by dz/dx = (z_c − z)/(z_c − share·z_c). On reversal they return with the displacement (elastoplastic
+model: Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002, with their α linear). Below the
+share the contact is a spring without creep. The force is stiffness·z, plus a damping that fades
+with speed and brings a stuck control to rest.
 
-z depends on the way alone, and is solved exactly along it; so no event is located. A step takes
-the mean force over its way, an averaged vector field of second order; a turn inside a step costs
-the difference between two ways of length h², which keeps the order.
+z depends on the displacement alone and is solved exactly along it, so no event is located. A step
+uses the mean force over its displacement (an averaged vector field method of second order). A
+reversal inside a step costs the difference between two displacements of order h², which keeps the
+order.
 
-Friction may differ with the direction of motion and grow with the force carried (gears, worn
-guides): to the levels above comes `pull` or `push`, and `by_load`·|F|. By direction alone, of a
-rigid contact, it is plain friction of the mean and a constant force of half the difference.
+Friction may depend on the direction of motion and on the load (gears, worn guides): `pull` or
+`push`, and `by_load`·|F|, are added to the levels above. Rigid friction that depends on direction
+only is plain friction of the mean level and a constant force of half the difference.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from coupled.rig.declaration import Declaration, Given
 
 
 class FrictionParameters(Protocol):
-    """Friction's levels, and the speed over which breakaway fades."""
+    """The levels of friction, and the speed over which the breakaway fades."""
 
     running: float  # F_c, N
     breakaway: float  # F_s ≥ F_c, N
     stribeck_rate: float  # v_s, d/s
     stiffness: float  # of the contact, N/d; 0 for a rigid one
-    compliance: float  # one over it, d/N; 0 for a rigid one
+    compliance: float  # its inverse, d/N; 0 for a rigid one
     contact_damping: float  # N·s/d at rest
-    pull: float  # more where the control moves aft, N
-    push: float  # and where it moves forward, N
-    by_load: float  # and for each N that the loader carries
-    elastic_share: float  # of the bristles' length, bent before any of it slips
+    pull: float  # addition for motion aft, N
+    push: float  # addition for motion forward, N
+    by_load: float  # addition for each N of load
+    elastic_share: float  # of the bristles' largest deflection, below which nothing slips
     dry: int  # whether there is any
     rigid: int  # and its contact is rigid
     varies: int  # with the direction or the load
@@ -51,14 +51,14 @@ class FrictionParameters(Protocol):
 
 CONTACT_DAMPING = 0.3  # of √(stiffness·mass)
 NEWTON_STEPS = 20
-LEAST_N = 1e-9  # friction of bristles that carry none at this load
-FADED = 6.0  # times the speed over which it fades, from which contacts do not damp
-SLIPS_ALL = 1e-9  # of friction, that bristles may lack where all of them slip
-SOLVED = 1e-7  # of the speeds at hand: what a step may still change
+LEAST_N = 1e-9  # least friction of bristles at any load
+FADED = 6.0  # times v_s, above which contacts do not damp
+SLIPS_ALL = 1e-9  # of friction, within which all bristles slip
+SOLVED = 1e-7  # relative change of the speeds at convergence
 
 
 def _stiffness(given: Given) -> float:
-    """Return the stiffness of a contact that carries friction, N/d."""
+    """Return the stiffness of a contact with friction, N/d."""
     return given.control.loader.friction_stiffness if _dry(given) else 0.0
 
 
@@ -96,7 +96,7 @@ FRICTION = Declaration(
 
 @stage
 def kept_at(p: FrictionParameters, rate: float) -> float:
-    """Return the share of what fades with speed that is left at `rate` in d/s."""
+    """Return the factor at `rate` in d/s of parts that fade with speed."""
     ratio = rate / p.stribeck_rate
     return math.exp(-ratio * ratio) if abs(ratio) < FADED else 0.0
 
@@ -111,7 +111,7 @@ def running_friction(p: FrictionParameters, rate: float) -> float:
 
 @stage
 def more_friction(p: FrictionParameters, load: float, direction: float) -> float:
-    """Return what the direction of motion and the force carried, N, add to friction, N."""
+    """Return the additions to friction by direction of motion and by load (N), N."""
     if p.varies == 0:
         return 0.0
     return (p.pull if direction > 0.0 else p.push) + p.by_load * load
@@ -119,14 +119,14 @@ def more_friction(p: FrictionParameters, load: float, direction: float) -> float
 
 @stage
 def _slipping(p: FrictionParameters, load: float, rate: float, kept: float) -> float:
-    """Return the friction at which bristles slip at a rate, N, of which `kept_at` is left."""
+    """Return the friction at which bristles slip at a rate, N; `kept` is `kept_at` of the rate."""
     level = p.running + (p.breakaway - p.running) * kept + more_friction(p, load, rate)
-    return max(level, LEAST_N)  # of breakaway alone nothing is left at speed
+    return max(level, LEAST_N)  # breakaway alone fades to nothing with speed
 
 
 @stage
 def reached(x: float) -> float:
-    """Return 1 − e^(−x) to 14 digits, for x ≥ 0, in half the time that `math.expm1` takes."""
+    """Return 1 − e^(−x) to 14 digits, for x ≥ 0, in half the time of `math.expm1`."""
     if x > 0.1:
         return 1.0 - math.exp(-x)
     near, far = 1.0 - x * (1 / 2 - x / 6), 1 / 24 - x * (1 / 120 - x / 720)
@@ -137,10 +137,10 @@ def reached(x: float) -> float:
 def _along(
     level: float, share: float, compliance: float, per_soft: float, bent: float, way: float
 ) -> tuple[float, float, float]:
-    """Return how far bristles are bent after a way, on the mean over it, both in d, and 1/way.
+    """Return the bristles' deflection after a displacement, its mean, both in d, and 1/`way`.
 
-    `per_soft` is one over how far they bend while they slip, 1/d. A step asks for few divisions:
-    each takes as long as all else here.
+    `per_soft` is the inverse of the displacement over which they slip partly, 1/d. Divisions are
+    avoided, since each takes as long as everything else here.
     """
     side, per_way = 1.0 if way > 0.0 else -1.0, 1.0 / way
     most = level * compliance
@@ -160,7 +160,7 @@ def _along(
 
 @stage
 def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tuple[float, float]:
-    """Return how far bristles are bent after a way, and on the mean over it, both in d.
+    """Return the bristles' deflection after a displacement, and its mean, both in d.
 
     `level` is the friction at which they slip, N.
     """
@@ -173,14 +173,14 @@ def yielded(p: FrictionParameters, level: float, bent: float, way: float) -> tup
 
 @stage
 def _bending(level: float, compliance: float, per_soft: float, bent: float, way: float) -> float:
-    """Return by how much bristles bend on for each d of the way, 1 where none of it slips."""
+    """Return the bristles' deflection for each d of displacement, 1 where nothing slips."""
     left = level * compliance - (bent if way > 0.0 else -bent)
     return min(max(left * per_soft, 0.0), 1.0)
 
 
 @stage
 def bent_after(p: FrictionParameters, bent: float, rate: float, way: float, load: float) -> float:
-    """Return how far bristles are bent after a way at a rate, d; 0 of a rigid contact."""
+    """Return the bristles' deflection after a displacement at a rate, d; 0 for a rigid contact."""
     if p.stiffness == 0.0:
         return 0.0
     return yielded(p, _slipping(p, load, rate, kept_at(p, rate)), bent, way)[0]
@@ -196,13 +196,13 @@ def yielding_speed(
     span: float,
     load: float,
 ) -> tuple[float, float]:
-    """Return the speed u at the middle of a step of `span` seconds, in d/s, of a yielding contact.
+    """Return the speed u at the middle of a step of `span` seconds, in d/s, with presliding.
 
-    And how far its bristles are bent at the end, d.
+    And the deflection of its bristles at the end, d.
 
-    inertia·(u − v) + force over the way u·span = push, with `v` the speed at its start. The force
-    rises with the way, ever less: from the speed that its slope at the start would let, Newton's
-    steps run up to u from one side, each a smaller part of the last.
+    It solves inertia·(u − v) + force over the displacement u·span = push, with `v` the speed at the
+    start. The force grows with the displacement, with falling slope. So Newton's method, started
+    from the solution with the initial slope, converges to u from one side.
     """
     stiffness, compliance, share = p.stiffness, p.compliance, p.elastic_share
     level = _slipping(p, load, v, kept_at(p, v) if p.breakaway > p.running else 0.0)
@@ -235,12 +235,12 @@ def yielding_speed(
         u += change
         after += bends * (change * span)
         near, step = SOLVED * (abs(u) + abs(v)), abs(change)
-        # This one, or the next by their ratio, or by how much force and bend may curve.
+        # Converged now, or in the next step, by the ratio of steps or by the curvature.
         if step <= near or step * step <= near * last:
             break
-        if min(abs(u), abs(v)) > faded:  # else the slope lacks how damping and level fade
-            # Half of the most that it curves with speed, N·s²/d²: of what it carries at the end,
-            # and of its mean force over the way a third of that.
+        if min(abs(u), abs(v)) > faded:  # else the slope lacks the fading of damping and level
+            # Half of the largest curvature over speed, N·s²/d²: of the force at the end, and of
+            # its mean over the displacement a third of that.
             bowed = 0.5 * stiffness * span * span * per_soft
             square = step * step * bowed
             if square <= 3.0 * near * slope and square <= SOLVED * level:
@@ -260,12 +260,12 @@ def rubbing_speed(
     span: float,
     load: float,
 ) -> tuple[float, float]:
-    """Return the speed at the middle of a step of `span` seconds, of any friction, in d/s.
+    """Return the speed at the middle of a step of `span` seconds, with any friction, in d/s.
 
-    And how far bristles are bent after it, d.
+    And the deflection of the bristles after it, d.
 
-    `push` is the force but for friction, N, `inertia` what it has to move, N·s/d, `direction` the
-    side to which a rigid contact slides, `load` the force carried, N.
+    `push` is the force without friction, N, `inertia` the inertia to be moved, N·s/d, `direction`
+    the direction in which a rigid contact slides, `load` the load, N.
     """
     if p.dry == 0:
         return v + push / inertia, 0.0
@@ -273,6 +273,6 @@ def rubbing_speed(
         return yielding_speed(p, bent, v, push, inertia, span, load)
     push -= more_friction(p, load, direction) * direction
     halfway = v + (push - running_friction(p, v) * direction) / inertia
-    if p.breakaway > p.running:  # Stribeck: once more with the speed just found
+    if p.breakaway > p.running:  # Stribeck: a second iteration with the speed just found
         halfway = v + (push - running_friction(p, halfway) * direction) / inertia
     return halfway, 0.0

@@ -1,19 +1,19 @@
-"""Gauge: from the hand's force to the force that loader and host are given.
+"""Gauge: from the hand's force to the force measured for loader and host.
 
-    mass       F_g = F − m_g·x''        the inertia of what lies between gauge and grip
+    mass       F_g = F − m_g·x''        the inertia of the parts between gauge and grip
     amplifier  y'' = ω²·(F_g − y) − 2ζω·y',    or  y' = ω·(F_g − y)
     delay      y(t − τ)
     converter  sampled at a rate of its own and held until the next sample
 
-A gauge does not feel the hand but what the structure beneath it carries. What lies between,
-grip, yoke, and the upper part of the column, takes its share m_g·x'' to be moved, and a free
-control whose gauge reads −m_g·x'' pushes itself: with the lag of gauge and servo in between,
-that is what sets how light a loader's simulated mass may be (`authority/stability`).
+A gauge measures the force in the structure beneath it, not that of the hand. The parts in between
+(grip, yoke, the upper part of the column) take m_g·x'' to be accelerated. The gauge of a free
+control then reads −m_g·x'', which drives the loader: with the lag of gauge and servo this limits
+how small the simulated mass of a loader can be (`authority/stability`).
 
-The mass moves with the servo, below the bend: its own vibration upon the structure, at
-1/√(K·m_g), is left out. x'' is what the servo's equation says at the last node, none where its
-speed is at its limit. The amplifier is stepped exactly for a force that runs straight over a
-substep. With every number neutral the stage is skipped, and the hand's own force goes on.
+The mass moves with the servo, below the bend; its own vibration on the structure, at 1/√(K·m_g), is
+neglected. x'' is that of the servo's equation at the last node, zero if its speed is at its limit.
+The amplifier is stepped exactly for a force linear over a substep. If all numbers are neutral the
+stage is skipped, and the hand's own force is used.
 """
 
 from __future__ import annotations
@@ -33,24 +33,24 @@ from coupled.rig.parameters import GAUGE_SLOTS
 class GaugeParameters(Protocol):
     """Mass, amplifier, delay and converter of a gauge; d is m, or rad for a wheel."""
 
-    present: int  # 0 where the gauge gives the hand's force as it is
+    present: int  # 0 if the gauge gives the hand's force unchanged
     mass: float  # m_g, kg (N per d/s²)
     servo_stiffness: float  # ω², 1/s²
     servo_damping: float  # 2ζω, 1/s
     position: NDArray[np.float64]  # weights of (y, y', F_g before, F_g after) in the next y
     speed: NDArray[np.float64]  # and in the next y'
     delay_substeps: float  # τ over the substep
-    samples: float  # in a substep; 0 for a converter that follows
+    samples: float  # in a substep; 0 for continuous sampling
 
 
 class GaugeState(Protocol):
-    """What is on its way from the grip to the loader."""
+    """The state between the grip and the loader."""
 
     acceleration: float  # x'' at the last node, d/s²
     given: float  # F_g at the last node, N
     passed: float  # y, N
     rate: float  # y', N/s
-    force: float  # what loader and host get, N
+    force: float  # output for loader and host, N
     phase: float  # of the converter's sample, 0 to 1
     node: int  # substeps since the start
     history: NDArray[np.float64]  # y at past nodes, N
@@ -59,9 +59,9 @@ class GaugeState(Protocol):
 def amplifier_weights(
     order: str, frequency_Hz: float, damping_ratio: float, h: float
 ) -> NDArray[np.float64]:
-    """Return the exact one-substep map of an amplifier, shape (2, 4), as `servo_weights` has it.
+    """Return the exact one-substep map of an amplifier, shape (2, 4), as `servo_weights`.
 
-    0 Hz is an amplifier that follows at once.
+    0 Hz is an amplifier without lag.
     """
     if frequency_Hz == 0.0:
         return np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
@@ -107,11 +107,11 @@ GAUGE = Declaration(
 
 @stage
 def start_gauge(p: GaugeParameters, s: GaugeState, force: float) -> float:
-    """Begin at rest with the hand's force at the first node, N; return what the gauge gives."""
+    """Start at rest with the hand's force at the first node, N; return the gauge's output."""
     if p.present == 0:
         return force
     s.given = force
-    s.passed = force if p.position[3] == 1.0 else 0.0  # 1 where no amplifier lags
+    s.passed = force if p.position[3] == 1.0 else 0.0  # 1 if the amplifier has no lag
     s.history[0] = s.passed
     s.force = s.passed if p.delay_substeps == 0.0 else 0.0
     return s.force
@@ -119,7 +119,7 @@ def start_gauge(p: GaugeParameters, s: GaugeState, force: float) -> float:
 
 @stage
 def gauge_force(p: GaugeParameters, s: GaugeState, force: float) -> float:
-    """Return the force in N that loader and host get at the next node, the hand's there given."""
+    """Return the output for loader and host at the next node, N, from the hand's force there."""
     before, y, rate = s.given, s.passed, s.rate
     s.given = force - p.mass * s.acceleration
     a, b = p.position, p.speed
@@ -151,7 +151,7 @@ def move_gauge(
     linkage: LinkageState,
     computed: float,
 ) -> None:
-    """Take up how the mass beyond the gauge is accelerated at a node where δc stands, d."""
+    """Set the acceleration of the mass beyond the gauge at a node, from δc there, d."""
     s.acceleration = (
         p.servo_stiffness * (computed - linkage.position) - p.servo_damping * linkage.rate
     )

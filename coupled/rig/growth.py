@@ -1,6 +1,6 @@
-"""How fast a control let go from a small deflection grows or dies, by the stages that fly.
+"""The growth or decay of a control's motion from a small deflection, by simulation.
 
-Every frame is that of `frame`. Before the state leaves the range of doubles it is scaled down,
+Every frame is that of `frame`. Before the state exceeds the range of doubles it is scaled down,
 which changes nothing in a linear rig, and the scale is added to the growth.
 """
 
@@ -27,11 +27,11 @@ _LARGEST, _SMALLEST = 1e3, 1e-3
 
 
 def growth(rig: Rig, hand: Hand, seconds: float) -> float:
-    """Return the rate at which the motion of a rig's only control grows, 1/s; negative: it dies.
+    """Return the growth rate of the motion of a rig's only control, 1/s; negative for a decay.
 
-    The slope of the logarithm of the state's size over the latter half of the time, which must
-    be long beside the motion's period. Infinite where a frame is more than doubles can hold.
-    The rig must be linear: without friction, breakout, play and limits.
+    The slope of the logarithm of the state's size over the second half of the time, which must be
+    long compared with the motion's period. Infinite if a frame exceeds the range of doubles. The
+    rig must be linear: without friction, breakout, backlash and limits.
     """
     frames = max(_LEAST_FRAMES, math.ceil(seconds * rig.frame_rate))
     (name, control), *others = rig.controls.items()
@@ -49,10 +49,10 @@ def growth(rig: Rig, hand: Hand, seconds: float) -> float:
 
 @lru_cache(maxsize=64)
 def _slope_weights(count: int) -> Floats:
-    """Return what values, each a frame after the last, give their trend by, a frame: its slope.
+    """Return weights of values, one a frame, that give their slope, a frame.
 
-    The straight line of least squares, with weights that fade at both ends and let a swing of
-    the values about their trend fall out.
+    The least-squares line with weights that fade at both ends, so that oscillations about the trend
+    cancel.
     """
     frames = np.arange(count, dtype=np.float64)
     weights = np.sin(np.pi * (frames + 0.5) / count) ** 2
@@ -62,7 +62,7 @@ def _slope_weights(count: int) -> Floats:
 
 @stage
 def _size(s: ControlState, rate: float) -> float:
-    """Return the size of a motion, d/s: speeds, and deflections by a typical rate in rad/s."""
+    """Return the size of a motion, d/s: speeds, and deflections times a typical rate in rad/s."""
     moved = s.loader.rate * s.loader.rate + s.linkage.rate * s.linkage.rate
     away = s.loader.computed * s.loader.computed + s.linkage.position * s.linkage.position
     return math.sqrt(moved + rate * rate * away)
@@ -70,7 +70,7 @@ def _size(s: ControlState, rate: float) -> float:
 
 @cache
 def growing_numbers() -> NDArray[np.bool_]:
-    """Return which of a control's numbers, eight bytes each, grow with its motion."""
+    """Return which of a control's numbers, eight bytes each, scale with its motion."""
     marks = np.zeros(1, CONTROL)
     for name, declared in STAGES.items():
         state = declared.state or np.dtype([])
@@ -84,9 +84,9 @@ def growing_numbers() -> NDArray[np.bool_]:
 def _grow(
     controls: ControlArray, numbers: Floats, growing: NDArray[np.bool_], rate: float, logs: Floats
 ) -> None:
-    """Run a control from a deflection with some speed; write its size's logarithm each frame.
+    """Run a control from a deflection with some speed; write the logarithm of its size each frame.
 
-    `numbers` are the control's own, the same memory.
+    `numbers` are the control's own, in the same memory.
     """
     p, s = controls[0].parameters, controls[0].state
     still = np.zeros(p.clock.substeps + 1)
@@ -98,7 +98,7 @@ def _grow(
     start_loader(p.loader, s.loader, start_gauge(p.gauge, s.gauge, s.hand.force))
     grown = 0.0
     for k in range(len(logs)):
-        out[:] = 0.0  # what it holds is the noise of what is read
+        out[:] = 0.0  # it contains the noise of the readings
         host_frame(p, s, s.hand.force, 0.0, 0.0, out)
         run_frame(p, s, still, still, 0, 1.0)
         size = _size(s, rate)

@@ -1,26 +1,25 @@
-"""What holds the grip: a force on it, and perhaps an impedance.
+"""The hand on the grip: a given force, and possibly an impedance.
 
     F = F_script(t) + u_lag + k_h·(δ_set − δ) + c_h·(δ_set' − δ') + k_I·∫(δ_set − δ) dt
 
-With every gain zero the hand is the scripted force. With gains it holds the grip
-at δ_set with whatever force that takes (a clamp). u is the command of a pilot in the
-loop, held over a frame; it reaches the grip through the muscle's lag.
+With all gains zero the hand is the scripted force. With gains it holds the grip at δ_set with
+whatever force that takes (a clamp). u is the command of a pilot in the loop, held over a frame,
+through the muscle's lag.
 
-The force bends the structure, so δ on the right depends on F on the left. The
-bend's local slope K is taken implicitly, which keeps a stiff hand stable at any
-K; the motion of the loader enters as it stood at the node (an exchange once a
-substep, first order in it).
+The force bends the structure, so δ on the right depends on F on the left. The bend's local slope K
+is taken implicitly, which keeps a stiff hand stable at any K. The motion of the loader enters with
+its value at the node (an exchange once a substep, of first order).
 
-Beyond its strength a hand gives way, and no impedance acts. Its full strength lasts for an
-endurance; after that it has its lasting strength only, until it has rested:
+A hand at its strength limit has no impedance. Its full strength lasts for an endurance; after that
+it has its lasting strength only, until it has rested:
 
     effort' = (|F| − F_lasting)/(F_strongest − F_lasting), within 0 and the endurance
 
-The arm has a mass m_h, in kg at the grip, and what accelerates it the grip does not get:
+The arm has a mass m_h, in kg at the grip, whose inertia reduces the force on the grip:
 
     F = F_hand − m_h·δ''
 
-taken implicitly over a substep, to first order in it. How far a hand goes is `reach`.
+taken implicitly over a substep, to first order. `reach` limits the hand's deflection.
 """
 
 from __future__ import annotations
@@ -46,14 +45,14 @@ class HandParameters(Protocol):
 
 
 class HandState(Protocol):
-    """What the hand does now."""
+    """The current action of the hand."""
 
     force: float  # N, pull positive
-    asked: float  # N, of which the stop at the reach takes some
+    asked: float  # N, before the stop at the reach takes its part
     command: float  # u, N, held over the frame
     muscle: float  # u behind the muscle's lag, N
     integral: float  # the integral term, N
-    effort: float  # s at full strength that the hand has behind it
+    effort: float  # time spent at full strength, s
     at: float  # δ at the last node, d
     moving: float  # δ' there, d/s
 
@@ -72,19 +71,19 @@ HAND = Declaration(
 
 @stage
 def has_impedance(p: HandParameters) -> bool:
-    """Tell whether the grip's motion changes a hand's force."""
+    """Tell whether a hand's force depends on the grip's motion."""
     return p.stiffness != 0.0 or p.damping != 0.0 or p.integral != 0.0 or p.mass != 0.0
 
 
 @stage
 def only_scripted(p: HandParameters) -> bool:
-    """Tell whether a hand holds what is asked of it as it is: no impedance, no limit."""
+    """Tell whether a hand applies its script unchanged: no impedance, no limit."""
     return not has_impedance(p) and p.strongest == 0.0
 
 
 @stage
 def within_strength(p: HandParameters, s: HandState, force: float) -> float:
-    """Return the force that a hand can hold of one asked for, N."""
+    """Return a force limited to the hand's strength, N."""
     if p.strongest == 0.0:
         return force
     limit = p.strongest if s.effort < p.endurance else p.lasting
@@ -102,7 +101,7 @@ def ask(
     held_rate: float,
     h: float,
 ) -> float:
-    """Set the force that a hand would have at a node, N; return what its integral then gains, N.
+    """Set the hand's force at a node, N; return the increment of its integral, N.
 
     `script` is F_script in N, `held` and `held_rate` are δ_set and its rate.
     """
@@ -134,7 +133,7 @@ def hold(
     striving: float,
     h: float,
 ) -> None:
-    """Let a hand hold a force for a substep, N; it tires, or rests, and its integral gains."""
+    """Apply a force for a substep, N; update fatigue and the integral."""
     s.force = force
     s.integral += striving
     if p.strongest > 0.0:
@@ -149,7 +148,7 @@ def hold(
 
 @stage
 def move_muscle(p: HandParameters, s: HandState) -> None:
-    """Let the pilot's command act for a substep through the muscle's lag."""
+    """Advance the pilot's command by a substep through the muscle's lag."""
     s.muscle += p.lag_gain * (s.command - s.muscle)
     if abs(s.muscle) < TINY:
         s.muscle = 0.0

@@ -1,4 +1,4 @@
-"""What a record holds of the host's work, as replays take it: its services, and frames missed."""
+"""Data of the host in a record, as inputs of replays: its services, and missed frames."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Mask = NDArray[np.bool_]
 
 
 class Hosted(NamedTuple):
-    """What a record holds of the loader's services, and of its host.
+    """The loader's services and the host's data of a record.
 
-    `missed` are the frames that the host missed, `held` is what of the services' force the host
-    holds over each frame, N (`serving.held_force`), `reach` where a stop of the cab stops the grip,
-    d, 0 for nowhere, `assumed` how far the host's K̂ in ΔG was another than its first, d/N.
+    `missed` are the frames that the host missed, `held` the part of the services' force held over
+    each frame, N (`serving.held_force`), `reach` the deflection at which a stop of the cab stops
+    the grip, d, 0 for none, `assumed` the change of the host's K̂ in ΔG from its first, d/N.
     """
 
     services: ServiceRows | None = None
@@ -28,7 +28,7 @@ class Hosted(NamedTuple):
     assumed: Floats | None = None
 
     def rows(self, frames: int) -> tuple[Floats, ...]:
-        """Return x₀ in d, the held force in N and jams of services, misses and K̂, at each frame."""
+        """Return x₀ in d, held force in N and jams of services, misses and K̂, at each frame."""
         none = np.zeros(frames)
         neutral, jammed = none, none
         if self.services is not None:
@@ -38,16 +38,16 @@ class Hosted(NamedTuple):
         return neutral, held, jammed, missed, none if self.assumed is None else self.assumed
 
     def a_frame_late(self) -> Hosted:
-        """Return the same with the services' rows a frame late."""
+        """Return the same with the services' rows delayed by a frame."""
         if self.services is None:
             return self
         late = (np.concatenate((row[:1], row[:-1])) for row in self.services)
         return self._replace(services=ServiceRows(*late))
 
     def following(self) -> Floats | None:
-        """Return the services' force that follows the motion, N at each frame; None without any.
+        """Return the part of the services' force that follows the motion, N; None if there is none.
 
-        A row holds what the host held until then.
+        A row has the force that the host held until then.
         """
         if self.services is None:
             return None
@@ -60,7 +60,7 @@ HOSTED = Hosted()
 
 
 def held_over(signal: Floats, missed: Mask | None) -> Floats:
-    """Return what a host puts out, held over the frames that it missed, never the first."""
+    """Return a host's output, held over the missed frames (never the first)."""
     if missed is None:
         return signal
     frames = np.arange(len(signal))

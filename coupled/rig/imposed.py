@@ -1,23 +1,23 @@
-"""The loader with its motion imposed: the force that answers, as on a test bench for dampers.
+"""The loader with imposed motion: its reaction force, as on a test bench for dampers.
 
-The loader's own laws, solved for the force instead of the motion:
+The loader's equations, solved for the force instead of the motion:
 
     F = m·x'' + c·x' + friction + breakout·sgn(x) + springs(x) + F_mod − F_offset + b·(n_z − 1)
 
-Where the motion of the grip is imposed, the linkage lies between it and the loader. The structure's
-bend is a function of the measured force, and the servo's law is solved for its command u, x being
-the servo's place:
+If the motion of the grip is imposed, the linkage lies between it and the loader. The structure's
+bend is a function of the measured force, and the servo's equation is solved for its command u, x
+being the servo's position:
 
     x = δ − bend(F),     u + (2ζp/ω)·u' = x + (2ζ/ω)·x' + x''/ω²
 
-Play lies between what is imposed and the loader, which follows once the play is taken up; in the
-gap no force is felt, and the loader goes where its own springs, against its damping, take it. A
-play whose contact yields bends by F/stiffness beside.
+Backlash lies between the imposed motion and the loader, which follows once the backlash is closed.
+While it is open the force is zero, and the loader moves by its own springs against its damping. A
+backlash with a contact stiffness also bends by F/stiffness.
 
-A friction whose contact is rigid holds a still loader with any force up to its level: which, the
-motion does not say. It is taken to yield by a tenth of a thousandth of the travel, so that the
-tremble of a sensor at rest is no slip. The acceleration is the mean over a frame about the sample:
-the blow at the end of a play lasts no time, and a force that is sampled has no room for it.
+Rigid friction holds a still loader with any force up to its level, which the motion does not
+determine. It is given a presliding of 1e-4 of the travel, so that sensor noise at rest does not
+count as slip. The acceleration is the mean over a frame about the sample, since the impact at the
+end of a backlash lasts no time and a sampled force cannot contain it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from coupled.rig.rig import Rig
 from coupled.rig.springs import elastic, feel, relax
 
 Floats = NDArray[np.float64]
-RIGID = 1e-4  # of the travel, by which a rigid contact yields here
+RIGID = 1e-4  # of the travel, presliding of a rigid contact here
 
 
 def answer_to(
@@ -57,12 +57,13 @@ def answer_to(
     gradient: Floats,
     load_factor: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the force in N at each frame that a control answers an imposed motion with.
+    """Return a control's reaction force at each frame to an imposed motion, N.
 
-    And whether within half a frame of it a play is taken up or left, where the force jumps.
+    And whether a backlash closes or opens within half a frame of it, where the force jumps.
 
-    `nodes` is the motion on the loader's nodes, d, `rig.substeps` a frame and one more; `gradient`
-    G_T in N/d at each frame, `load_factor` +1 in level flight. In a play it is exactly 0.
+    `nodes` is the motion on the loader's nodes, d, `rig.substeps` for each frame and one more;
+    `gradient` G_T in N/d at each frame, `load_factor` +1 in level flight. In an open backlash the
+    force is exactly 0.
     """
     packed = pack(rig, only=control)
     p, s = packed["parameters"].copy(), packed["state"].copy()
@@ -70,7 +71,7 @@ def answer_to(
     level = np.ones(frames) if load_factor is None else load_factor
     felt, mass = np.zeros((3, len(nodes))), np.zeros(frames)
     _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, felt, mass)
-    # Of the substep that ends at node n: force but for inertia, mean speed, whether it is felt.
+    # Of the substep that ends at node n: force without inertia, mean speed, whether in contact.
     force, speed, touched = felt
     half, last = max(1, rig.substeps // 2), len(nodes) - 1
     at = np.arange(frames) * rig.substeps
@@ -88,11 +89,11 @@ def behind_linkage(
     force_N: Floats,
     others_N: Mapping[str, Floats] | None = None,
 ) -> Floats:
-    """Return the motion behind the linkage on the loader's nodes, d, for that of the grip.
+    """Return the motion behind the linkage on the loader's nodes, d, from that of the grip.
 
-    `read` is what the transducer reads of δ at the frames, d, without its zero; `force_N` F at the
-    frames, N, which bends the structure, and `others_N` the forces on other controls. Play is left
-    out: where it lies, the loader's own motion decides (`answer_to`).
+    `read` is the transducer's reading of δ at the frames, d, without its zero; `force_N` F at the
+    frames, N, which bends the structure, and `others_N` the forces on other controls. Backlash is
+    left out: in it the loader's own motion decides (`answer_to`).
     """
     data = rig.controls[control]
     loader, length = data.loader, data.length
@@ -124,9 +125,9 @@ def behind_linkage(
 
 @stage
 def _left_alone(p: ControlParameters, loader: LoaderState, held: float, h: float) -> float:
-    """Return where a loader that nothing touches goes in h seconds, d; `held` is its springs', N.
+    """Return the position of a free loader after h seconds, d; `held` is its springs' force, N.
 
-    Without damping, beyond any play.
+    Without damping, beyond any backlash.
     """
     most = p.friction.running
     net = held - min(max(held, -most), most)
@@ -137,7 +138,7 @@ def _left_alone(p: ControlParameters, loader: LoaderState, held: float, h: float
 
 @stage
 def _rubbing(p: ControlParameters, loader: LoaderState, dry: float, way: float, h: float) -> float:
-    """Return the friction over a way of h seconds, N, from what it was before; bend its contact."""
+    """Return the friction over a displacement in h seconds, N, and advance its contact."""
     rate = way / h
     if p.friction.stiffness > 0.0:
         loader.bent = bent_after(p.friction, loader.bent, rate, way, loader.load)
@@ -159,7 +160,7 @@ def _answer(
     felt: Floats,
     mass: Floats,
 ) -> None:
-    """Write force but for inertia, N, speed and touch of each substep, and each frame's mass."""
+    """Write force without inertia, N, speed and contact of each substep, and each frame's mass."""
     p, s = parameters[0], states[0]
     m, loader = s.modification, s.loader
     start_loader(p.loader, loader, 0.0)
@@ -183,7 +184,7 @@ def _answer(
                 relax(p.loader, loader, way, h)
             loader.computed = new
             felt[1, node] = way / h
-            if half == 0.0 or new != alone:  # else it is alone in its play
+            if half == 0.0 or new != alone:  # else there is no contact
                 breakout = p.loader.breakout + (0.0 if p.loader.held else m.breakout)
                 felt[2, node] = 1.0
                 force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external

@@ -1,14 +1,14 @@
-"""Inertia: mass, damping and force of the loader's model, where they go with the gradient.
+"""Inertia: mass, damping and force of the loader's model, scheduled by the gradient.
 
     m = m₀·f_m(G_T),    c = c₀·f_c(G_T),    F_L = F + T(G_T)·z',    τ·z' = F − z
 
-Eq. (12) gives the loader a spring of G_T/(1 − K·G_T) on δc, so that a constant m and c swing
-faster and less damped than specified: the frequency by 1/√(1 − K·G_T), the damping ratio by
-√(1 − K·G_T). With both factors 1/(1 − K·G_T) they are as specified again. What is left of a
-release is the bend's springing back: the grip is at δ·(1 − K·G_T) at once, and from rest. The
-lead T on the force gives the loader the speed that the specified motion has there, by an
-impulse T·F as F ends (`calibration/letgo`). All three stand in a table over the gradient that
-the schedule asks for, straight between its rows and held at its ends, and are set at each frame.
+Eq. (12) gives the loader a spring of G_T/(1 − K·G_T) on δc, so that a constant m and c oscillate
+faster and with less damping than specified: the frequency by 1/√(1 − K·G_T), the damping ratio by
+√(1 − K·G_T). With both factors 1/(1 − K·G_T) they are as specified. The remaining error of a
+release is the bend's springing back: the grip is at δ·(1 − K·G_T) at once, and at rest. The lead T
+on the force gives the loader the speed of the specified motion there, by an impulse T·F when F ends
+(`calibration/letgo`). All three are in a table over the gradient of the schedule, linear between
+its rows and constant beyond, and are set at each frame.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ class InertiaParameters(Protocol):
     damping_factor: Table
     force_lead: Table  # T, s
     lag: float  # τ, s
-    lag_gain: float  # share that z goes in a substep, by the implicit Euler rule
+    lag_gain: float  # step response of z over a substep, by the implicit Euler rule
 
 
 class InertiaState(Protocol):
-    """The lead now."""
+    """The current lead."""
 
     lead: float  # T, s
     lagged: float  # z, N
 
 
 def _column(of: str) -> Callable[[Given], Table]:
-    """Return what gives a column of the table at its full length; one left out is neutral."""
+    """Return a function for a column of the table at its full length; default: neutral."""
 
     def column(g: Given) -> Table:
         host = g.control.compensation
@@ -85,7 +85,7 @@ def set_inertia(
     s: LoaderState,
     gradient: float,
 ) -> None:
-    """Set m, c and T for the frame, by the gradient that the schedule asks for, N/d."""
+    """Set m, c and T for the frame, by the gradient of the schedule, N/d."""
     if p.rows == 0:
         return
     g, row = p.gradient, 1
@@ -101,7 +101,7 @@ def set_inertia(
 
 @stage
 def lead_force(p: InertiaParameters, s: InertiaState, force: float) -> float:
-    """Return the force that the loader takes for one at a node, N: F + T·z'."""
+    """Return the loader's input for a force at a node, N: F + T·z'."""
     s.lagged += p.lag_gain * (force - s.lagged)
     if abs(s.lagged) < TINY:
         s.lagged = 0.0

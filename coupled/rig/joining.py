@@ -1,4 +1,4 @@
-"""What the forces on other controls do at a control, node by node: they bend, and leak into it."""
+"""Effects of forces on other controls at a control, node by node: bend and crosstalk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @stage
 def bend_by_others(controls: ControlArray, i: int) -> None:
-    """Set what the others' forces bend at control i: Σ_j K_ij·F_j."""
+    """Set the bend at control i by the others' forces: Σ_j K_ij·F_j."""
     row, bent = controls[i].parameters.crossing.bends, 0.0
     for j in range(len(controls)):
         bent += row[j] * controls[j].state.hand.force
@@ -22,9 +22,10 @@ def bend_by_others(controls: ControlArray, i: int) -> None:
 
 @stage
 def leak_from_others(controls: ControlArray, i: int, script: Floats, node: int) -> None:
-    """Set what of the others' forces reaches loader i at a node.
+    """Set the others' forces on loader i at a node by crosstalk.
 
-    Controls before i are there; those after it stand at the last node, and their scripts run on.
+    Controls before i have been advanced to the node; those after it are at the last node, with
+    their scripts extrapolated.
     """
     row, leaked = controls[i].parameters.crossing.leaks, 0.0
     for j in range(len(controls)):

@@ -1,24 +1,24 @@
-"""Linkage: from δc to the grip, through the servo, its play, and the structure's bend.
+"""Linkage: from δc to the grip, through the servo, its backlash, and the structure's bend.
 
     servo      (without one: x = u, |x'| ≤ rate limit)
                x'' = ω²·(u − x) + 2ζω·(p·u' − x'),   |x'| ≤ rate limit, |x''| ≤ acceleration
-               limit, of a motor's torque or a profile;  u is δc as `command` gives it, late or
-               in set points. p = 0: a servo on position, of second order,
-               and with ζ far above 1 a proportional one, of first; p = 1: a PI controller of the
-               error e, x' = 2ζω·e + ω²·∫e
-    backlash   the grip's side follows x once it has taken up the play; with a contact that yields
-               the force moves it against spring and damper of the contact, which holds beyond the
-               play alone: k·τ·z' + k·(|z| − play/2)·sgn(z) = F, δ = x + z
+               limit, of a motor's torque or a profile;  u is δc by `command`, delayed or in set
+               points. p = 0: a position servo of second order, and with ζ far above 1 a
+               proportional one of first order; p = 1: a PI controller of the error e,
+               x' = 2ζω·e + ω²·∫e
+    backlash   the grip's side follows x once the play is taken up; with a contact stiffness the
+               force moves it against spring and damper of the contact, which acts beyond the
+               play only: k·τ·z' + k·(|z| − play/2)·sgn(z) = F, δ = x + z
     bend       δ = x + K·F                     eq. (1); stiffening: limit·tanh(K·F/limit)
     direction  K for a pull, another for a push; both meet at F = 0
     hysteresis δ = x + (1 − s)·bend(F) + s·bend(P), P behind a play of full width w in the force:
-               over a cycle between ±A (A > w/2, one K) it takes s·K·w·(2A − w) of work
-    mode       what bends has mass: y'' = ω²·(bend − y) − 2ζω·y', δ = x + y
+               a cycle between ±A (A > w/2, one K) dissipates s·K·w·(2A − w)
+    mode       the structure has mass: y'' = ω²·(bend − y) − 2ζω·y', δ = x + y
     structure  + Σ K_ij·F_j of the other controls  (`structure`)
     arc        the transducer reads L·sin(δ/L)  eqs. (15) to (17)
 
-The servo is stepped exactly for a δc that runs straight over the substep, so it is
-stable at any frequency and second-order in δc.
+The servo is stepped exactly for a δc linear over the substep, so it is stable at any frequency and
+of second order in δc.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from coupled.rig.compiled import TINY, layout, stage
 from coupled.rig.declaration import Declaration, Given
 from coupled.rig.parameters import DELAY_SLOTS, Loader
 
-CONTACT_s = 2e-3  # chosen: damping of a play's contact over its stiffness
-SMALL = 1e-6  # turn over a substep, rad, under which the servo counts as critically damped
+CONTACT_s = 2e-3  # chosen: damping of a backlash's contact over its stiffness
+SMALL = 1e-6  # angle over a substep, rad, below which the servo counts as critically damped
 
 
 class LinkageParameters(CommandParameters, Protocol):
-    """Servo, play, structure and grip."""
+    """Servo, backlash, structure and grip."""
 
     position: NDArray[np.float64]  # weights of (x, x', δc before, δc after) in the next x
     speed: NDArray[np.float64]  # and in the next x'
@@ -50,29 +50,29 @@ class LinkageParameters(CommandParameters, Protocol):
     play: float  # full width of the backlash, d
     bend: float  # K of the structure, d/N, for a pull
     push: float  # and for a push
-    bend_limit: float  # where the bend saturates, d; 0 for never
+    bend_limit: float  # at which the bend saturates, d; 0 for none
     share: float  # of the bend that follows the force through a play
     width: float  # full width of that play, N
-    modal: int  # what bends has mass
+    modal: int  # the structure has mass
     mode_position: NDArray[np.float64]  # weights of (y, y', bend before, bend after) in the next y
     mode_speed: NDArray[np.float64]  # and in the next y'
-    contact: float  # stiffness of the play's contact, N/d; 0 for a rigid one
-    carries: int  # whether anything here remembers the force
-    arc_length: float  # L of the grip's arc, d; 0 where the transducer reads δ itself
+    contact: float  # stiffness of the backlash's contact, N/d; 0 for a rigid one
+    carries: int  # whether any part has a memory of the force
+    arc_length: float  # L of the grip's arc, d; 0 if the transducer reads δ itself
 
 
 class LinkageState(CommandState, Protocol):
-    """The servo, and the grip's side of the play."""
+    """The servo, and the grip's side of the backlash."""
 
     position: float  # x, d
     rate: float  # x', d/s
-    grip: float  # behind the play, before the bend, d
+    grip: float  # behind the backlash, before the bend, d
     carried: float  # P, the force behind the bend's play, N
-    touch: float  # z, the grip against the servo in a contact that yields, d
+    touch: float  # z, the grip relative to the servo with a soft contact, d
     bent: float  # y, d
     bent_rate: float  # y', d/s
-    asked: float  # the bend that the mode follows, as it stood at the last node, d
-    others: float  # what the other controls' forces bend here, d
+    asked: float  # the input of the mode, the static bend at the last node, d
+    others: float  # bend by the other controls' forces, d
 
 
 def servo_weights(
@@ -80,13 +80,12 @@ def servo_weights(
 ) -> NDArray[np.float64]:
     """Return the servo's exact one-substep map, shape (2, 4).
 
-    Rows give (x, x') after h seconds from (x, x', δc before, δc after), δc running
-    straight between. Behind a ramp u₀ + s·t the servo settles at x = u₀ + s·t − 2ζ(1 − p)s/ω,
-    x' = s, where p is the share of the command's rate that it is given,
-    and what it starts away from that fades as the free servo does.
+    Rows give (x, x') after h seconds from (x, x', δc before, δc after), with δc linear in between.
+    Behind a ramp u₀ + s·t the servo settles at x = u₀ + s·t − 2ζ(1 − p)s/ω, x' = s, where p is the
+    share of the command's rate in its input; an initial deviation decays like the free servo.
     """
     w, z = omega_rad_per_s, damping_ratio
-    turn = cmath.sqrt(complex(1.0 - z * z)) * w  # imaginary where the servo is overdamped
+    turn = cmath.sqrt(complex(1.0 - z * z)) * w  # imaginary if the servo is overdamped
     ahead, behind = (cmath.exp((-z * w + side * turn) * h) for side in (1j, -1j))
     wave = 0.5 * (ahead + behind).real
     swing = math.exp(-z * w * h) * h  # the limit at critical damping
@@ -94,7 +93,7 @@ def servo_weights(
         swing = ((ahead - behind) / (2j * turn)).real
     free = np.array([[wave + z * w * swing, swing], [-w * w * swing, wave - z * w * swing]])
     lag = 2.0 * z * (1.0 - rate_share) / w
-    # Columns: what u₀ and what s do to (x, x').
+    # Columns: effect of u₀ and of s on (x, x').
     level = np.array([1.0, 0.0]) - free[:, 0]
     ramp = np.array([h - lag, 1.0]) - free @ np.array([-lag, 1.0])
     return np.column_stack((free, level - ramp / h, ramp / h))
@@ -103,7 +102,7 @@ def servo_weights(
 def weights_of_servo(loader: Loader, h: float) -> NDArray[np.float64]:
     """Return the map of a loader's servo over h seconds, as `servo_weights`.
 
-    Without a servo the place is δc itself, and the rate its mean over the substep.
+    Without a servo the position is δc itself, and the rate its mean over the substep.
     """
     if loader.servo_frequency == 0.0:
         return np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / h, 1.0 / h]])
@@ -165,7 +164,7 @@ LINKAGE = Declaration(
 def move_linkage(
     p: LinkageParameters, s: LinkageState, computed_before: float, computed: float, h: float
 ) -> None:
-    """Advance servo and play over a substep of h seconds in which δc moves as given, d."""
+    """Advance servo and backlash over a substep of h seconds for a given motion of δc, d."""
     before, after = commanded(p, s, computed_before, computed)
     a, b = p.position, p.speed
     x, v = s.position, s.rate
@@ -189,7 +188,7 @@ def move_linkage(
 
 @stage
 def bend(p: LinkageParameters, force: float) -> float:
-    """Return the structure's bend in d under a force in N: K·F of eq. (1), or its saturation."""
+    """Return the structure's bend in d under a force in N: K·F of eq. (1), with its saturation."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return p.bend_limit * math.tanh(compliance * force / p.bend_limit)
@@ -200,16 +199,15 @@ def bend(p: LinkageParameters, force: float) -> float:
 def bend_slope(p: LinkageParameters, force: float) -> float:
     """Return the bend's derivative by force, d/N.
 
-    With hysteresis that of a force which carries all of the bend with it: no force in the play
-    bends more, so a hand that takes this slope implicitly does not overshoot. What has mass does
-    not bend at once.
+    With hysteresis it is that of the whole bend, the largest slope, so that a hand that takes it
+    implicitly does not overshoot. A structure with mass does not bend at once.
     """
     return 0.0 if p.modal else static_slope(p, force)
 
 
 @stage
 def static_slope(p: LinkageParameters, force: float) -> float:
-    """Return the slope of `bend` by the force, d/N, of a structure that has come to rest."""
+    """Return the derivative of `bend` by the force, d/N, of a structure at rest."""
     compliance = p.bend if force >= 0.0 else p.push
     if p.bend_limit > 0.0:
         return compliance / math.cosh(compliance * force / p.bend_limit) ** 2
@@ -218,10 +216,10 @@ def static_slope(p: LinkageParameters, force: float) -> float:
 
 @stage
 def pressed(p: LinkageParameters, force: float) -> float:
-    """Return how far a force in N moves the grip ahead of the servo in a soft play at rest, d.
+    """Return the displacement of the grip from the servo by a force in N in a soft backlash, d.
 
-    Half of the play, and what its contact yields: sgn(F)·play/2 + F/k; 0 for a rigid contact,
-    behind which the servo takes the grip along.
+    At rest: half of the play, and the deflection of its contact, sgn(F)·play/2 + F/k; 0 for a rigid
+    contact, behind which the servo moves the grip.
     """
     if p.contact == 0.0 or force == 0.0:
         return 0.0
@@ -230,7 +228,7 @@ def pressed(p: LinkageParameters, force: float) -> float:
 
 @stage
 def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
-    """Begin at rest under the force at the first node, N."""
+    """Start at rest under the force at the first node, N."""
     half = 0.5 * p.width
     s.carried = min(max(s.carried, force - half), force + half)
     s.asked = s.bent = still(p, s, force)
@@ -238,7 +236,7 @@ def start_bend(p: LinkageParameters, s: LinkageState, force: float) -> None:
 
 @stage
 def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
-    """Let the force at a node, N, take along what remembers it, h seconds after the last node."""
+    """Advance the parts with a memory of the force to a node, h seconds after the last; N."""
     if p.contact > 0.0:
         _press(p, s, force, h)
     half = 0.5 * p.width
@@ -254,10 +252,10 @@ def carry(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None
 
 @stage
 def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> None:
-    """Move the grip in its play by the force, N, until the contact holds it."""
+    """Move the grip in its backlash by the force, N, until the contact holds it."""
     half, z = 0.5 * p.play, s.touch
     yields = force / p.contact
-    if abs(z) < half:  # nothing holds it but the damper
+    if abs(z) < half:  # only the damper acts
         s.touch = z + yields * h / CONTACT_s
     else:
         rests = (half if z > 0.0 else -half) + yields
@@ -267,7 +265,7 @@ def _press(p: LinkageParameters, s: LinkageState, force: float, h: float) -> Non
 
 @stage
 def still(p: LinkageParameters, s: LinkageState, force: float) -> float:
-    """Return the bend under a force in N as it would stay, d."""
+    """Return the static bend under a force in N, d."""
     bent = bend(p, force)
     if p.share > 0.0:
         half = 0.5 * p.width
@@ -284,7 +282,7 @@ def deflection(p: LinkageParameters, s: LinkageState, force: float) -> float:
 
 @stage
 def transducer(p: LinkageParameters, true: float) -> float:
-    """Return what the transducer at the grip reads of a true deflection, d: eqs. (15), (16)."""
+    """Return the transducer's reading of a true deflection, d: eqs. (15), (16)."""
     if p.arc_length > 0.0:
         return p.arc_length * math.sin(true / p.arc_length)
     return true

@@ -3,23 +3,22 @@
     m·δc'' + c·δc' + friction·sgn(δc') + breakout·sgn(δc) + springs(δc) + F_mod
         = F(t − delay) + F_offset − b·(n_z − 1),      −forward ≤ δc ≤ aft, inelastic stops
 
-F is the pilot's force, and with crosstalk a share of that on another control (`crossing`).
+F is the pilot's force, plus a share of that on another control by crosstalk (`crossing`).
 
-The springs, G_B·δc + k₃·δc³ and others, are in `springs`, the laws of friction in `friction`.
-A trim moves the neutral about which springs, breakout and F_mod act (`services`).
+The springs, G_B·δc + k₃·δc³ and others, are in `springs`, the laws of friction in `friction`. A
+trim moves the neutral about which springs, breakout and F_mod act (`services`).
 
-Friction, breakout and the stops are set-valued: each holds the control still with
-whatever force that takes, up to its limit. They are integrated as what they are, not
-smoothed: between two events (the control comes to rest, passes neutral, meets a
-stop) the equation is smooth and is stepped by the implicit midpoint rule, A-stable
-and of second order; an event inside a substep is located, and the rest of the substep
-goes on from there. So the order is kept through stick, slip and impact, and a
-control inside its friction band does not creep. A friction whose contact yields is no
-event, but a force that depends on the way.
+Friction, breakout and the stops are set-valued: each holds the control still with any force up to
+its limit. They are integrated without smoothing. Between two events (the control comes to rest,
+passes neutral, meets a stop) the equation is smooth and is stepped by the implicit midpoint rule,
+A-stable and of second order. An event inside a substep is located, and the rest of the substep
+continues from there. So the order is kept through stick, slip and impact, and a control inside its
+friction band does not creep. Presliding friction is not an event but a force that depends on the
+displacement.
 
-The springs enter by their slope at the midpoint (one Newton step), which keeps the order. An
-F_mod that lags, τ·y' = F_mod − y, is advanced by half a substep before the motion and half a
-substep after it (Strang's splitting), each exactly: of second order, too.
+The springs enter by their slope at the midpoint (one Newton step), which keeps the order. A lag of
+F_mod, τ·y' = F_mod − y, is advanced exactly by half a substep before the motion and half a substep
+after it (Strang splitting), also of second order.
 """
 
 from __future__ import annotations
@@ -45,40 +44,40 @@ from coupled.rig.springs import (
     stiffness,
 )
 
-MAX_EVENTS = 16  # events in one substep before the control is taken to be at rest
+MAX_EVENTS = 16  # events in one substep after which the control is taken to be at rest
 
 
 class LoaderParameters(SpringParameters, DelayParameters, Protocol):
-    """The electronics' settings beside the springs; d is m, or rad for a wheel."""
+    """Parameters of the electronics beside the springs; d is m, or rad for a wheel."""
 
     mass: float  # m, kg (N per d/s²)
     damping: float  # c, N·s/d
     breakout: float  # F_BO, N
     bob_weight: float  # b, N per g
-    offset: float  # F_offset, N, with the pilot's force
+    offset: float  # F_offset, N, in the direction of the pilot's force
     travel: float  # of the control to either side, d
-    aft: float  # where δc stops on the positive side, d: the travel, or a stop within it
+    aft: float  # stop of δc on the positive side, d: the travel, or a stop within it
     forward: float  # and on the negative side, as a size
 
 
 class LoaderState(SpringState, DelayState, Protocol):
-    """Where the computed control is."""
+    """The state of the computed control."""
 
     computed: float  # δc, d
     rate: float  # δc', d/s
-    mass: float  # m as it now is, kg: the file's, or by the gradient (`inertia`)
-    damping: float  # c as it now is, N·s/d
-    load: float  # the force that it carries, N; of use to friction that grows with it
-    bent: float  # by how much a friction's contact has yielded, d
-    leaked: float  # of another control's force, N, at the next node
+    mass: float  # current m, kg: the file's, or by the gradient (`inertia`)
+    damping: float  # current c, N·s/d
+    load: float  # force on the loader, N, for friction that grows with it
+    bent: float  # deflection of a friction's contact, d
+    leaked: float  # crosstalk of another control's force, N, at the next node
     external: float  # F_offset − b·(n_z − 1), N, held over the frame
     neutral: float  # x₀, about which the springs act, d (`services`)
-    loose: int  # the springs follow the control, and no breakout holds it
-    stop: int  # the stop met during this frame: −1, 0 or +1
+    loose: int  # the springs follow the control, without breakout
+    stop: int  # the stop reached during this frame: −1, 0 or +1
 
 
 def stop_of(travel: float, stop: float) -> float:
-    """Return where a control stops on one side, d: at its travel, or at a `stop` within it."""
+    """Return a control's stop on one side, d: its travel, or a `stop` within it."""
     return min(travel, stop) if stop > 0.0 else travel
 
 
@@ -99,13 +98,13 @@ LOADER = Declaration(
 
 @stage
 def set_external(p: LoaderParameters, s: LoaderState, load_factor: float) -> None:
-    """Set the forces that hold over a frame; load factor is +1 in level flight."""
+    """Set the forces that are constant over a frame; load factor is +1 in level flight."""
     s.external = p.offset - p.bob_weight * (load_factor - 1.0)
 
 
 @stage
 def start_loader(p: LoaderParameters, s: LoaderState, force: float) -> None:
-    """Begin at rest with the pilot's force at the first node, N, and none before it."""
+    """Start at rest with the pilot's force at the first node, N, and none before it."""
     s.mass, s.damping = p.mass, p.damping
     start_delay(p, s, force + s.leaked, 0.0)
 
@@ -114,10 +113,10 @@ def start_loader(p: LoaderParameters, s: LoaderState, force: float) -> None:
 def _release(
     p: LoaderParameters, s: LoaderState, holds: Ends, start: float, end: float, ends: Ends
 ) -> tuple[float, float]:
-    """Return when a control at rest begins to slide, as a share of the way, and to which side.
+    """Return when a control at rest begins to slide, as a share of the step, and its direction.
 
-    `start` and `end` are the net force on it at either end, N, which runs straight between;
-    `holds` what friction, and at neutral the breakout, can hold to either side. Side 0: it stays.
+    `start` and `end` are the net force at either end, N, linear in between; `holds` is what
+    friction, and at neutral the breakout, can hold to either side. Direction 0: it stays.
     """
     down, up = holds
     if s.computed >= ends[1] and start >= 0.0 and end >= 0.0:
@@ -136,7 +135,7 @@ def _release(
 
 @stage
 def _holds(friction: FrictionParameters, s: LoaderState, breakout: float) -> Ends:
-    """Return the least and the greatest net force that a control at rest withstands, N."""
+    """Return the least and the largest net force that a control at rest withstands, N."""
     preload = breakout if s.computed == s.neutral else 0.0
     if friction.rigid == 0:
         return -preload, preload
@@ -154,10 +153,10 @@ def _midpoint(
     direction: float,
     span: float,
 ) -> tuple[float, float]:
-    """Return δc' at the middle of a step of `span` seconds in which nothing happens, d/s.
+    """Return δc' at the middle of a step of `span` seconds without events, d/s.
 
-    And how far a friction's contact has yielded after it, d.
-    `push` is the force that does not depend on the motion, N.
+    And the deflection of a friction's contact after it, d. `push` is the force that does not depend
+    on the motion, N.
     """
     v = s.rate
     middle = s.computed + 0.5 * span * v - s.neutral
@@ -181,7 +180,7 @@ def _rest(
     left: float,
     ends: Ends,
 ) -> tuple[float, float]:
-    """Return how long a control at rest stays so, s, and to which side it then slides; 0: to none.
+    """Return how long a control at rest stays so, s, and in which direction it then slides, or 0.
 
     `pulls` are the pilot's force at the beginning and the end of the `left` seconds, N.
     """
@@ -209,7 +208,7 @@ def _pass_neutral(
     pull: float,
     left: float,
 ) -> None:
-    """Let the preload stop a control too slow to leave neutral within the `left` seconds."""
+    """Stop a control at neutral if it is too slow to leave the breakout in `left` seconds."""
     s.computed = s.neutral
     hold = breakout
     if friction.rigid:
@@ -222,7 +221,7 @@ def _pass_neutral(
 
 @stage
 def _strike(p: LoaderParameters, s: LoaderState, ends: Ends) -> None:
-    """Stop at the end that the control has met."""
+    """Stop at the end of travel that the control has reached."""
     above = s.computed - ends[0] > ends[1] - s.computed
     s.computed, s.rate = ends[1] if above else ends[0], 0.0
     if s.computed in (p.aft, -p.forward):
@@ -239,7 +238,7 @@ def _move(
     ends: Ends,
     h: float,
 ) -> None:
-    """Advance δc over a substep of h seconds with a held F_mod as it is felt."""
+    """Advance δc over a substep of h seconds with a constant F_mod."""
     before = s.delayed
     after = delayed(p, s, force)
     s.delayed = after
@@ -299,7 +298,7 @@ def move_loader(
     ends: Ends,
     h: float,
 ) -> None:
-    """Advance δc, between its `ends`, over h seconds to where the pilot's force is `force` N."""
+    """Advance δc within `ends` over h seconds, at whose end the pilot's force is `force` N."""
     if p.held:
         feel(p, m, s, s.computed - s.neutral)
     _move(p, friction, m, s, force + s.leaked, ends, h)

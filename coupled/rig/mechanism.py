@@ -1,7 +1,7 @@
-"""What runs on over a frame: one control's hand, gauge, loader and linkage, node by node.
+"""The loop over a frame: one control's hand, gauge, loader and linkage, node by node.
 
 The order of a substep is that of the signal chain: the hand's force at the new node, the gauge, the
-loader, the linkage, and what the hand then finds at the grip.
+loader, the linkage, and the resulting motion of the grip.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 def set_hand(
     p: ControlParameters, s: ControlState, script: float, held: float, held_rate: float
 ) -> None:
-    """Set the hand's force at a node for a script in N, and a held deflection in d and its rate."""
+    """Set the hand's force at a node from its script, N, and held deflection, d, with its rate."""
     h = p.clock.substep
     striving = ask(p.hand, s.hand, p.linkage, s.linkage, script, held, held_rate, h)
     force = s.hand.asked
@@ -37,13 +37,13 @@ def set_hand(
         computed = s.loader.computed
         force = within_reach(p.reach, s.reach, p.linkage, s.linkage, computed, force)
         if force != s.hand.asked:
-            striving = 0.0  # at its stop a hand does not strive for ever more
+            striving = 0.0  # no integral windup at the stop
     hold(p.hand, s.hand, p.linkage, s.linkage, force, striving, h)
 
 
 @seldom
 def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
-    """Return the force that the loader takes for the hand's at the next node, N."""
+    """Return the loader's input from the hand's force at the next node, N."""
     if p.gauge.present:
         force = gauge_force(p.gauge, s.gauge, force)
     return lead_force(p.inertia, s.inertia, force) if p.inertia.rows > 0 else force
@@ -51,14 +51,14 @@ def force_given(p: ControlParameters, s: ControlState, force: float) -> float:
 
 @seldom
 def sample_channels(p: ControlParameters, s: ControlState, left: int, first: bool) -> None:
-    """Let the host's converters have δc and F, `left` substeps before the frame's end."""
+    """Sample δc and F by the host's converters, `left` substeps before the frame's end."""
     at_gauge = s.gauge.force if p.gauge.present else s.hand.force
     sample(p.sensing, s.sensing, s.loader.computed, at_gauge, left, first)
 
 
 @stage
 def begin_frame(p: ControlParameters, s: ControlState, load_factor: float) -> bool:
-    """Set what holds over a frame; return whether the hand does no more than its script."""
+    """Set constants of the frame; return whether the hand applies its script only."""
     set_external(p.loader, s.loader, load_factor)
     s.loader.stop = 0
     take_set_point(p.linkage, s.linkage, s.loader.computed)
@@ -88,17 +88,17 @@ def run_node(
     """Run hand, loader and linkage over the substep that ends at a node.
 
     `force` and `held` are the hand's script on the nodes of the whole flight, N and d; the frame
-    began at `first_node`; `scripted` where the hand does no more than its script.
+    began at `first_node`; `scripted`: the hand applies its script only.
     """
     h, stopped, late = p.clock.substep, p.reach.reach > 0.0, p.modification.late
     if late > 0 and node == first_node + 1 + late:
         exchange_last(s.modification)
     move_muscle(p.hand, s.hand)
-    # The hand's impedance acts as it stood at the last node; its script runs on.
+    # The hand's impedance is that of the last node; its script is that of this one.
     before = s.loader.computed
     acting = s.hand.force
     if stopped and seated(s.reach, p.linkage, before) != 0:
-        acting = s.hand.asked  # of which the stop takes what it must
+        acting = s.hand.asked  # before the stop takes its part
     ahead = acting + force[node] - force[node - 1]
     if p.gauge.present != 0 or p.inertia.rows > 0:
         ahead = force_given(p, s, ahead)
@@ -127,9 +127,9 @@ def run_node(
 
 @stage
 def stands_alone(p: ControlParameters, s: ControlState) -> bool:
-    """Tell whether a control is no more than a hand, a loader and a linkage over a frame.
+    """Tell whether a control consists of hand, loader and linkage only over a frame.
 
-    No gauge between them, no services, no reach, nothing that comes late or remembers the force.
+    No gauge in between, no services, no reach, no delay or memory of the force.
     """
     if p.gauge.present or p.inertia.rows > 0 or p.reach.reach > 0.0 or s.services.on:
         return False
@@ -149,13 +149,13 @@ def run_frame(
 
     `force` and `held` are the hand's script on the nodes of the whole flight, N and d.
     """
-    scripted = begin_frame(p, s, load_factor)  # asked once a frame, not at every node
+    scripted = begin_frame(p, s, load_factor)  # once a frame, not at every node
     last = first_node + p.clock.substeps
     if not stands_alone(p, s):
         for node in range(first_node + 1, last + 1):
             run_node(p, s, force, held, first_node, node, scripted)
         return
-    # The same without what such a control has not, which to ask at every node takes a fifth.
+    # The same without optional stages, whose tests at every node take a fifth of the time.
     h, ends = p.clock.substep, (-p.loader.forward, p.loader.aft)
     for node in range(first_node + 1, last + 1):
         move_muscle(p.hand, s.hand)

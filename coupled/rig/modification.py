@@ -1,42 +1,41 @@
-"""Gradient modification: what the host adds to the basic gradient (figures 2 and 5).
+"""Gradient modification: the force that the host adds to the basic gradient (figures 2 and 5).
 
-The pilot is to feel F = F_BO + G₁·δ up to δ₁ and the slope G₂ beyond (appendix C).
-The loader itself gives F_BO + G_B·δc, so the host adds what lacks, eqs. (9) and (10):
+The pilot is to feel F = F_BO + G₁·δ up to δ₁ and the slope G₂ beyond (appendix C). The loader
+itself gives F_BO + G_B·δc, so the host adds the difference, eqs. (9) and (10):
 
     F_mod = ΔG·δc  (11),    ΔG = G_T − G_B                      without compensation
                             ΔG = G_T/(1 − K·G_T) − G_B          eq. (12), with it
 
-since the loader sees δc = δ − K·F. With a breakout, solving that for δ gives
+since the loader measures δc = δ − K·F. With a breakout, solving that for δ gives
 δ = (δc + K·F_BO)/(1 − K·G₁): eq. (11) needs one more term, a breakout of
 
     F_extra = G₁·K·F_BO/(1 − K·G₁)
 
-which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too
-little at every deflection, G being the slope there.
+which appendix C leaves out. `exact` adds it; as printed, the pilot feels K·G·F_BO too little at
+every deflection, G being the slope there.
 
-The break lies at δc₁ = δ₁ − K·F(δ₁): the author's reading, since the report's flow chart is
-lost, and its text says only that the bend is included. Where K·F(δ₁) ≥ δ₁ it lies within what
-the breakout bends: δc leaves neutral at the force at which δ = K·F(δ), which is on the second
-segment, so that G₂ holds from there on and F_extra fills up to it,
+The break is at δc₁ = δ₁ − K·F(δ₁). This is the author's interpretation, since the report's flow
+chart is lost, and its text says only that the bend is included. If K·F(δ₁) ≥ δ₁ the break is within
+the bend by the breakout: δc leaves neutral at the force at which δ = K·F(δ), which is on the second
+segment, so that G₂ applies from there on and F_extra adds the rest,
 
     F_extra = F₀/(1 − K·G₂) − F_BO,    F₀ = F_BO + (G₁ − G₂)·δ₁
 
-Below that force the loader stands at neutral and the grip moves by the bend alone, δ = K·F,
-whatever is specified: no F_mod(δc) can give it.
+Below that force the loader is at neutral and the grip moves by the bend alone, δ = K·F, whatever is
+specified: no F_mod(δc) can change it.
 
-The host asks for ΔF in volts, v₂ = S₂·ΔF: a scale S₂ that is off makes another force of it.
-With the analog multiplier (figures 3 and 5) the host sends ΔG, scaled by Ŝ₂/Ŝ₁, and the product
-is made of v₁ = S₁·δc, eq. (2). So a wrong S₁ of the loader's electronics is felt,
+The host commands ΔF in volts, v₂ = S₂·ΔF, so an error of S₂ scales the force. With the analog
+multiplier (figures 3 and 5) the host sends ΔG, scaled by Ŝ₂/Ŝ₁, and the product uses v₁ = S₁·δc,
+eq. (2). So an error of the electronics' S₁ is felt,
 
     ΔF = ΔG·δc·(S₁/Ŝ₁)·(Ŝ₂/S₂),
 
-and the break lies where v₁ says that δc is δc₁. A digital product is made of δc as the host
-reads it, to the same effect.
+and the break is where v₁ corresponds to δc₁. A digital product uses δc as the host reads it, to the
+same effect.
 
-An analog multiplier is not at zero where its product is: to F_mod it adds an offset, which
-drifts in time, F_offset + r·t, set anew at each frame. What the host puts out may come late by
-a part of the frame; until then the last frame's ΔG stands (or its product, where that is what
-the host makes).
+An analog multiplier adds an offset to F_mod, which drifts in time, F_offset + r·t, updated at each
+frame. The host's output may be late by a part of the frame; until then the last frame's ΔG applies
+(or its product, if the host computes the product).
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ total_to_computed = stage(equations.total_to_computed)  # eq. (12), without its 
 
 
 class ModificationParameters(Protocol):
-    """What the host assumes of the loader, and which corrections it makes."""
+    """The host's assumptions on the loader, and its corrections."""
 
     basic_gradient: float  # G_B as the host assumes it, N/d
     bend: float  # K̂, d/N
@@ -60,12 +59,12 @@ class ModificationParameters(Protocol):
     break_deflection: float  # δ₁, d; 0 for one segment
     compensated: int  # gradient compensation, eq. (12), on or off
     exact: int  # with the breakout's term, or as printed
-    digital: int  # the product ΔG·δc is made by the host and held over a frame
-    made: float  # ΔF as made over ΔF as asked for: S₂ assumed over real
-    multiplied: float  # δc as the analog multiplier has it over δc: S₁ real over assumed
+    digital: int  # the product ΔG·δc is computed by the host and held over a frame
+    made: float  # ΔF over the ΔF ordered: S₂ assumed over real
+    multiplied: float  # δc in the analog multiplier over δc: S₁ real over assumed
     offset: float  # of the analog multiplier at the start, N
     drift: float  # N a frame
-    late: int  # substeps after t_k at which what the host puts out arrives
+    late: int  # substeps after t_k at which the host's output arrives
 
 
 class ModificationState(Protocol):
@@ -91,7 +90,7 @@ def _analog(g: Given) -> float:
 
 
 def _multiplied(given: Given) -> float:
-    """Return S₁/Ŝ₁ of the analog multiplier; a digital product has it in the δc that is read."""
+    """Return S₁/Ŝ₁ of the analog multiplier; a digital product has it in the δc as read."""
     control = given.control
     return control.sensing.computed_scale if control.loader.multiplier == "hybrid" else 1.0
 
@@ -122,13 +121,13 @@ MODIFICATION = Declaration(
 
 @stage
 def assumed_bend(p: ModificationParameters) -> float:
-    """Return the K̂ by which ΔG is made, d/N; 0 without gradient compensation."""
+    """Return the K̂ in ΔG, d/N; 0 without gradient compensation."""
     return p.bend if p.compensated else 0.0
 
 
 @stage
 def assume(p: ModificationParameters, bend: float) -> None:
-    """Set the K̂ by which ΔG is made, d/N; 0 is without gradient compensation."""
+    """Set the K̂ in ΔG, d/N; 0 is without gradient compensation."""
     p.bend = bend
     p.compensated = 1
 
@@ -137,7 +136,7 @@ def assume(p: ModificationParameters, bend: float) -> None:
 def set_gradients(
     p: ModificationParameters, s: ModificationState, first: float, second: float
 ) -> None:
-    """Set the modification for the gradients G₁ and G₂ that the schedule asks for, N/d.
+    """Set the modification for the gradients G₁ and G₂ of the schedule, N/d.
 
     Eq. (12) for each segment; appendix C, with the breakout's term or as printed.
     """
@@ -150,8 +149,8 @@ def set_gradients(
         force = preload + first * p.break_deflection
         s.break_computed = computed_deflection(p.break_deflection, force, bend)
         if s.break_computed <= 0.0:
-            # What holds at the break bends further than δ₁: the loader's first motion is
-            # beyond it already, on the second segment's line F = preload + G₂·δ.
+            # The force at the break bends further than δ₁: the loader's first motion is beyond it,
+            # on the second segment's line F = preload + G₂·δ.
             s.break_computed = 0.0
             preload += (first - second) * p.break_deflection
             first = second
@@ -168,14 +167,14 @@ def set_gradients(
 
 @stage
 def keep_last(s: ModificationState) -> None:
-    """Keep what stands at the end of a frame, for a host whose output comes late."""
+    """Store the values at the end of a frame, for a host with a late output."""
     s.last_first, s.last_second, s.last_break_computed = s.first, s.second, s.break_computed
     s.last_breakout, s.last_held, s.last_offset = s.breakout, s.held, s.offset
 
 
 @stage
 def exchange_last(s: ModificationState) -> None:
-    """Exchange what this frame's output is with what the last one's was."""
+    """Exchange this frame's output and the last one's."""
     s.first, s.last_first = s.last_first, s.first
     s.second, s.last_second = s.last_second, s.second
     s.break_computed, s.last_break_computed = s.last_break_computed, s.break_computed
@@ -186,7 +185,7 @@ def exchange_last(s: ModificationState) -> None:
 
 @stage
 def smooth_force(s: ModificationState, computed: float) -> float:
-    """Return F_mod in N without its breakout, at δc in d: eq. (11), in two segments, and offset."""
+    """Return F_mod in N without its breakout, at δc in d: eq. (11), two segments, with offset."""
     force = s.first * computed + s.offset
     if s.break_computed > 0.0:
         beyond = abs(computed) - s.break_computed

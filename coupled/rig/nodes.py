@@ -1,4 +1,4 @@
-"""Signals between the frames: the cubic spline through the samples, on the loader's own steps."""
+"""Signals between the frames: the cubic spline through the samples, at the loader's steps."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ Floats = NDArray[np.float64]
 
 
 def on_nodes(rig: Rig, samples: Floats) -> Floats:
-    """Return a signal on the loader's nodes: `rig.substeps` a frame, and the last.
+    """Return a signal on the loader's nodes: `rig.substeps` for each frame, and the last.
 
-    Not to be written to: who asks for the same again has the same array.
+    The array is cached and must not be written to.
     """
     return _on_nodes(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), rig.substeps)
 
 
 def coarsely(rig: Rig, samples: Floats) -> Floats:
-    """Return a signal on the loader's nodes, along the spline through every other sample.
+    """Return a signal on the loader's nodes, by the spline through every other sample.
 
-    A replay by it departs from that by all samples as much as that is wrong, or more: Richardson's
-    rule for the lowest order, 1, that of a force that jumps between two frames.
+    The change of a replay with it bounds the interpolation error: Richardson's rule for order 1,
+    that of a force that jumps between two frames.
     """
     last = len(samples) - 1
     kept = np.unique(np.append(np.arange(0, last, 2), last))
@@ -36,7 +36,7 @@ def coarsely(rig: Rig, samples: Floats) -> Floats:
 
 
 class Nodes:
-    """A signal on the nodes of any rig of its frame rate, however finely its loader is stepped.
+    """A signal on the nodes of any rig of its frame rate, for any loader rate.
 
     `interpolate` is the spline (`on_nodes`), or `coarsely`.
     """
@@ -65,11 +65,10 @@ def _on_nodes(samples: bytes, substeps: int) -> Floats:
 
 @long_entry
 def _splined(y: Floats, work: Floats, substeps: int, out: Floats) -> None:
-    """Write a cubic spline's values, so many a sample, and the last; for four samples or more.
+    """Write a cubic spline's values, so many for each sample, and the last; four samples or more.
 
-    Its third derivative does not jump at the second sample, nor at the last but one. The slopes at
-    the samples solve a tridiagonal system (de Boor, A Practical Guide to Splines, 1978, ch. IV),
-    whose rows are brought to a diagonal in order.
+    Not-a-knot conditions at both ends. The slopes at the samples solve a tridiagonal system (de
+    Boor, A Practical Guide to Splines, 1978, ch. IV), by elimination in order.
     """
     last = len(y) - 1
     slope, above = work[0], work[1]

@@ -1,4 +1,4 @@
-"""From a rig's data to the kernels' parameters, as the stages declare them."""
+"""From a rig's data to the kernels' parameters, by the stages' declarations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["COMMAND_SIGN", "Hand", "first_order_gain", "pack"]
 def crossed_bends(
     rig: Rig, control: str, names: Sequence[str]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return K_ij and the host's K̂_ij of a control by forces on those named, d/N; its own 0."""
+    """Return K_ij and the host's K̂_ij of a control for the forces on others, d/N; its own 0."""
     at, structure = list(names).index(control), rig.structure
     corrected = rig.controls[cast(ControlName, control)].compensation.deflection
     bends = structure.between(names)[at]
@@ -33,7 +33,7 @@ def pack(
 ) -> ControlArray:
     """Return a rig's controls at rest in trim, shape (controls,), in the rig's order.
 
-    With `only`, that control alone. Raises KeyError where the rig has no such control.
+    With `only`, that control alone. Raises KeyError if the rig has no such control.
     """
     found = {str(name): control for name, control in rig.controls.items()}
     if only is not None:

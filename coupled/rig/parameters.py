@@ -1,9 +1,8 @@
 """The sections of a control-loading rig: the data of a rig file, checked and frozen.
 
-Each section below is a table of the file; a field's key there is its name and its
-unit, d being m for column and pedals and rad for a wheel (`schema`). A neutral value
-(0, or 1 for a factor) leaves an effect out. Signs: pull, clockwise and right foot
-forward are positive.
+Each section is a table of the file; a field's key there is its name and its unit, d being m for
+column and pedals and rad for a wheel (`schema`). A neutral value (0, or 1 for a factor) leaves an
+effect out. Signs: pull, clockwise and right foot forward are positive.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import Annotated, Literal
 
 from coupled.schema import Section, named, quantity, text_like
 
-# A name that may become a file's: letters, digits, dot, dash, underscore.
+# A name usable in a file name: letters, digits, dot, dash, underscore.
 PLAIN_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,79}$"
 PlainName = Annotated[
     str,
@@ -25,11 +24,11 @@ PlainName = Annotated[
 MAX_ROWS = 32  # of a schedule's table
 DELAY_SLOTS = 1024  # of the loader's force history, in substeps; a power of two
 GAUGE_SLOTS = 256  # of the gauge's, likewise
-SERVO_DAMPING_RATIO = 0.7  # of a servo that a fit adds to a rig without one; usual
+SERVO_DAMPING_RATIO = 0.7  # usual; of a servo that a fit adds to a rig without one
 
 
 class Loader(Section):
-    """Electronics, servo and structure: the hardware, as it really is."""
+    """Electronics, servo and structure: the true hardware."""
 
     mass: float = quantity("kg", gt=0)
     damping: float = quantity("N_s_per_{d}", ge=0)
@@ -79,7 +78,7 @@ class Loader(Section):
 
 
 class Schedule(Section):
-    """Gradient against dynamic pressure, and what may be wrong with its use."""
+    """Gradient over dynamic pressure, and faults of its use."""
 
     dynamic_pressure: list[float] = quantity("Pa", min_length=2)
     total_gradient: list[float] = quantity("N_per_{d}")
@@ -91,7 +90,7 @@ class Schedule(Section):
 
 
 class Compensation(Section):
-    """Which corrections the host makes, and the numbers that it assumes of the hardware."""
+    """The host's corrections, and the numbers that it assumes of the hardware."""
 
     deflection: bool
     gradient: bool
@@ -110,8 +109,8 @@ class Compensation(Section):
 class Sensing(Section):
     """Gauge, scales and converters between loader and host (figure 3); 0 bits is no converter.
 
-    Each scale is real over assumed. S₁ is in two parts: the electronics' own (`computed_scale`),
-    in v₁ for host and analog multiplier alike, and that of the host's reading of v₁ alone.
+    Each scale is real over assumed. S₁ has two parts: the electronics' own (`computed_scale`), in
+    v₁ for host and analog multiplier alike, and that of the host's reading of v₁ alone.
     """
 
     computed_scale: float = quantity("", 1.0, gt=0)
@@ -142,12 +141,12 @@ class Sensing(Section):
 
     @property
     def read_scale(self) -> float:
-        """δc as the host reads it over δc as it is."""
+        """δc as the host reads it over δc."""
         return self.computed_scale * self.deflection_scale
 
 
 class Rigging(Section):
-    """The run from the host's command to the surface."""
+    """The chain from the host's command to the surface."""
 
     stretch_loss: float = quantity("per_Pa", 0.0, ge=0)
     lag: float = quantity("s", 0.0, ge=0)
@@ -157,7 +156,7 @@ class Rigging(Section):
 
 
 class Services(Section):
-    """What the loader gives beside gradient and breakout; 0 leaves a service out (`services`)."""
+    """Services of the loader; 0 leaves a service out (`services`)."""
 
     autopilot_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     autopilot_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
@@ -189,9 +188,9 @@ class Services(Section):
 
 
 class Gains(Section):
-    """What is fixed before any readings are taken; 0 for a ratio that is not known (figure 3).
+    """Gains set before any readings are taken; 0 for an unknown ratio (figure 3).
 
-    `low_gradient` is the one set while S₁ is calibrated at a low gradient, eq. (7a); 0 for the
+    `low_gradient` is the one used for a calibration of S₁ at a low gradient, eq. (7a); 0 for the
     schedule's lowest.
     """
 
@@ -202,9 +201,9 @@ class Gains(Section):
 
 
 class Calibration(Section):
-    """What a calibration found, with standard errors, and the gains it was made under.
+    """The results of a calibration, with standard errors, and the gains during it.
 
-    `readings` is 0 where there has been none; S2 is 0 where it was not found.
+    `readings` is 0 without a calibration; S2 is 0 if it was not found.
     """
 
     readings: int = quantity("", 0, ge=0)
@@ -240,24 +239,24 @@ class Control(Section):
     gains: Gains = Gains()
     rigging: Rigging = Rigging()
     calibration: Calibration = Calibration()
-    # How well the numbers above are known: half of a 95 % interval by their keys, in their units.
+    # Tolerances of the numbers above: half a 95 % interval by key, in the key's unit.
     tolerance: dict[str, float] = {}
 
     @property
     def assumed_basic_gradient(self) -> float:
-        """G_B as the host has it, N/d: the loader's own where the file says nothing else."""
+        """G_B assumed by the host, N/d; by default the loader's own."""
         given = self.compensation.basic_gradient
         return self.loader.basic_gradient if given is None else given
 
     @property
     def assumed_breakout(self) -> float:
-        """F_BO as the host has it, N: the loader's own where the file says nothing else."""
+        """F_BO assumed by the host, N; by default the loader's own."""
         given = self.compensation.breakout
         return self.loader.breakout if given is None else given
 
 
 class Flight(Section):
-    """The JSBSim model, how it is loaded, trimmed and flown, factors on its moments, the air."""
+    """The JSBSim model, its loading and trim, factors on its moments, and the air."""
 
     model: Annotated[
         str, text_like(r"[^\x00-\x1f\x7f/\\]{1,120}", "should be the name of a JSBSim model")

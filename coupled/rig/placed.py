@@ -1,9 +1,9 @@
-"""The frame step as a flight calls it: its arrays stand at an address, and are handed over once.
+"""The frame step as called by a flight: its arrays are at an address, passed only once.
 
-At every frame they would cost as much as half of the physics. Numbers cost, too: each some 8 ns to
-hand over, and 20 to make of a command. So a rig of a column alone hands over the longitudinal
-motion and takes one command; a rig of more, the whole motion and three. Both are short entries
-that put the motion beside the arrays and call one frame step, which is compiled once for any rig.
+Passing them at every frame would cost half as much as the physics. Numbers cost, too: each some
+8 ns to pass, and 20 for a returned command. So a rig of a column alone passes the longitudinal
+motion and returns one command; other rigs pass the whole motion and return three. Both are short
+entries that store the motion beside the arrays and call one frame step, compiled once for any rig.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ _BESIDE = WHOLE_MOTION + 3  # the motion, the second and third command, and the 
 
 
 class Placed:
-    """A flight's arrays as `step_frame_at` finds them, kept alive: those of `step_frame`.
+    """A flight's arrays for `step_frame_at`, kept alive: those of `step_frame`.
 
-    Column 0 of the record is the time, at `frame_rate_Hz`.
-    `elsewhere`: hand and loader are not simulated, but measured; only the host's part is done.
+    Column 0 of the record is the time, at `frame_rate_Hz`. `elsewhere`: hand and loader are
+    measured, not simulated; only the host's part is computed.
 
     `run_column` takes `address`, the frame's number and the longitudinal motion (SI, in the
-    channels' order), and returns the first control's command; `run_all` takes the lateral motion
-    behind it, and returns three commands.
+    channels' order), and returns the first control's command; `run_all` also takes the lateral
+    motion, and returns three commands.
     """
 
     def __init__(
@@ -61,15 +61,15 @@ class Placed:
         self.run_column, self.run_all = kernels.run_column, kernels.run_all
 
     def frame(self, k: int, motion: tuple[float, ...]) -> Commands:
-        """Run frame k under the whole motion, and return the surface commands of all controls."""
+        """Run frame k with the whole motion, and return the surface commands of all controls."""
         return self.run_all(self.address, k, *motion)
 
 
 @entry
 def step_frame_at(address: int, k: int) -> float:
-    """Run `step_frame` on the arrays and the motion placed at `address`; return one command.
+    """Run `step_frame` on the arrays and the motion at `address`; return one command.
 
-    The other two are left beside the motion.
+    The other two are stored beside the motion.
     """
     at = carray(pointer(address), 10, np.int64)
     controls = carray(pointer(at[0]), (at[1],), CONTROL)
@@ -142,7 +142,7 @@ def _run_all(
 
 
 class Kernels(NamedTuple):
-    """The machine code of the entries; `step_frame` is where it lies."""
+    """The machine code of the entries; `step_frame` is an address."""
 
     step_frame: int
     run_column: Callable[..., float]
@@ -151,7 +151,7 @@ class Kernels(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _kernels() -> Kernels:
-    """Return the machine code, which numba takes a third of a millisecond to find."""
+    """Return the machine code, cached, since numba takes a third of a millisecond to find it."""
     along, whole = (0.0,) * len(LONGITUDINAL), (0.0,) * WHOLE_MOTION
     code = machine_code(step_frame_at, 0, 0)
     return Kernels(code, bound(_run_column, 0, 0, *along), bound(_run_all, 0, 0, *whole))

@@ -1,24 +1,24 @@
-"""The reach of a hand: a stop at the grip, where the limb is straight or the column meets the cab.
+"""The reach of a hand: a stop at the grip, where the arm is straight or the column meets the cab.
 
-The grip at δ = ±r stops the whole chain behind it, inelastically. Loader and servo go no further
-than the place x at which the grip, under the force that moves it there slowly, stands at the reach:
+The grip at δ = ±r stops the whole chain behind it, inelastically. Loader and servo stop at the
+position x at which the grip, under the force of a slow motion, is at the reach:
 
     x + yields(F_x) + others = r,      F_x = F_BO + (G_B + ΔG)·x + k₃·x³ + friction − F_external
 
-`yields` is all that lies between servo and grip: the bend, as its hysteresis stands at the frame,
-and a play whose contact yields; `others` is what the forces on other controls bend here. Loader and
-servo are stopped there as at the loader's own stops. What stops their masses is an impulse, which
-is not in the force of a node.
+`yields` is the displacement between servo and grip: the bend, with its hysteresis at the frame, and
+a soft backlash; `others` is the bend by forces on other controls. Loader and servo are stopped
+there as at the loader's own stops. Their masses are stopped by an impulse, which is not part of the
+force at a node.
 
-The stop takes what a hand asks for beyond the force at which the grip stands at the reach,
+The stop takes the part of the hand's force beyond the force at which the grip is at the reach,
 
     at + yields(F) + others ≤ r,     at = the servo's side
 
-and of a linkage that does not yield, beyond F_x once δc is at x. What does not follow the force at
-once (a structure with mass, a soft play behind its damper) is stopped where δ = r: it goes no
-further, and a structure with mass keeps no speed outward.
+and in a rigid linkage, the part beyond F_x once δc is at x. Parts that do not follow the force at
+once (a structure with mass, a soft backlash with its damper) are stopped at δ = r: they go no
+further, and a structure with mass keeps no outward speed.
 
-Where x moves inward, as the gradient rises with q̄, the stop takes more by the same rule, and the
+If x moves inward, as the gradient rises with q̄, the stop takes more by the same rule, and the
 loader follows by its own motion. δ then exceeds r by rounding only: over random structures, forces
 and gradients a test bounds the excess by 1e-9 m. On a loader with a transport delay or a servo the
 stop acts at once.
@@ -48,17 +48,17 @@ from coupled.rig.springs import limited, spring, spring_slope
 _ITERATIONS = 40
 _HALVINGS = 64  # to the last digit of a double
 _SEAT = 1e-12  # of a deflection: rounding
-_NO_FORCE = 1e30  # N: no force brings the grip to its reach
+_NO_FORCE = 1e30  # N: the grip cannot get to its reach
 
 
 class ReachParameters(Protocol):
-    """How far a hand goes."""
+    """The limit of a hand's deflection."""
 
-    reach: float  # r on both sides, d; 0 for a hand that goes as far as the control
+    reach: float  # r on both sides, d; 0 for the control's travel
 
 
 class ReachState(Protocol):
-    """Where the grip stands at its reach, on either side, over a frame."""
+    """The stop positions at the reach on either side, over a frame."""
 
     top: float  # x on the positive side, d, before the bend
     bottom: float  # on the negative side
@@ -76,7 +76,7 @@ REACH = Declaration(
 
 @stage
 def unbent(p: LinkageParameters, by: float) -> float:
-    """Return the force in N that bends the structure by so much, d: `bend` solved for F, K > 0."""
+    """Return the force in N for a bend of the structure, d: `bend` solved for F, K > 0."""
     compliance = p.bend if by >= 0.0 else p.push
     if compliance == 0.0:
         return _NO_FORCE if by > 0.0 else -_NO_FORCE
@@ -99,7 +99,7 @@ def _place(
     linkage_p: LinkageParameters,
     linkage: LinkageState,
 ) -> tuple[float, float]:
-    """Return x and F_x on a side, both as sizes, by Newton's rule kept within its bracket."""
+    """Return x and F_x on a side, both as sizes, by bracketed Newton's method."""
     low, high = 0.0, p.aft if side > 0.0 else p.forward
     x = min(r, high)
     rubs = friction.running + more_friction(friction, 0.0, side)
@@ -131,7 +131,7 @@ def _place(
 
 @stage
 def free(stop: ReachState) -> None:
-    """Let a hand go as far as its own structure's bend, before the first frame."""
+    """Set no limit by the reach, before the first frame."""
     stop.top_force, stop.bottom_force = _NO_FORCE, -_NO_FORCE
 
 
@@ -146,7 +146,7 @@ def set_reach(
     linkage_p: LinkageParameters,
     linkage: LinkageState,
 ) -> None:
-    """Find where the grip stands at its reach with a frame's gradients and external force."""
+    """Find the stop positions at the reach for a frame's gradients and external force."""
     r = p.reach
     stop.top, stop.top_force = _place(r, 1.0, loader_p, friction, m, loader, linkage_p, linkage)
     size, force = _place(r, -1.0, loader_p, friction, m, loader, linkage_p, linkage)
@@ -155,7 +155,7 @@ def set_reach(
 
 @stage
 def _dragged(p: LinkageParameters) -> float:
-    """Return by how much the servo may be ahead of the grip, d: half of a play that is rigid."""
+    """Return the servo's lead over the grip, d: half of a rigid backlash."""
     return 0.0 if p.contact > 0.0 else 0.5 * p.play
 
 
@@ -167,7 +167,7 @@ def bounds(
     linkage_p: LinkageParameters,
     computed: float,
 ) -> tuple[float, float]:
-    """Return how far down and up δc may go in a substep, d: the travel, or the reach.
+    """Return the range of δc in a substep, d, by the travel or the reach.
 
     From beyond the reach, if it has moved inward, only back.
     """
@@ -182,7 +182,7 @@ def bounds(
 def stop_linkage(
     stop: ReachState, p: LinkageParameters, s: LinkageState, position: float, grip: float
 ) -> None:
-    """Stop servo and grip where the reach stops them; `position` and `grip` are those before."""
+    """Stop servo and grip at the reach; `position` and `grip` are those before."""
     half = _dragged(p)
     top, bottom = max(stop.top + half, position), min(stop.bottom - half, position)
     if s.position > top:
@@ -197,7 +197,7 @@ def stop_linkage(
 
 @stage
 def seated(stop: ReachState, p: LinkageParameters, computed: float) -> int:
-    """Tell on which side δc stands where the reach stops it, or 0."""
+    """Return the side on which δc is at its stop by the reach, or 0."""
     half = _dragged(p)
     if abs(computed - (stop.top + half)) <= _SEAT * abs(computed):
         return 1
@@ -206,9 +206,9 @@ def seated(stop: ReachState, p: LinkageParameters, computed: float) -> int:
 
 @seldom
 def _brought(p: LinkageParameters, s: LinkageState, by: float, side: float) -> float:
-    """Return the greatest force to a side, N, that takes the grip no further than `by`, d.
+    """Return the largest force to a side, N, that displaces the grip by at most `by`, d.
 
-    By halving: the bend, as its hysteresis now stands, and a soft play at rest rise with the force.
+    By bisection: bend, with its current hysteresis, and a soft backlash at rest grow with force.
     """
     if p.contact > 0.0:
         widest = p.contact * (abs(by) + 0.5 * p.play)
@@ -236,7 +236,7 @@ def _most(
     computed: float,
     side: float,
 ) -> float:
-    """Return the force to a side, N, beyond which the stop takes what is asked for."""
+    """Return the force to a side, N, beyond which the stop takes the rest."""
     outward, inward = linkage_p.bend, linkage_p.push
     if side < 0.0:
         outward, inward = inward, outward
@@ -250,7 +250,7 @@ def _most(
     servo = linkage.position if linkage_p.contact > 0.0 else linkage.grip
     by = side * p.reach - (servo + linkage.others)
     if side * by < 0.0 and inward == 0.0 and linkage_p.contact == 0.0:
-        return 0.0  # it stands beyond, and no force bends it back
+        return 0.0  # it is beyond the reach, and no force bends it back
     if linkage_p.share > 0.0 or linkage_p.contact > 0.0:
         return _brought(linkage_p, linkage, by, side)
     return unbent(linkage_p, by)
@@ -265,14 +265,14 @@ def within_reach(
     computed: float,
     asked: float,
 ) -> float:
-    """Return the force of one asked for, N, that the stop leaves on the grip."""
+    """Return the part of a force, N, that the stop leaves on the grip."""
     top = _most(p, stop, linkage_p, linkage, computed, 1.0)
     return max(min(asked, top), _most(p, stop, linkage_p, linkage, computed, -1.0))
 
 
 @seldom
 def stop_grip(p: ReachParameters, linkage_p: LinkageParameters, s: LinkageState, f: float) -> None:
-    """Stop at the reach what has not followed the force at once; F at the node in N."""
+    """Stop parts at the reach that did not follow the force at once; F at the node in N."""
     if not (linkage_p.modal or linkage_p.contact > 0.0):
         return
     at = deflection(linkage_p, s, f)

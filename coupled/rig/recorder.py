@@ -1,8 +1,8 @@
-"""Recorder: channels of a record that are stamped late, or early, against the others.
+"""Recorder: channels of a record with late or early time stamps.
 
-What is stamped so late was true so much before; between frames it goes along the cubic through
-the four next to it. The host knows nothing of it. Before the first frame and after the last a
-channel stands.
+A channel stamped late has earlier values; between frames they are interpolated by the cubic through
+the four nearest. The host is not affected. Before the first frame and after the last a channel is
+constant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 def stamped(signal: Floats, late: float) -> Floats:
-    """Return a signal as recorded, stamped so many frames late; shape (frames,), four or more."""
+    """Return a signal as recorded, stamped `late` frames late; shape (frames,), four or more."""
     if late == 0.0:
         return signal
     given = np.ascontiguousarray(signal, dtype=np.float64)
@@ -29,7 +29,7 @@ def stamped(signal: Floats, late: float) -> Floats:
 
 @long_entry
 def _moved(signal: Floats, late: float, out: Floats) -> Floats:
-    """Return a signal as it was so many frames before."""
+    """Return a signal delayed by `late` frames."""
     last = len(signal) - 1
     for i in range(last + 1):
         at = min(max(i - late, 0.0), float(last))
@@ -45,7 +45,7 @@ def _moved(signal: Floats, late: float, out: Floats) -> Floats:
 
 
 def moved_channels(controls: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels that are of the aircraft's motion, and neither q̄ nor a surface."""
+    """Return the channels of the aircraft's motion except q̄ and surfaces."""
     every = motion_channels(controls, flown=True)
     return tuple(
         name
@@ -55,7 +55,7 @@ def moved_channels(controls: Sequence[str]) -> tuple[str, ...]:
 
 
 def lateness(rig: Rig) -> dict[str, float]:
-    """Return by how many frames each channel is stamped late, of those that are."""
+    """Return the delay of each channel's stamps, frames, if not zero."""
     late: dict[str, float] = {}
     for name, control in rig.controls.items():
         late[channel(name, "force")] = control.sensing.force_stamp * rig.frame_rate
@@ -66,7 +66,7 @@ def lateness(rig: Rig) -> dict[str, float]:
 
 
 def stamp(rig: Rig, channels: Sequence[str], data: Floats, noise: Floats) -> None:
-    """Stamp a record's channels, shape (frames, channels), in place; their noise stays."""
+    """Stamp a record's channels, shape (frames, channels), in place, without their noise."""
     for name, late in lateness(rig).items():
         at = channels.index(name)
         data[:, at] = stamped(data[:, at] - noise[:, at], late) + noise[:, at]

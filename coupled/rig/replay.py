@@ -1,8 +1,7 @@
-"""Each stage alone, driven by its measured input: the same stage functions that fly.
+"""Each stage alone, driven by its measured input, with the stage functions of a flight.
 
-The chain is cut at every measured signal, so that a fault upstream is inherited by
-nobody. Signals are given at the frames; between them what is continuous in the rig
-(force, δc) runs along the cubic spline through its samples (`nodes`).
+The chain is cut at every measured signal, so a fault upstream does not affect a stage. Signals are
+given at the frames; continuous ones (force, δc) are interpolated by cubic splines (`nodes`).
 """
 
 from __future__ import annotations
@@ -42,10 +41,10 @@ def replay_schedule(
     beyond: bool = False,
     missed: Mask | None = None,
 ) -> Floats:
-    """Return G_T in N/d for the dynamic pressure that the host had at each frame.
+    """Return G_T in N/d for the host's dynamic pressure at each frame.
 
-    `beyond` asks for that beyond the break, on a rig of two segments; `missed` are the frames that
-    the host missed, never the first.
+    `beyond`: that beyond the break, on a rig of two segments; `missed` are the frames that the
+    host missed, never the first.
     """
     p, s = _one(rig, control)
     ran = pressure_Pa if missed is None else pressure_Pa[~missed]
@@ -65,10 +64,9 @@ def replay_loader(
 ) -> tuple[Floats, Floats]:
     """Return δc in d and F_mod in N at each frame.
 
-    `gradient` is G_T in N/d as the schedule gave it (`second` that beyond the break, where
-    there is one), `misread` what the host read of δc beyond what it was, d: a digital multiplier
-    makes its product of both. The loader starts at rest at neutral; with `restart`, it is put
-    back to a measured state now and then.
+    `gradient` is the schedule's G_T in N/d (`second` that beyond the break, if there is one),
+    `misread` the host's reading of δc less δc, d, for a digital product. The loader starts at rest
+    at neutral; with `restart`, it is reset to measured states.
     """
     nodes = on_nodes(rig, force_N)
     return drive_loader(rig, control, nodes, gradient, misread, load_factor, second, restart)
@@ -85,11 +83,11 @@ def drive_loader(
     restart: Restart | None = None,
     host: Hosted = HOSTED,
 ) -> tuple[Floats, Floats]:
-    """Do as `replay_loader`, with the force given on the loader's nodes, straight between them.
+    """Return the same as `replay_loader`, with the force on the loader's nodes, linear between.
 
-    `nodes_N` has `rig.substeps` values a frame and one more. Of the services' force what the host
-    holds stays over a frame, and the rest runs along the spline. A digital product stays as it was
-    in frames that the host missed. G_T is as given.
+    `nodes_N` has `rig.substeps` values for each frame and one more. The part of the services' force
+    held by the host is constant over a frame, the rest follows the spline. A digital product keeps
+    its last value in missed frames. G_T is as given.
     """
     p, s = _one(rig, control)
     level = np.ones_like(misread) if load_factor is None else load_factor
@@ -122,12 +120,11 @@ def drive_series(
     host: Hosted = HOSTED,
     others_N: Mapping[str, Floats] | None = None,
 ) -> Floats:
-    """Return what the transducer at the grip reads, d, for F alone: loader and linkage in series.
+    """Return the reading of the grip's transducer, d, from F alone: loader and linkage in series.
 
-    `nodes_N` is F in N on the loader's nodes as the loader takes it (with another control's share),
-    `force_N` F at the frames as it bends the structure. The other arguments are those of
-    `drive_loader` and `replay_linkage`. δc is predicted, not measured; the host reads it without
-    error.
+    `nodes_N` is the loader's input F in N on its nodes (with crosstalk), `force_N` F at the frames,
+    which bends the structure. The other arguments are those of `drive_loader` and `replay_linkage`.
+    δc is predicted, not measured, and the host reads it without error.
     """
     p, s = _one(rig, control)
     frames = len(force_N)
@@ -152,8 +149,8 @@ def replay_product(
 ) -> Floats:
     """Return F_mod in N for δc in d at each frame and G_T in N/d.
 
-    A digital product stays as it was in the frames `missed` by the host. `assumed` is how far the
-    host's K̂ in ΔG differs from the rig's, d/N.
+    A digital product keeps its last value in the frames `missed` by the host. `assumed` is the
+    difference of the host's K̂ in ΔG from the rig's, d/N.
     """
     p, s = _one(rig, control)
     more = np.zeros_like(gradient) if assumed is None else assumed
@@ -169,7 +166,7 @@ def replay_linkage(
     force_N: Floats,
     others_N: Mapping[str, Floats] | None = None,
 ) -> Floats:
-    """Return what the transducer at the grip reads, d, for δc in d and F in N.
+    """Return the reading of the grip's transducer, d, for δc in d and F in N.
 
     `others_N` are the forces on other controls of the same structure, at each frame.
     """
@@ -183,7 +180,7 @@ def drive_linkage(
     force_N: Floats,
     others_N: Mapping[str, Floats] | None = None,
 ) -> Floats:
-    """Do as `replay_linkage`, with δc given on the loader's nodes."""
+    """Return the same as `replay_linkage`, with δc given on the loader's nodes."""
     p, s = _one(rig, control)
     h = 1.0 / (rig.frame_rate * rig.substeps)
     s[0]["linkage"]["position"] = s[0]["linkage"]["grip"] = nodes[0]
@@ -196,7 +193,7 @@ def bent_by(
 ) -> Floats:
     """Return the structure's bend in d at each frame under F in N, and the others' forces.
 
-    With its hysteresis and its mode, and without the linkage's play.
+    With its hysteresis and its mode, and without the linkage's backlash.
     """
     p, s = _one(rig, control)
     p[0]["linkage"]["contact"] = 0.0
@@ -215,7 +212,7 @@ def replay_compensation(
 ) -> Floats:
     """Return δ̂ in d for δc in d and F in N as the host read them, and the others' forces.
 
-    It stays as it was in the frames `missed` by the host.
+    It keeps its last value in the frames `missed` by the host.
     """
     p, _ = _one(rig, control)
     made = _compensation(p, computed, force_N, np.empty_like(force_N))
@@ -225,7 +222,7 @@ def replay_compensation(
 def _by_others(
     rig: Rig, control: str, others_N: Mapping[str, Floats], assumed: int, like: Floats
 ) -> Floats:
-    """Return what the others' forces bend at each frame, d, or what the host takes that for."""
+    """Return the bend by the others' forces at each frame, d, true or as assumed by the host."""
     names = [str(name) for name in rig.controls]
     row = crossed_bends(rig, control, names)[assumed]
     bent = np.zeros_like(like)
@@ -267,9 +264,9 @@ def _loader(
     out: Floats,
     fine: Floats,
 ) -> None:
-    """Run the loader on what is `given`, shape (12, frames), and on forces at the nodes.
+    """Run the loader on the inputs `given`, shape (12, frames), and on forces at the nodes.
 
-    G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, and restarts.
+    `given`: G_T twice, misread δc, load factor, restarts' δc and its rate, `Hosted.rows`, restarts.
     Write δc and F_mod at the frames to `out`, and δc at every node to `fine`, unless that is empty.
     """
     p, s = parameters[0], states[0]

@@ -1,8 +1,8 @@
-"""A control-loading rig, whole: its data, what the physics refuses of them, and changes to them.
+"""A control-loading rig: its data, their physical limits, and changes to them.
 
-Beyond each value's own bounds a rig is refused for what the physics cannot give: a gradient
-stiffer than the structure (K̂·G_T ≥ 1, where eq. (12) is singular), a table that does
-not rise, a converter that the signal would overflow.
+Beyond each value's own bounds a rig is refused if it is physically impossible: a gradient stiffer
+than the structure (K̂·G_T ≥ 1, where eq. (12) is singular), a table that does not rise, a converter
+that the signal would overflow.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ from coupled.schema import (
 class Rig(Section):
     """A control-loading rig, and the aircraft that it is coupled to.
 
-    Without `flight` it is a bench: q̄ is given, and there is no aircraft. `noise` gives
-    the standard deviation of a channel's white noise by the channel's name. SI throughout;
-    a field's key in a file, and in `changed`, ends in its unit.
+    Without `flight` it is a bench: q̄ is given, and there is no aircraft. `noise` has the standard
+    deviation of a channel's white noise by the channel's name. SI throughout; a field's key in a
+    file, and in `changed`, ends in its unit.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
@@ -78,16 +78,16 @@ class Rig(Section):
 
     @property
     def substeps(self) -> int:
-        """Loader steps in a frame: enough for the loader's rate."""
+        """The number of loader steps in a frame."""
         return max(1, -int(-self.loader_rate // self.frame_rate))
 
     def changed(self, changes: Mapping[str, Any]) -> Rig:
         """Return the rig with some values replaced: {dotted key of a rig file: value}.
 
-        A key is spelled as in a rig file, its unit at its end, as
+        A key is that of a rig file, with its unit at its end, such as
         `controls.column.loader.play_m`. A value may also be a whole table, a section of another
-        rig, or None for an aircraft that is left out. Raises InputError, as a rig file would,
-        naming this rig and the key.
+        rig, or None to remove the aircraft. Raises InputError as a rig file does, with the name of
+        this rig and the key.
         """
         plain = dict(changes)
         controls = {key: plain.pop(key) for key in changes if key.split(".")[0] == "controls"}
@@ -100,7 +100,7 @@ class Rig(Section):
     def only(self, control: str) -> Rig:
         """Return the rig with one control only, no aircraft, no noise and no common structure.
 
-        Raises InputError where the rig has no such control.
+        Raises InputError if the rig has no such control.
         """
         if control not in self.controls:
             problem = f"the rig has no {control}; {nearest(control, self.controls)}"
@@ -130,14 +130,14 @@ def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control
 
 
 def _control(rig: Rig, name: str, given: Any) -> Control:
-    """Return a control given as a section, or as the table of one."""
+    """Return a control given as a section or as its table."""
     if isinstance(given, Control):
         return given
     return build(Control, given, rig.name, f"controls.{name}", unit_of(name))
 
 
 def checked(rig: Rig, file: object) -> Rig:
-    """Return the rig; raise InputError for what the physics cannot give, naming `file`."""
+    """Return the rig; raises InputError with `file` for a physically impossible one."""
     for name, control in rig.controls.items():
         _check_control(rig, name, control, file)
     check_structure(rig.structure, {str(n): c for n, c in rig.controls.items()}, file)
@@ -189,7 +189,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
 
 
 def _check_tolerance(control: Control, file: object, path: str, d: str) -> None:
-    """Refuse how well a number is known where there is no such number."""
+    """Refuse a tolerance whose key is no number of the control."""
     for key, wide in control.tolerance.items():
         section, _, name = key.partition(".")
         holder = getattr(control, section, None)
@@ -226,7 +226,7 @@ def _check_servo(control: Control, file: object, path: str) -> None:
 
 
 def _check_without_servo(control: Control, file: object, path: str, d: str) -> None:
-    """Refuse what only a servo has, on a rig without one."""
+    """Refuse parameters of a servo, on a rig without one."""
     loader, names = control.loader, ("servo_rate_share", "servo_acceleration_limit")
     for key, name in file_keys(type(loader), d).items():
         if name in names and getattr(loader, name) > 0.0:
@@ -285,7 +285,7 @@ def _check_schedule(control: Control, file: object, path: str, d: str) -> None:
             f"{key}.break_deflection_{d}",
             f"a second segment needs both break_deflection_{d} and second_gradient_N_per_{d}",
         )
-    # The host corrects for K̂. A real structure may be softer than that, or none would be found so.
+    # K̂ is limited, not K: a real structure may be softer than assumed, or it could not be found.
     bends = {f"{path}.compensation.bend_{d}_per_N": control.compensation.bend}
     if control.compensation.bend == 0.0:
         bends = {

@@ -1,4 +1,4 @@
-"""A rig file with some of its numbers replaced: its comments, order and layout stay."""
+"""A rig file with some of its numbers replaced; its comments, order and layout are kept."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from coupled.schema import Section, file_keys
 def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") -> str:
     """Return a rig file's text with values replaced, {the parts of a key: value}, or added.
 
-    A remark goes to its head. The text must be valid TOML.
+    A remark is put at its head. The text must be valid TOML.
     """
     document: Any = tomlkit.parse(text)
     for parts, value in changes.items():
@@ -30,18 +30,18 @@ def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") 
 
 
 def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
-    """Return the values in which a rig differs from another of the same controls, by their keys."""
+    """Return the values that differ between two rigs of the same controls, by their keys."""
     found = dict(_within((), old, new, "m"))
     if old.flight is not None and new.flight is not None:
         found |= _within(("flight",), old.flight, new.flight, "m")
-        if new.flight.folder:  # whole, since what is written may lie elsewhere
+        if new.flight.folder:  # an absolute path, since the new file may be in another folder
             found["flight", "model_folder"] = new.flight.folder
     for name, control in new.controls.items():
         d = unit_of(name)
         path = ("controls", str(name))
         found |= _within(path, old.controls[name], control, d)
         added = old.controls[name].loader.servo_frequency == 0.0 < control.loader.servo_frequency
-        if added:  # a file gives both numbers of a servo, or none
+        if added:  # a file has both numbers of a servo, or none
             ratio = control.loader.servo_damping_ratio
             found[(*path, "loader", "servo_damping_ratio")] = ratio
     return found
@@ -50,7 +50,7 @@ def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
 def _within(
     path: tuple[str, ...], old: Section, new: Section, d: str
 ) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the values in which a section differs, those of its own sections included."""
+    """Yield the values that differ in a section, with those of its own sections."""
     for key, field in file_keys(type(new), d).items():
         before, after = getattr(old, field), getattr(new, field)
         if isinstance(after, Section) and isinstance(before, Section):

@@ -15,7 +15,7 @@ from coupled.schema import build, file_keys, known_keys, load_toml
 
 
 def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
-    """Return the rig of a file, with `changes` made to it: {dotted key: value}."""
+    """Return the rig of a file, with `changes`: {dotted key: value}."""
     table = load_toml(path)
     for key, value in (changes or {}).items():
         if not change(table, key, value):
@@ -24,9 +24,9 @@ def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
 
 
 def _placed(flight: Any, file: object) -> Any:
-    """Return a `flight` table whose folder of models, if it names one, is a whole path.
+    """Return a `flight` table with the absolute path of its folder of models, if it names one.
 
-    A rig file names it from its own place, so that both can be moved together.
+    In a rig file the path is relative to the file, so that both can be moved together.
     """
     given = flight.get("model_folder") if isinstance(flight, dict) else None
     if not isinstance(given, str) or not given:
@@ -36,7 +36,7 @@ def _placed(flight: Any, file: object) -> Any:
     try:
         folder = (base / given).resolve()
         there = not isinstance(name, str) or (folder / name / f"{name}.xml").is_file()
-    except (OSError, ValueError):  # a name that no folder can have
+    except (OSError, ValueError):  # not a valid name of a folder
         problem = "is no name of a folder; give the folder that the model's lies in"
         raise InputError(file, "flight.model_folder", problem) from None
     if not there:
@@ -46,7 +46,7 @@ def _placed(flight: Any, file: object) -> Any:
 
 
 def change(table: dict[str, Any], key: str, value: Any) -> bool:
-    """Set a dotted key of a table of tables in place; false where it leads through a value."""
+    """Set a dotted key of a table of tables in place; return false if it leads through a value."""
     *parents, last = key.split(".")
     for parent in parents:
         table = table.setdefault(parent, {})
@@ -78,7 +78,7 @@ def rig_from_table(table: Mapping[str, Any], file: object) -> Rig:
         with collected(faults):
             values["flight"] = build(Flight, _placed(values.pop("flight"), file), file, "flight")
     if faults:
-        with collected(faults):  # the rest, without controls to be judged by
+        with collected(faults):  # check the rest without controls
             build(Rig, {**values, "controls": {}}, file, "")
         raise together(faults)
     rig = build(Rig, values, file, "")

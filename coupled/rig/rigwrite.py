@@ -1,6 +1,6 @@
-"""A rig as the text of a rig file: what `rigfile` reads, written back.
+"""A rig as the text of a rig file, which `rigfile` reads back.
 
-Values at their defaults are left out, but for those that a file gives together; floats are
+Values at their defaults are left out, except for those that a file must give together; floats are
 written so that they read back the same.
 """
 
@@ -31,9 +31,10 @@ def rig_text(rig: Rig, remark: str = "") -> str:
 
 
 def rig_table(rig: Rig) -> dict[str, Any]:
-    """Return a rig as the tables of a rig file, every key with its unit, defaults too.
+    """Return a rig as the tables of a rig file, every key with its unit, defaults included.
 
-    What the rig has not, as a flight on a bench, is left out: the tables read back as the rig.
+    Parts that the rig lacks, such as a flight on a bench, are left out: the tables read back as the
+    rig.
     """
     table = section_table(rig, "m")
     controls = {name: section_table(each, unit_of(name)) for name, each in rig.controls.items()}

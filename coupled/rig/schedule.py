@@ -1,9 +1,8 @@
-"""Schedule: from dynamic pressure to the gradient that the pilot is to feel.
+"""Schedule: from dynamic pressure to the specified gradient.
 
-G_T(q̄) is interpolated linearly in the rig's table and held at its ends. A second
-table gives the gradient beyond a break in deflection (appendix C of the report).
-What may be wrong with its use: the pressure that it gets lags or is off by a
-factor, or the table's rise above its value at q̄ = 0 is.
+G_T(q̄) is interpolated linearly in the rig's table and constant beyond its ends. A second table
+gives the gradient beyond a break in deflection (appendix C of the report). Faults: the schedule's
+pressure lags or is wrong by a factor, or the table's rise above its value at q̄ = 0 is.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ Table = NDArray[np.float64]
 
 
 class ScheduleParameters(Protocol):
-    """The table, and what may be wrong with the way it is used."""
+    """The table, and the faults of its use."""
 
     rows: int
     dynamic_pressure: Table  # Pa, rising
     total_gradient: Table  # G_T, N/d
-    second_gradient: Table  # slope beyond the break, N/d; as the first where there is none
-    pressure_scale: float  # q̄ that the schedule gets over the real one
+    second_gradient: Table  # slope beyond the break, N/d; equal to the first if there is none
+    pressure_scale: float  # q̄ in the schedule over the real one
     pressure_lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
     slope: float  # factor on the rise above the value at q̄ = 0
 
@@ -40,7 +39,7 @@ class ScheduleState(Protocol):
 
 
 def _rows(values: list[float]) -> Table:
-    """Return a table's column at its full length, zeros behind its last row."""
+    """Return a table's column at its full length, with zeros after its last row."""
     column = np.zeros(MAX_ROWS)
     column[: len(values)] = values
     return column
@@ -66,7 +65,7 @@ SCHEDULE = Declaration(
 
 @stage
 def read_pressure(p: ScheduleParameters, s: ScheduleState, dynamic_pressure: float) -> float:
-    """Return the pressure that the schedule gets at this frame, Pa."""
+    """Return the schedule's pressure at this frame, Pa."""
     scaled = p.pressure_scale * dynamic_pressure
     if s.started == 0:
         s.started = 1

@@ -1,22 +1,20 @@
-"""Sensing: what the host and the recorder read of force and deflection (figure 3).
+"""Sensing: the readings of force and deflection by host and recorder (figure 3).
 
-Volts stand for metres and newtons: v₁ = S₁·δc, v₂ = S₂·ΔF, v₃ = S₃·F, eq. (2). A
-converter of a given word length rounds them to its step and holds them at its full
-scale. A scale S₁ or S₃ that is off makes the δc or F read that factor too large. An S₁ that
-is off in the loader's electronics is in the v₁ of the analog multiplier, too; one of the host's
-reading (transducer to host) is not.
+Voltages represent metres and newtons: v₁ = S₁·δc, v₂ = S₂·ΔF, v₃ = S₃·F, eq. (2). A converter of a
+given word length rounds them to its step and limits them to its full scale. An error of S₁ or S₃
+scales the δc or F as read by that factor. An error of S₁ in the loader's electronics is in the v₁
+of the analog multiplier, too; one of the host's reading (transducer to host) is not.
 
-Steps and ranges are those of what is made: a ΔF, or ΔG, sent by assumed scales is made by the
-real ones.
+Steps and ranges are those of the resulting quantity: a ΔF, or ΔG, sent by assumed scales results by
+the real ones.
 
-A host reads its channels one after the other. With a skew, the δc or F of the frame at t_k is
-that of t_k − skew, straight between the loader's nodes; what it puts out may come late, too
-(`modification`).
+A host reads its channels one after the other. With a skew, the δc or F of the frame at t_k is that
+of t_k − skew, linear between the loader's nodes; the output may be late, too (`modification`).
 
-A gauge or a transducer may have a zero that is off, and S₁ may drift: δc read at t_k is then
-S₁·(1 + rate·t_k)·δc over what is assumed. The mains may hum in it, hum·sin(2π·f·t_k + phase): the
-host has that, too, and a converter sampled below 2·f folds it. Channels that are stamped late
-against the others are the recorder's doing (`recorder`).
+A gauge or a transducer may have a zero offset, and S₁ may drift: δc as read at t_k is then
+S₁·(1 + rate·t_k)·δc over the assumed S₁. Mains hum may be added, hum·sin(2π·f·t_k + phase): the
+host reads it, too, and a converter sampled below 2·f aliases it. Late time stamps are an effect of
+the recorder (`recorder`).
 """
 
 from __future__ import annotations
@@ -33,14 +31,14 @@ from coupled.rig.parameters import Sensing
 class SensingParameters(Protocol):
     """Scales and converter steps, already divided into the quantity's own unit."""
 
-    read_scale: float  # S₁ real over assumed, as the host reads v₁
-    scale_drift: float  # by what share that grows in a frame
+    read_scale: float  # S₁ real over assumed, in the host's reading of v₁
+    scale_drift: float  # its relative growth in a frame
     hum: float  # of the mains in δc as read, d
     hum_turn: float  # rad a frame
     hum_phase: float  # at t = 0, rad
     force_scale: float  # S₃ real over assumed
-    force_zero: float  # what is read without a force, N
-    deflection_zero: float  # what the transducer at the grip reads at neutral, d
+    force_zero: float  # reading without a force, N
+    deflection_zero: float  # reading of the grip's transducer at neutral, d
     computed_step: float  # converter step of δc, d; 0 for none
     computed_range: float  # converter range of δc, d
     force_step: float  # of F, N
@@ -50,12 +48,12 @@ class SensingParameters(Protocol):
     gradient_step: float  # of ΔG (hybrid), N/d
     gradient_range: float
     skewed: int  # δc or F is read before t_k
-    computed_skew: float  # by how much, in substeps
+    computed_skew: float  # lead of the reading, in substeps
     force_skew: float
 
 
 class SensingState(Protocol):
-    """What was there when the host sampled it, within the frame that ends at t_k."""
+    """The values sampled by the host, within the frame that ends at t_k."""
 
     computed: float  # δc, d
     force: float  # F, N
@@ -75,7 +73,7 @@ def _range(of: str) -> Callable[[Given], float]:
 
 
 def _step(of: str) -> Callable[[Given], float]:
-    """Return what gives a converter's step: 2ᴺ steps from −full scale to full scale."""
+    """Return a function for a converter's step: 2ᴺ steps from −full scale to full scale."""
     return lambda g: 2.0 * _range(of)(g) / 2**g.control.sensing.word_length
 
 
@@ -100,7 +98,7 @@ SENSING = Declaration(
 
 @stage
 def converted(value: float, step: float, full_scale: float) -> float:
-    """Return a value as a converter of this step and range passes it; step 0 passes all."""
+    """Return a value after a converter of this step and range; unchanged for step 0."""
     if step == 0.0:
         return value
     rounded = step * math.floor(value / step + 0.5)
@@ -111,9 +109,9 @@ def converted(value: float, step: float, full_scale: float) -> float:
 def sample(
     p: SensingParameters, s: SensingState, computed: float, force: float, left: int, first: bool
 ) -> None:
-    """Take up δc in d and F in N at a node, `left` substeps before the frame's end.
+    """Store δc in d and F in N at a node, `left` substeps before the frame's end.
 
-    `first` is the frame's first node, from which the samples are made anew.
+    `first` is the frame's first node, at which the samples are reset.
     """
     if first:
         s.computed = s.force = 0.0
@@ -123,7 +121,7 @@ def sample(
 
 @stage
 def scale_at(p: SensingParameters, frame: int) -> float:
-    """Return δc as the host reads it at a frame over what it is."""
+    """Return the ratio of δc as the host reads it to δc, at a frame."""
     return p.read_scale * (1.0 + p.scale_drift * frame)
 
 
@@ -135,7 +133,7 @@ def hum_at(p: SensingParameters, frame: int) -> float:
 
 @stage
 def read_computed(p: SensingParameters, computed: float, frame: int, noise: float) -> float:
-    """Return δc as the host reads it, d: v₁ of eq. (2), by the scale that it assumes."""
+    """Return δc as the host reads it, d: v₁ of eq. (2), by the assumed scale."""
     read = scale_at(p, frame) * computed + noise
     if p.hum != 0.0:
         read += hum_at(p, frame)

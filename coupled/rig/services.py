@@ -1,22 +1,22 @@
-"""Services: what a control loader gives beside gradient and breakout, and what may fail of it.
+"""Services: functions of a control loader beside gradient and breakout, and their failures.
 
-    trim         springs and F_mod act about x₀, led by force trim; a trim release lets x₀ be δc
+    trim         springs and F_mod act about x₀, set by force trim; a trim release sets x₀ = δc
     autopilot    F_a = k·(x_a − δc) − c·δc', within ±override: the backdrive of a hand's override
     other side   m₂·y'' + c₂·y' + G₂·(y − x₀) = F₂ + F_l,    F_l = k_l·(δc − y) + c_l·(δc' − y'),
                  until it is disconnected; it moves a share of the surface by y
-    jam          δc stays where it was, and what it moves of the surface stays too
+    jam          δc is fixed, and so is its part of the surface
     shaker       A·sin(2π·f·t)
-    pusher       −P, coming and going over its rise
+    pusher       −P, fading in and out over its rise
     hinge        −q̄·(h_α·(α − α₀) + h_δ·surface)
     soft stop    −k·(|δc| − s) beyond s, and a damping on the way out
     envelope     −e·(n_z − n) above n, and e'·(n' − n_z) below n'
-    failed feel  G_T·(1 − lost), eqs. (6) to (12) with what is left
+    failed feel  G_T·(1 − lost), eqs. (6) to (12) with the rest
 
-Forces act on the loader beside the pilot's, positive with a pull. Those of the host (pusher,
-hinge, envelope) are held over a frame, the others follow the motion at each node. Shaker and
-pusher act when asked to, or from an angle of attack on. What a flight leads of all this is in the
-state, and 0 at its start; `serving` leads it, for a run's events as for a page. A rig that has
-none of it skips the stage.
+Forces act on the loader in addition to the pilot's, positive in the direction of a pull. Those of
+the host (pusher, hinge, envelope) are held over a frame, the others follow the motion at each node.
+Shaker and pusher act on command, or from an angle of attack on. The commands of a flight are in the
+state, 0 at its start; `serving` sets them, for a run's events and for a page. A rig without
+services skips the stage.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from coupled.rig.modification import ModificationState
 from coupled.rig.parameters import Services
 from coupled.rig.springs import elastic
 
-# What is recorded of each control that has services, in this order; d is its unit.
+# The recorded channels of each control with services, in this order; d is its unit.
 SERVICE_CHANNELS = (
     "trim_{d}",
     "service_force_N",
@@ -51,23 +51,23 @@ SERVICE_CHANNELS = (
 
 
 class ServicesParameters(Protocol):
-    """The services' numbers; d is m, or rad for a wheel. 0 leaves one out."""
+    """The services' parameters; d is m, or rad for a wheel. 0 leaves one out."""
 
-    present: int  # the rig file gives some
+    present: int  # the rig file has some
     frame: float  # s
     travel: float  # d
     autopilot_stiffness: float  # N/d
     autopilot_damping: float  # N·s/d
-    override: float  # the most that the backdrive gives, N
-    override_time: float  # held against it for so long, s, it lets go; 0 for never
+    override: float  # largest force of the backdrive, N
+    override_time: float  # duration of an override that disconnects it, s; 0 for never
     other_mass: float  # of the other side's control, kg (N per d/s²)
     other_damping: float  # N·s/d
     other_gradient: float  # N/d
-    other_share: float  # of the surface that it moves
+    other_share: float  # of the surface moved by it
     link_stiffness: float  # N/d
     link_damping: float  # N·s/d
-    disconnect: float  # the link opens above this force, N; 0 for never
-    jam_breaks: float  # a jam gives way above this force, N; 0 for never
+    disconnect: float  # force that opens the link, N; 0 for never
+    jam_breaks: float  # force that breaks a jam, N; 0 for never
     shaker: float  # A, N
     shaker_frequency: float  # Hz
     shaker_alpha: float  # rad; 0 for none
@@ -86,9 +86,9 @@ class ServicesParameters(Protocol):
 
 
 class ServicesState(Protocol):
-    """What is led, as 0 or 1 where nothing else is said; and what follows of it."""
+    """The commands, 0 or 1 unless a unit is given, and the resulting state."""
 
-    on: int  # a rig file or an event asks for the stage
+    on: int  # a rig file or an event requires the stage
     trim_release: float
     autopilot: float
     autopilot_at: float  # x_a, d
@@ -102,20 +102,20 @@ class ServicesState(Protocol):
     started: int
     alpha: float  # α₀, rad
     base: float  # the loader's own external force, N
-    slow: float  # what is held over the frame, N
-    force: float  # all that the services add at the last node, N
+    slow: float  # forces held over the frame, N
+    force: float  # total force of the services at the last node, N
     shaking: int
-    time: float  # that it has been shaking, s
+    time: float  # duration of the shaking, s
     pushing: float  # share of the pusher's force
-    over: float  # s for which the hand has held more than the override
-    stuck: int  # the jam has taken hold
+    over: float  # duration of a hand force above the override, s
+    stuck: int  # the jam is active
     stuck_at: float  # δc there, d
     held: float  # δ̂ there, d
     other: float  # y, d
     other_rate: float  # d/s
     link: float  # F_l, N
-    asked: float  # of the surface, d
-    row: NDArray[np.float64]  # what is recorded
+    asked: float  # command of the surface, d
+    row: NDArray[np.float64]  # the recorded values
 
 
 SERVICES = Declaration(
@@ -150,7 +150,7 @@ def begin_services(
     load_factor: float,
     alpha: float,
 ) -> None:
-    """Set what the host holds over a frame: q̄ in Pa, n_z in g and α in rad as they are at t_k."""
+    """Set the host's forces for a frame: q̄ in Pa, n_z in g and α in rad are those at t_k."""
     if s.started == 0:
         s.alpha, s.started = alpha, 1
     pushed = s.pusher > 0.5 or (p.pusher_alpha > 0.0 and alpha >= p.pusher_alpha)
@@ -170,7 +170,7 @@ def begin_services(
 
 @stage
 def set_base(s: ServicesState, loader: LoaderState) -> None:
-    """Take up the loader's own external force of a frame, and add what the host holds to it."""
+    """Store the loader's own external force of a frame, and add the host's to it."""
     s.base = loader.external
     loader.external = s.base + s.slow
 
@@ -179,7 +179,7 @@ def set_base(s: ServicesState, loader: LoaderState) -> None:
 def _backdrive(
     p: ServicesParameters, s: ServicesState, x: float, v: float, hand: float, h: float
 ) -> float:
-    """Return the autopilot's force, N; it lets go of a hand that holds more for long enough."""
+    """Return the autopilot's force, N; a long enough override by the hand disconnects it."""
     if s.autopilot <= 0.5 or p.override == 0.0:
         s.over = 0.0
         return 0.0
@@ -255,9 +255,9 @@ def serve(
     ends: Ends,
     h: float,
 ) -> Ends:
-    """Set the services' force for a substep of h seconds; return how far δc may go, d.
+    """Set the services' force for a substep of h seconds; return the range of δc, d.
 
-    `hand` is the pilot's force at the substep's end, N, `ends` how far it might go without.
+    `hand` is the pilot's force at the substep's end, N, `ends` the range without services.
     """
     x, v = loader.computed, loader.rate
     loader.loose = s.trim_release > 0.5
@@ -278,7 +278,7 @@ def serve(
 
 @stage
 def asked_of_surface(p: ServicesParameters, s: ServicesState, estimated: float) -> float:
-    """Return what is asked of the surface, d, where the host's estimate is δ̂."""
+    """Return the command of the surface, d, for the host's estimate δ̂."""
     own = s.held if s.stuck else estimated
     s.asked = own
     if p.other_share > 0.0:
@@ -288,7 +288,7 @@ def asked_of_surface(p: ServicesParameters, s: ServicesState, estimated: float) 
 
 @seldom
 def note_services(s: ServicesState, loader: LoaderState) -> None:
-    """Write what is recorded at t_k, as `SERVICE_CHANNELS` has it."""
+    """Write the recorded values at t_k, in the order of `SERVICE_CHANNELS`."""
     row = s.row
     row[0], row[1], row[2], row[3] = loader.neutral, s.force, s.autopilot, s.disconnected
     row[4], row[5], row[6], row[7] = s.jammed, float(s.shaking), s.pushing, s.feel_lost

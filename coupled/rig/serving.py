@@ -1,7 +1,7 @@
-"""What a flight leads of the loaders' services: one way for a run's events and for a page.
+"""Commands of the loaders' services in flight, for a run's events and for a page.
 
-`lead` sets a service of a rig that is flying, as `pack` made it, between two frames; `noted` is
-what its kernels last wrote of the services, as the channels of `service_channels`.
+`lead` sets a service of a flying rig, packed by `pack`, between two frames; `noted` returns the
+kernels' last values of the services, by the channels of `service_channels`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from coupled.rig.services import SERVICE_CHANNELS
 
 Floats = NDArray[np.float64]
 
-# What may be led of a control: where it stands in the state, and its greatest value, if any is set.
+# The commands of a control: their place in the state, and their largest value, if any is set.
 LED: dict[str, tuple[str, str, float | None]] = {
     "trim_{d}": ("loader", "neutral", None),
     "trim_release": ("services", "trim_release", 1.0),
@@ -36,7 +36,7 @@ LED: dict[str, tuple[str, str, float | None]] = {
     "pusher": ("services", "pusher", 1.0),
     "feel_lost": ("services", "feel_lost", 1.0),
 }
-# Without this key of the rig file a service does nothing.
+# The key of the rig file that a service requires.
 _NEEDS = {
     "autopilot": ("override", "override_N"),
     "autopilot_{d}": ("override", "override_N"),
@@ -59,17 +59,17 @@ def service_channels(control: str) -> tuple[str, ...]:
 
 
 class ServiceRows(NamedTuple):
-    """What a record holds of a control's services, one value a frame."""
+    """The services of a control in a record, one value a frame."""
 
     neutral: Floats  # x₀, d
-    force: Floats  # that they add, N
+    force: Floats  # added by them, N
     jammed: Floats  # 0 or 1
     feel_lost: Floats  # share of G_T
-    asked: Floats  # of the surface, d
+    asked: Floats  # command of the surface, d
 
 
 def service_rows(record: Record, control: str) -> ServiceRows | None:
-    """Return a record's channels of a control's services; None where it lacks any of them."""
+    """Return a record's channels of a control's services; None if any is missing."""
     quantities = ("trim_{d}", "service_force_N", "jammed", "feel_lost", "asked_{d}")
     names = [f"{control}_{each.format(d=unit_of(control))}" for each in quantities]
     if any(name not in record for name in names):
@@ -78,9 +78,9 @@ def service_rows(record: Record, control: str) -> ServiceRows | None:
 
 
 def held_force(rig: Rig, record: Record, control: str) -> Floats | None:
-    """Return the services' force that the host holds over each frame, N, as `begin_services` does.
+    """Return the services' force held by the host over each frame, N, as `begin_services` does.
 
-    Of pusher, hinge moments and envelope, by the motion as recorded. None where the rig has none of
+    That of pusher, hinge moments and envelope, by the recorded motion. None if the rig has none of
     them, or the record lacks a channel for it.
     """
     of, d = rig.controls[cast(ControlName, control)].services, unit_of(control)
@@ -96,7 +96,7 @@ def held_force(rig: Rig, record: Record, control: str) -> Floats | None:
     if "pusher" in rows:
         held -= of.pusher * rows["pusher"]
     if "asked" in rows:
-        asked = np.concatenate(([0.0], rows["asked"][:-1]))  # as it stood when the frame began
+        asked = np.concatenate(([0.0], rows["asked"][:-1]))  # at the start of the frame
         moment = of.hinge_alpha * (rows["alpha"] - rows["alpha"][0])
         travel = rig.controls[cast(ControlName, control)].travel
         held -= rows["q"] * (moment + of.hinge_surface * asked / travel)
@@ -107,12 +107,12 @@ def held_force(rig: Rig, record: Record, control: str) -> Floats | None:
 
 
 def has_services(control: Control) -> bool:
-    """Tell whether the rig file gives a control any."""
+    """Tell whether the rig file has services of a control."""
     return control.services != Services()
 
 
 def check_led(rig: Rig, control: str, service: str, to: float, file: object, place: str) -> None:
-    """Raise InputError for what cannot be led on a rig; `place` is the table of a file."""
+    """Raise InputError for a command impossible on a rig; `place` is the table of a file."""
     if control not in rig.controls:
         problem = f"the rig has no {control}; {nearest(control, rig.controls)}"
         raise InputError(file, f"{place}.control", problem)
@@ -138,7 +138,7 @@ def lead(
 ) -> None:
     """Set a service of a flying rig between two frames; `names` are its controls, in order.
 
-    An autopilot that is engaged holds the control where it is, until it is led elsewhere.
+    An engaged autopilot holds the control at its position, until another is set.
     """
     state = controls["state"][list(names).index(control)]
     stage, field, _ = LED[services_of(control)[service]]
@@ -149,13 +149,13 @@ def lead(
 
 
 def led(controls: ControlArray, names: Sequence[str], control: str, service: str) -> float:
-    """Return how a service of a flying rig stands."""
+    """Return the current command of a service of a flying rig."""
     stage, field, _ = LED[services_of(control)[service]]
     return float(controls["state"][list(names).index(control)][stage][field])
 
 
 def noted(controls: ControlArray, names: Sequence[str], which: Sequence[str], into: Floats) -> None:
-    """Write what was last recorded of some controls' services, a row each, shape (n, channels)."""
+    """Write the last values of some controls' services, a row each, shape (n, channels)."""
     rows = controls["state"]["services"]["row"]
     for row, name in zip(into, which, strict=True):
         row[:] = rows[list(names).index(name)]

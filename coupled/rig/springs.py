@@ -1,13 +1,13 @@
-"""Springs: what opposes δc by where the loader stands, and what remembers where it stood.
+"""Springs: forces against δc that depend on its position, and on its history.
 
     spring      G_B·δc + k₃·δc³
     ripple      + r·sin(2π·δc/period + phase)        cogging, teeth, a ball screw
-    F_mod       no more than the actuator gives: −limit ≤ F_mod ≤ limit
+    F_mod       limited to the actuator's force: −limit ≤ F_mod ≤ limit
     relaxation  + y,  y' = k·δc' − y/τ               a spring k in series with a damper k·τ
 
-The loader's step takes their mean over the step. That of the relaxing spring is exact for an even
+The loader's step uses their mean over the step. That of the relaxing spring is exact for a uniform
 motion: with a = τ·(1 − e^(−h/τ))/h it is a·y + (1 − a)·k·τ·u, u being the mean rate, so it enters
-the implicit step as a force and a damping. All else is taken at the step's middle.
+the implicit step as a force and a damping. The others are evaluated at the step's middle.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ class SpringParameters(Protocol):
     ripple: float  # N
     ripple_wave: float  # 2π over the period, 1/d
     ripple_phase: float  # rad
-    force_limit: float  # of F_mod as the actuator gives it, N
+    force_limit: float  # of the actuator's F_mod, N
     relaxing: float  # stiffness of the spring that relaxes, N/d
     relaxing_time: float  # τ, s
     digital: int  # F_mod is held over the frame
-    lag_gain: float  # share that F_mod's lag goes in half a substep; 0 without lag
+    lag_gain: float  # step response of F_mod's lag in half a substep; 0 without lag
     held: int  # F_mod does not follow δc within a substep: it is digital, or lags
 
 
 class SpringState(Protocol):
-    """What the springs remember."""
+    """The state of the springs."""
 
-    felt: float  # F_mod as the loader feels it where it is held, N
+    felt: float  # F_mod on the loader if it is held, N
     relaxed: float  # y, N
 
 
 def _half_step_gain(given: Given) -> float:
-    """Return the share that F_mod's lag goes in half a substep, 0 where it has none."""
+    """Return the step response of F_mod's lag in half a substep, 0 without lag."""
     lag_s = given.control.loader.modifying_lag
     return first_order_gain(lag_s, 0.5 * given.substep_s) if lag_s > 0.0 else 0.0
 
@@ -64,13 +64,13 @@ DERIVED: dict[str, Callable[[Given], Any]] = {
 
 @stage
 def ripple(p: SpringParameters, x: float) -> float:
-    """Return the force that comes again at every period of δc = x, N."""
+    """Return the force that is periodic in δc = x, N."""
     return p.ripple * math.sin(p.ripple_wave * x + p.ripple_phase) if p.ripple != 0.0 else 0.0
 
 
 @stage
 def spring(p: SpringParameters, x: float) -> float:
-    """Return what the electronics' own springs oppose δc = x with, N: F_L of eq. (8)."""
+    """Return the force of the electronics' own springs at δc = x, N: F_L of eq. (8)."""
     return (p.basic_gradient + p.cubic * x * x) * x + ripple(p, x)
 
 
@@ -85,7 +85,7 @@ def spring_slope(p: SpringParameters, x: float) -> float:
 
 @stage
 def limited(p: SpringParameters, force: float) -> float:
-    """Return what the actuator gives of a modifying force, N."""
+    """Return a modifying force limited to the actuator's, N."""
     if p.force_limit > 0.0:
         return min(max(force, -p.force_limit), p.force_limit)
     return force
@@ -93,7 +93,7 @@ def limited(p: SpringParameters, force: float) -> float:
 
 @stage
 def elastic(p: SpringParameters, m: ModificationState, s: SpringState, x: float) -> float:
-    """Return the smooth part of the force that opposes δc = x, N: the springs', and F_mod."""
+    """Return the smooth part of the force against δc = x, N: the springs', and F_mod."""
     force = spring(p, x)
     return force + (s.felt if p.held else limited(p, smooth_force(m, x)))
 
@@ -109,7 +109,7 @@ def stiffness(p: SpringParameters, m: ModificationState, x: float) -> float:
 
 @stage
 def feel(p: SpringParameters, m: ModificationState, s: SpringState, computed: float) -> None:
-    """Let a held F_mod reach the loader: at once, or half a substep on through its lag."""
+    """Apply a held F_mod to the loader: at once, or advanced by half a substep through its lag."""
     wanted = m.held if p.digital else modifying_force(m, computed)
     wanted = limited(p, wanted)
     if p.lag_gain > 0.0:
@@ -125,14 +125,14 @@ def faded(p: SpringParameters, s: SpringState, span: float) -> float:
 
 @stage
 def relaxing_mean(p: SpringParameters, s: SpringState, span: float) -> tuple[float, float]:
-    """Return the mean of y over `span` seconds at rest, N, and what each d/s adds to it, N·s/d."""
+    """Return the mean of y over `span` seconds at rest, N, and its slope over speed, N·s/d."""
     kept = -math.expm1(-span / p.relaxing_time) * p.relaxing_time / span
     return kept * s.relaxed, (1.0 - kept) * p.relaxing * p.relaxing_time
 
 
 @stage
 def relax(p: SpringParameters, s: SpringState, way: float, span: float) -> None:
-    """Advance the relaxing spring over `span` seconds of even motion, `way` long, d."""
+    """Advance the relaxing spring over `span` seconds of uniform motion by `way`, d."""
     if span <= 0.0:
         return
     steady = p.relaxing * p.relaxing_time * way / span

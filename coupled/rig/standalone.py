@@ -1,7 +1,7 @@
-"""One control without an aircraft: a force on its grip, a given q̄ to its host.
+"""One control without an aircraft: a force on its grip, a given q̄ for its host.
 
-The frame step that flies, run over a given dynamic pressure; and the loader with its
-multiplier replaced by a voltage supply, as the null of eq. (14) needs it.
+It uses the frame step of a flight with a given dynamic pressure; and the loader with its multiplier
+replaced by a voltage supply, for the null of eq. (14).
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _HISTORY += ["surface_norm", "hand_force"]
 class History:
     """A control's time history, one value a frame, in SI; d is m, or rad for a wheel.
 
-    `force` F as the host reads it, `hand_force` F as it is and `modifying` F_mod in N, `computed`
-    δc and `deflection` δ as read, `estimate` δ̂ in d, `gradient` G_T in N/d, `surface` the
-    command about trim in ±1.
+    `force` F as the host reads it, `hand_force` the true F and `modifying` F_mod in N, `computed`
+    δc and `deflection` δ as read, `estimate` δ̂ in d, `gradient` G_T in N/d, `surface` the command
+    about trim in ±1.
     """
 
     time_s: Floats
@@ -49,15 +49,15 @@ class History:
 
 
 def nodes_of(rig: Rig, frames: int) -> Floats:
-    """Return the times of the loader's nodes over so many frames, s."""
+    """Return the times of the loader's nodes over some frames, s."""
     return np.arange(frames * rig.substeps + 1) / (rig.frame_rate * rig.substeps)
 
 
 def run_control(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) -> History:
-    """Return what a control does from rest under a hand's force, the host reading this q̄.
+    """Return a control's motion from rest under a hand's force, at a given q̄.
 
-    `nodes_N` has `rig.substeps` values a frame and one more, straight between; `pressure_Pa`
-    one a frame. Without noise: readings differ from the truth by scales and converters only.
+    `nodes_N` has `rig.substeps` values for each frame and one more, linear between; `pressure_Pa`
+    one for each frame. Without noise: readings differ from the truth by scales and converters only.
     """
     rig = rig.only(control)
     controls = pack(rig)
@@ -72,22 +72,22 @@ def run_control(rig: Rig, control: str, nodes_N: Floats, pressure_Pa: Floats) ->
 
 
 def smooth(share: Floats) -> Floats:
-    """Return a half cosine from 0 to 1 over shares of the way from 0 to 1."""
+    """Return a half cosine from 0 to 1 over its argument from 0 to 1."""
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(share, 0.0, 1.0)))
 
 
 def under_supply(
     rig: Rig, control: str, rise_s: float, rest_s: float
 ) -> Callable[[float, float], float]:
-    """Return δc in d at which a free control rests under a supply in the multiplier's place.
+    """Return a function for δc in d at which a free control rests under a supply.
 
-    What is returned is a function of two forces in N that the supply's voltage v₂ stands for,
-    v₂/S₂, positive with the pilot's: the supply is turned to the first over `rise_s`, to the
-    second over as long, and left for `rest_s`. The control starts at rest at neutral, with no
-    hand on it (v₃ = 0): appendix B.
+    The supply replaces the multiplier. The function's arguments are two forces in N that correspond
+    to the supply's voltage v₂, v₂/S₂, positive in the direction of the pilot's: the supply is
+    turned to the first over `rise_s`, to the second over as long, and left for `rest_s`. The
+    control starts at rest at neutral, with no hand on it (v₃ = 0): appendix B.
     """
     packed = pack(rig.only(control))
-    for field in ("digital", "held"):  # F_mod is what the supply makes, not a product
+    for field in ("digital", "held"):  # F_mod is the supply's, not a product
         packed["parameters"]["loader"][field] = 1
     h = 1.0 / (rig.frame_rate * rig.substeps)
     up, on = _turned(rise_s, rest_s, h)
@@ -103,7 +103,7 @@ def under_supply(
 
 @lru_cache(maxsize=8)
 def _turned(rise_s: float, rest_s: float, h: float) -> tuple[Floats, Floats]:
-    """Return how far two turns of a knob are, one after the other, at nodes after the first."""
+    """Return two smooth rises, one after the other, at nodes after the first."""
     turns = np.arange(1.0, round((2.0 * rise_s + rest_s) / h) + 1.0) * (h / rise_s)
     return smooth(turns), smooth(turns - 1.0)
 

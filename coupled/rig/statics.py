@@ -1,21 +1,21 @@
-"""The rig at rest: force, deflection and what the host makes of it, in closed form.
+"""The rig at rest: force, deflection and the host's estimate, in closed form.
 
-With breakout, two segments and a stiffening bend, along δc: the balance of the loader gives
+With breakout, two segments and a stiffening bend, over δc, the equilibrium of the loader is
 
     F(δc) = F_BO + F_L + k₃·δc³ + ripple + F_mod − F_offset + b·(n_z − 1) − Σ_j leak_j·F_j
 
-which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a play whose contact yields
-+ sgn(F)·play/2 + F/k. F_mod is what the multiplier makes: of δc with an analog one, of δc as the
-host reads it with a digital one. The schedule has the q̄ that it gets, drifts stand as at `time_s`.
+which is eq. (9) solved for F; the structure δ = δc + bend(F), and with a soft backlash
++ sgn(F)·play/2 + F/k. F_mod is the multiplier's output: from δc with an analog one, from δc as the
+host reads it with a digital one. The schedule has its own q̄; drifts are those at `time_s`.
 
-The law is set-valued where something holds the loader still. At neutral it rests in its breakout
-under any F between F(0−) and F(0+); at its stop under any F beyond that at the stop.
+The relation is set-valued where something holds the loader still: at neutral the breakout, for any
+F between F(0−) and F(0+); at its stop for any F beyond that at the stop.
 
-Left out is what is a band about this line: friction, the bend's hysteresis, whose middle is here,
-and a play that the servo takes along, half of its width to either side. `equations` has the linear
-case. Forces that other controls' pilots hold bend a common structure: δ = δc + bend(F) + Σ_j
-K_ij·F_j, and δ̂ has the host's K̂_ij·F_j in it. The line is drawn by the stages that fly, in one
-kernel that is kept on disk.
+Effects that form a band about this line are left out: friction, the bend's hysteresis, whose middle
+is used, and a rigid backlash, half of its width to either side. `equations` has the linear case.
+Forces held on other controls bend a common structure: δ = δc + bend(F) + Σ_j K_ij·F_j, and δ̂
+includes the host's K̂_ij·F_j. The line is computed by the stages of a flight, in one kernel that is
+cached on disk.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 loader_force = stage(basic_force)  # eq. (8)
 
 
-_NO_FORCE_N = 1e-9  # rounding of no force
+_NO_FORCE_N = 1e-9  # rounding of zero force
 _HALVINGS = 200  # from the widest force to the last digit of a double, and more
 
 
@@ -54,8 +54,8 @@ _HALVINGS = 200  # from the widest force to the last digit of a double, and more
 class Statics:
     """The static line of one control at one dynamic pressure; arrays of one shape.
 
-    `computed` δc, `deflection` δ and `estimate` δ̂ in d, `force` F and `specified` (what the
-    pilot should feel at that δ) in N; `command` of the surface about trim, in ±1.
+    `computed` δc, `deflection` δ and `estimate` δ̂ in d, `force` F and `specified` (the specified
+    force at that δ) in N; `command` of the surface about trim, in ±1.
     """
 
     computed: Floats
@@ -68,10 +68,10 @@ class Statics:
 
 @dataclass(frozen=True)
 class Others:
-    """What the forces held on other controls do at one control.
+    """Effects of the forces held on other controls at one control.
 
-    They bend it by `bent`, its host adds `added` for them, both in d, and `leaked` of them, N,
-    reaches its loader.
+    The bend here, `bent`, and the host's correction for it, `added`, both in d, and the crosstalk
+    on its loader, `leaked`, N.
     """
 
     bent: float
@@ -80,7 +80,7 @@ class Others:
 
 
 def crossed(rig: Rig, control: str, others_N: Mapping[str, float]) -> Others:
-    """Return what the forces held on other controls, {control: N}, do at a control."""
+    """Return the effects of the forces held on other controls, {control: N}, at a control."""
     names = [str(name) for name in rig.controls]
     bends, assumed = crossed_bends(rig, control, names)
     force = np.array([others_N.get(name, 0.0) for name in names])
@@ -100,7 +100,7 @@ def static_line(
     computed: Floats,
     others_N: Mapping[str, float] | None = None,
 ) -> Statics:
-    """Return the static line at the given δc in d, which are not to be zero.
+    """Return the static line at given δc in d, none of them zero.
 
     `others_N` are the forces held on other controls, {control: N}.
     """
@@ -121,12 +121,12 @@ def static_point(
     time_s: float = 0.0,
     load_factor: float = 1.0,
 ) -> Statics:
-    """Return the point of the static line at which the grip stands at δ in d.
+    """Return the point of the static line with the grip at δ in d.
 
-    Where the loader rests in its breakout, or at its stop, it is moved by the structure alone, and
-    between the contacts of a play without a force.
-    On a rigid structure δ is not to be zero. `time_s` since the start is the time at which drifts
-    of scale and multiplier stand; `load_factor` in g, +1 in level flight, acts on a bob weight.
+    If the loader rests in its breakout or at its stop, the grip is moved by the structure alone,
+    and inside a backlash without a force. On a rigid structure δ must not be zero. `time_s` since
+    the start determines drifts of scale and multiplier; `load_factor` in g, +1 in level flight,
+    acts on a bob weight.
     """
     packed, frame = pack(rig, only=control), round(time_s * rig.frame_rate)
     packed["state"]["modification"]["frames"] = frame
@@ -138,7 +138,7 @@ def static_point(
     point = _line(rig, control, pressure_Pa, packed, frame, computed, force, others)
     loader = rig.controls[cast(ControlName, control)].loader
     if loader.play * loader.play_stiffness > 0.0 and abs(found[1]) < _NO_FORCE_N:
-        at = np.array([float(deflection)])  # between the contacts of the play
+        at = np.array([float(deflection)])  # inside the backlash
         return replace(
             point, deflection=at, specified=specified_force(rig, control, pressure_Pa, at)
         )
@@ -165,7 +165,7 @@ def _line(
 
 @stage
 def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
-    """Set the modification of the frame that the state has; return δc as read over δc."""
+    """Set the modification of the state's frame; return δc as read over δc."""
     m, sensing = s.modification, p.sensing
     read = scale_at(sensing, m.frames)
     first, second = gradients(p.schedule, p.schedule.pressure_scale * pressure)
@@ -180,7 +180,7 @@ def _set(p: ControlParameters, s: ControlState, pressure: float) -> float:
 def _force(
     p: ControlParameters, s: ControlState, computed: float, read: float, side: float
 ) -> float:
-    """Return F in N at δc in d, past the breakout to a side; the host reads δc times `read`."""
+    """Return F in N at δc in d, beyond the breakout on a side; the host reads δc times `read`."""
     m, most = s.modification, p.sensing.product_range
     force = side * p.loader.breakout + loader_force(p.loader.basic_gradient, computed)
     force += p.loader.cubic * computed**3 + ripple(p.loader, computed) - p.loader.offset
@@ -196,7 +196,7 @@ def _force(
 
 @stage
 def _yields(p: LinkageParameters, force: float) -> float:
-    """Return how far the grip is ahead of δc under a force in N, d."""
+    """Return the displacement of the grip from δc under a force in N, d."""
     return bend(p, force) + pressed(p, force)
 
 
@@ -204,7 +204,7 @@ def _yields(p: LinkageParameters, force: float) -> float:
 def _along(
     controls: ControlArray, pressure: float, leaked: float, computed: Floats, out: Floats
 ) -> None:
-    """Write F in N at each δc, shape (n,), where others' forces leak so much into the loader, N."""
+    """Write F in N at each δc, shape (n,), with `leaked` as others' crosstalk on the loader, N."""
     p, s = controls[0].parameters, controls[0].state
     read = _set(p, s, pressure)
     for i in range(len(computed)):
@@ -222,9 +222,9 @@ def _made_of(
     beside: tuple[float, float],
     out: Floats,
 ) -> None:
-    """Write δ and δ̂ in d and the surface's command, shape (3, n), of each δc and F.
+    """Write δ and δ̂ in d and the surface's command, shape (3, n), for each δc and F.
 
-    `beside` is what other controls' forces bend here, and what the host adds for them, d.
+    `beside` is the bend by other controls' forces, and the host's correction for it, d.
     """
     p = controls[0].parameters
     read = scale_at(p.sensing, frame)
@@ -238,7 +238,7 @@ def _made_of(
 
 @seldom
 def _force_for(p: LinkageParameters, by: float, low: float, high: float) -> float:
-    """Return the F in N between two at which the grip is so far ahead of δc, d; the nearer end."""
+    """Return the F in N between two bounds that displaces the grip by `by`, d; else a bound."""
     if _yields(p, high) <= by:
         return high
     if _yields(p, low) >= by:
@@ -258,9 +258,9 @@ def _force_for(p: LinkageParameters, by: float, low: float, high: float) -> floa
 def _point_at(
     controls: ControlArray, pressure: float, leaked: float, deflection: float
 ) -> tuple[float, float]:
-    """Return the δc in d and the F in N at which the grip stands at δ, by bisection of δc.
+    """Return the δc in d and the F in N with the grip at δ, by bisection of δc.
 
-    Where the loader is held still, at neutral or at its stop, the structure alone gives F.
+    If the loader is held still, at neutral or at its stop, the structure alone determines F.
     """
     p, s = controls[0].parameters, controls[0].state
     read = _set(p, s, pressure)
@@ -281,7 +281,7 @@ def _point_at(
                 low, high = min(stopped, most), max(stopped, most)
                 return side * far, _force_for(p.linkage, deflection - side * far, low, high)
             most *= 2.0
-        return side * far, stopped  # nothing yields so far: a rigid structure, but for rounding
+        return side * far, stopped  # a rigid structure, or rounding
     while True:
         middle = 0.5 * (near + far)
         x = side * middle

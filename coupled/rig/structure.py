@@ -1,28 +1,28 @@
-"""One structure under all controls: what a force on one bends at the others.
+"""One structure under all controls: the bend at each control by forces on the others.
 
     δ_i = x_i + K_ii·F_i + Σ_j K_ij·F_j                      eq. (1) for three controls
 
-K_ii is the loader's own bend; the terms beside the diagonal are data here, deflection of the
-first control by force on the second, zero for controls that stand on their own.
+K_ii is the loader's own bend; the off-diagonal terms are data here, deflection of the first control
+by force on the second, zero for independent controls.
 
-A linear structure obeys Maxwell and Betti: its compliance is symmetric between forces and the
+A linear structure is reciprocal (Maxwell-Betti): its compliance is symmetric between forces and the
 displacements along them. A wheel's force acts at the rim, whose displacement is r·δ with r the
 rim's radius, the wheel's `length_m`; so in the file's units
 
     K_column,wheel = r·K_wheel,column,   K_pedals,wheel = r·K_wheel,pedals,   K_cp = K_pc
 
-Nothing imposes that: readings are of one column of the table at a time. `reciprocal` asks for
-the check. Whatever the radius, work against the structure is positive only where all principal
-minors of K are (scaling by r changes none of their signs).
+This is not imposed, since readings determine one column of the matrix at a time. `reciprocal`
+requests the check. Whatever the radius, the strain energy is positive only if all principal minors
+of K are (scaling by r does not change their signs).
 
-What the pilots feel. With ΔG of eq. (12) the loader of control i holds F_i = g_i·δc_i, and
+The felt forces: with ΔG of eq. (12) the loader of control i holds F_i = g_i·δc_i, and
 
     F = (1 + g·K)⁻¹·g·δ,     g = diag(G_i/(1 − K̂_ii·G_i))
 
-The whole of eq. (12) would be F = G·(1 − K̂·G)⁻¹·δc: its off-diagonal terms multiply another
+The matrix form of eq. (12) would be F = G·(1 − K̂·G)⁻¹·δc. Its off-diagonal terms multiply another
 control's δc, for which a loader has no multiplier. With the diagonal known, F_i = G_i·(δ_i −
-Σ_j K_ij·F_j): what the other forces bend here is felt as a shift of neutral, and stays. The
-surfaces' part of it, δ̂_i = δc_i + Σ_j K̂_ij·F_j, the host can make good.
+Σ_j K_ij·F_j): the bend by other forces is felt as a shift of neutral, and is not corrected. Its
+effect on the surfaces, δ̂_i = δc_i + Σ_j K̂_ij·F_j, is corrected by the host.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ from coupled.rig.parameters import Control
 from coupled.schema import Section, file_keys, quantity
 
 Floats = NDArray[np.float64]
-RECIPROCAL_WITHIN = 0.01  # of the larger: what a calibration finds agrees no better
+RECIPROCAL_WITHIN = 0.01  # of the larger: the accuracy of a calibration
 
 
 class Compliance(Section):
-    """What a force on one control bends at another: the terms beside the diagonal."""
+    """The off-diagonal terms of the compliance: the bend at a control by a force on another."""
 
     column_by_wheel: float = quantity("m_per_N", 0.0)
     column_by_pedals: float = quantity("m_per_N", 0.0)
@@ -54,30 +54,30 @@ class Compliance(Section):
 
     @property
     def diagonal(self) -> bool:
-        """Whether no force bends at another control."""
+        """Whether all off-diagonal terms are zero."""
         return not any(getattr(self, name) for name in Compliance.model_fields)
 
     def between(self, names: Sequence[str]) -> Floats:
-        """Return the terms beside the diagonal for controls in this order, d/N; diagonal 0."""
+        """Return the off-diagonal terms for controls in this order, d/N, with a zero diagonal."""
         return np.array(
             [[0.0 if i == j else getattr(self, f"{i}_by_{j}") for j in names] for i in names]
         )
 
 
 class Structure(Compliance):
-    """The structure as it is, and what the host assumes of it for δ̂."""
+    """The true structure, and the host's assumption for δ̂."""
 
     reciprocal: bool = False
     assumed: Compliance = Compliance()
 
     @property
     def stands_apart(self) -> bool:
-        """Whether each control is on its own, in the rig and to its host."""
+        """Whether all controls are independent, in the rig and for its host."""
         return self.diagonal and self.assumed.diagonal
 
 
 def lost_deflections(compliance: Floats, gradients: Floats, deflections: Floats) -> Floats:
-    """Return what the surfaces lose of δ, d, where each pilot feels G_i·δ_i: K·G·δ, eq. (7a).
+    """Return the deflections lost by the surfaces, d, if each pilot feels G_i·δ_i: K·G·δ, eq. (7a).
 
     `compliance` is the whole K in d/N, shape (n, n), `gradients` G in N/d, `deflections` δ in d.
     """
@@ -85,7 +85,7 @@ def lost_deflections(compliance: Floats, gradients: Floats, deflections: Floats)
 
 
 def felt_forces(compliance: Floats, on_computed: Floats, deflections: Floats) -> Floats:
-    """Return F in N where each loader holds F_i = g_i·δc_i: (1 + g·K)⁻¹·g·δ.
+    """Return F in N if each loader holds F_i = g_i·δc_i: (1 + g·K)⁻¹·g·δ.
 
     `on_computed` is g in N/d, `deflections` δ in d; the whole `compliance` in d/N.
     """
@@ -94,7 +94,7 @@ def felt_forces(compliance: Floats, on_computed: Floats, deflections: Floats) ->
 
 
 def whole(controls: Mapping[str, Control], terms: Compliance) -> Floats:
-    """Return the whole K, d/N: the loaders' bends and the terms between, controls in order."""
+    """Return the whole K, d/N: the loaders' bends and the off-diagonal terms, controls in order."""
     bends = [min(_bends(control)) for control in controls.values()]
     return np.asarray(terms.between(list(controls)) + np.diag(bends))
 
@@ -105,7 +105,7 @@ def _bends(control: Control) -> tuple[float, float]:
 
 
 def check_structure(structure: Structure, controls: Mapping[str, Control], file: object) -> None:
-    """Raise InputError for a structure that cannot be, naming the terms."""
+    """Raise InputError for an impossible structure, with the terms."""
     if structure.stands_apart:
         return
     for path, terms in (("structure", structure), ("structure.assumed", structure.assumed)):
@@ -131,7 +131,7 @@ def _check_linear(structure: Structure, controls: Mapping[str, Control], file: o
 
 
 def _check_work(structure: Structure, controls: Mapping[str, Control], file: object) -> None:
-    """Refuse a structure that gives work: a principal minor of K that is not positive."""
+    """Refuse a structure with negative strain energy: a principal minor of K not positive."""
     names, bends = list(controls), whole(controls, structure)
     coupled = structure.between(names)
     for count in (2, 3):
@@ -150,10 +150,10 @@ def _check_work(structure: Structure, controls: Mapping[str, Control], file: obj
 
 
 def _check_gradients(structure: Structure, controls: Mapping[str, Control], file: object) -> None:
-    """Refuse gradients that no structure this soft can be given: an eigenvalue of K·G_T of 1."""
+    """Refuse gradients too stiff for the structure: an eigenvalue of K·G_T of 1."""
     bends = structure.between(list(controls))
     bends = bends + np.diag([max(_bends(control)) for control in controls.values()])
-    # G_T is linear between rows, and the eigenvalue convex in it: greatest at a row.
+    # G_T is linear between rows, and the eigenvalue convex in it: largest at a row.
     rows = sorted({q for c in controls.values() for q in c.schedule.dynamic_pressure})
     for q in rows:
         gradients = np.array([_stiffest(control, q) for control in controls.values()])

@@ -1,13 +1,13 @@
 """Surface: from the host's estimate of the deflection to a command for the model.
 
     u = sign·δ̂/travel, clipped to ±1            the linkage of the aircraft
-    cable stretch   u/(1 + loss·q̄)              it yields to air load
+    cable stretch   u/(1 + loss·q̄)              under air load
     lag             τ·y' = u − y
     rate limit      |y'| ≤ rate
     free play       the surface follows once the play is taken up
     rigging         a constant added
 
-The result is added to the trim. All in command units: 1 is the whole travel.
+The result is added to the trim. All are in command units: 1 is the whole travel.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from coupled.rig.declaration import Declaration, first_order_gain
 
 
 class SurfaceParameters(Protocol):
-    """The run from the column to the surface."""
+    """The chain from the column to the surface."""
 
     gain: float  # sign/travel, 1/d
     stretch: float  # loss, 1/Pa
     lag_gain: float  # 1 − exp(−T/τ) over a frame; 1 without lag
-    rate_step: float  # most that it moves in a frame; 0 for no limit
+    rate_step: float  # largest motion in a frame; 0 for no limit
     play: float  # full width
     offset: float
 
 
 class SurfaceState(Protocol):
-    """What the surface remembers."""
+    """The state of the surface's chain."""
 
     lagged: float
     moved: float
     position: float
 
 
-# JSBSim's sign for nose up, right wing down, nose right, confirmed by flying each model.
+# JSBSim's sign for nose up, right wing down, nose right, confirmed in flight of each model.
 COMMAND_SIGN = {"elevator": -1.0, "aileron": 1.0, "rudder": -1.0}
 
 SURFACE = Declaration(
@@ -55,7 +55,7 @@ SURFACE = Declaration(
 
 @stage
 def asked_command(p: SurfaceParameters, estimate: float, dynamic_pressure: float) -> float:
-    """Return the command that the linkage asks for, in ±1, for δ̂ in d and q̄ in Pa."""
+    """Return the linkage's command, in ±1, for δ̂ in d and q̄ in Pa."""
     asked = min(max(p.gain * estimate, -1.0), 1.0)
     return asked / (1.0 + p.stretch * dynamic_pressure)
 

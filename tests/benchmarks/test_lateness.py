@@ -21,10 +21,10 @@ SECONDS = float(os.environ.get("COUPLED_LIVE_SECONDS", "30"))
 WAITS = """
 import json, sys
 from coupled.live.pacing import Pacer
-from coupled.live.pacing import first_place
+from coupled.live.pacing import real_time_priority
 frames = int(120 * float(sys.argv[1]))
 pacer = Pacer(1 / 120, frames)
-with first_place():
+with real_time_priority():
     for _ in range(frames):
         pacer.wait()
 print(json.dumps(pacer.result().as_dict()))

@@ -114,7 +114,7 @@ HOSTILE = [
     (CSV.replace("soft,4.0", ",4.0"), "row 3: gradient_set: is empty"),
     (CSV + "soft,2.0,6.4,27.11,7.40,,\n", "row 10: is the same as row 2"),
     (CSV.replace("null,,,40.0", "null,,6.0,40.0"), "row 8: has a deflection or a force without"),
-    (CSV.replace("12.5,12.0", "12.5,0"), "row 8: a null at 0 V tells nothing"),
+    (CSV.replace("12.5,12.0", "12.5,0"), "row 8: a null at 0 V does not determine S2"),
     (CSV.replace("first try", '"first try'), "row 9: is not CSV"),
     (CSV.replace("first try", "x" * 200_000), "is not CSV"),
     (CSV + CSV.splitlines()[1].replace("2.0", "{}"), "row 10"),

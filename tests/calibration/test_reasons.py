@@ -41,7 +41,7 @@ def test_a_release_fails_by_the_bend_and_no_reason_is_left_where_it_is_put_right
         ({"compensation.deflection": False}, "The deflection's correction is off"),
         (
             {"compensation.bend_m_per_N": 4e-5},
-            "takes K for 4e-05 m/N, and the structure has 9.136e-05",
+            "assumes K = 4e-05 m/N, and the structure has 9.136e-05",
         ),
         ({"sensing.modifying_scale": 0.7}, "Scales are off (modifying_scale = 0.7)"),
         ({"loader.breakout_N": 200.0}, "within the breakout of 200 N the loader rests"),

@@ -58,7 +58,7 @@ def flown(seconds: float, *words: str, adapt: bool = False) -> Record:
     ("seconds", "words", "said"),
     [
         (60.0, ("--die", "12"), "in which the loader sent no new sample"),
-        (30.0, ("--drop", "0.02"), "samples did not come"),
+        (30.0, ("--drop", "0.02"), "samples are missing"),
     ],
 )
 def test_a_healthy_loader_that_dies_or_loses_answers_has_no_gap(

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from coupled.flight.airframe import JSBSimAirframe
-from coupled.flight.kept import PUT_BACK_EXACTLY, Hangar, Lent, in_trim
+from coupled.flight.kept import PUT_BACK_EXACTLY, AircraftCache, CachedAircraft, in_trim
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.rig.parameters import Flight
@@ -115,23 +115,23 @@ LEFT: list[Spoil] = [shake, brake]
 @pytest.mark.parametrize("model", sorted(PUT_BACK_EXACTLY))
 def test_whatever_it_flew_before_a_kept_aircraft_flies_as_a_fresh_one(model: str) -> None:
     fresh = steered(made(model), 5, 1200)
-    lent = in_trim(made(model), "any")
-    assert isinstance(lent.airframe, JSBSimAirframe)
+    cached = in_trim(made(model), "any")
+    assert isinstance(cached.airframe, JSBSimAirframe)
     for spoil in (*PUT_BACK, *reversed(PUT_BACK)):
-        spoil(lent.airframe)
-        assert lent.state() != lent.trimmed
-        assert lent.restarted(), f"{model} after {spoil.__name__}"
-        assert steered(lent.airframe, 5, 1200) == fresh, f"{model} after {spoil.__name__}"
+        spoil(cached.airframe)
+        assert cached.state() != cached.trimmed
+        assert cached.restarted(), f"{model} after {spoil.__name__}"
+        assert steered(cached.airframe, 5, 1200) == fresh, f"{model} after {spoil.__name__}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", sorted(PUT_BACK_EXACTLY))
 def test_a_property_that_a_reset_leaves_changed_is_detected(model: str) -> None:
     for spoil in LEFT:
-        lent = in_trim(made(model), "any")
-        assert isinstance(lent.airframe, JSBSimAirframe)
-        spoil(lent.airframe)
-        assert not lent.restarted()
+        cached = in_trim(made(model), "any")
+        assert isinstance(cached.airframe, JSBSimAirframe)
+        spoil(cached.airframe)
+        assert not cached.restarted()
 
 
 @pytest.mark.slow
@@ -142,13 +142,13 @@ def test_why_a_c172p_is_not_kept() -> None:
     def c172p() -> JSBSimAirframe:
         return JSBSimAirframe(flight, 1.0 / 120.0, CONTROLS)
 
-    lent = in_trim(c172p(), "any")
-    assert isinstance(lent.airframe, JSBSimAirframe)
-    assert lent.restarted()
-    stall(lent.airframe)
+    cached = in_trim(c172p(), "any")
+    assert isinstance(cached.airframe, JSBSimAirframe)
+    assert cached.restarted()
+    stall(cached.airframe)
     fresh = c172p()
     stall(fresh)
-    reads = [each.reader("aero/stall-hyst-norm") for each in (fresh, lent.airframe)]
+    reads = [each.reader("aero/stall-hyst-norm") for each in (fresh, cached.airframe)]
     assert [read() for read in reads if read is not None] == [1.0, 0.0]
 
 
@@ -160,20 +160,20 @@ def short(run: str, force_N: float, changes: dict[str, Any] | None = None) -> Ma
 
 
 @pytest.mark.slow
-def test_flights_in_a_hangar_have_the_bytes_of_flights_without(
+def test_flights_from_the_cache_have_the_bytes_of_flights_without(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    restarts, restarted = list[bool](), Lent.restarted
+    restarts, restarted = list[bool](), CachedAircraft.restarted
 
-    def told(lent: Lent) -> bool:
-        restarts.append(restarted(lent))
+    def told(cached: CachedAircraft) -> bool:
+        restarts.append(restarted(cached))
         return restarts[-1]
 
-    monkeypatch.setattr(Lent, "restarted", told)
+    monkeypatch.setattr(CachedAircraft, "restarted", told)
     flights = [short("pull-up-737", force_N) for force_N in (170.0, -90.0, 40.0)]
     alone = [fly(flight).data.tobytes() for flight in flights]
-    hangar = Hangar()
-    together = [fly(flight, hangar=hangar).data.tobytes() for flight in (*flights, *flights[::-1])]
+    cache = AircraftCache()
+    together = [fly(flight, cache=cache).data.tobytes() for flight in (*flights, *flights[::-1])]
     assert together == [*alone, *alone[::-1]]
     assert restarts == [True] * 4  # the first two, of a kind not yet known to come again, load
 
@@ -188,12 +188,12 @@ def test_flights_in_a_hangar_have_the_bytes_of_flights_without(
     ],
 )
 def test_what_a_reset_may_not_restore_is_not_kept(run: str, changes: dict[str, Any] | None) -> None:
-    hangar, flight, made = Hangar(), short(run, 20.0, changes), []
+    cache, flight, made = AircraftCache(), short(run, 20.0, changes), []
 
     def make() -> Any:
         made.append(1)
         return object()
 
     for _ in range(3):
-        hangar.take_back(hangar.lend(flight, make))
+        cache.keep(cache.take(flight, make))
     assert len(made) == 3

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.flight.companion import Aboard
+from coupled.flight.companion import FlightAccess
 from coupled.flight.everyframe import PlainAircraft, plain_frames
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
@@ -132,7 +132,7 @@ class Onlooker:
 
     elsewhere = leads = False
 
-    def board(self, aboard: Aboard) -> None:
+    def begin(self, access: FlightAccess) -> None:
         pass
 
     def before(self, k: int, motion: tuple[float, ...]) -> str:

@@ -264,7 +264,7 @@ def test_far_above_the_short_period_pitch_falls_by_four_an_octave() -> None:
         (
             "crossover_rad_per_s = 2.0\nroll_crossover_rad_per_s = 1.0",
             "roll_crossover_rad_per_s",
-            "has no part in following pitch",
+            "is not used for pitch",
         ),
         (
             "crossover_rad_per_s = 2.0\narm_stiffness_N_per_rad = 9.0",

@@ -57,7 +57,7 @@ def test_a_machine_that_is_as_it_was_has_no_gap_and_a_fault_is_named() -> None:
     assert diagnose(RIG, same).verdict == "unexplained"
     held = diagnose(RIG, same, healthy=well)
     assert held.verdict == "no_gap"
-    assert held.summary.startswith("Held against the machine of 2 records when it was well")
+    assert held.summary.startswith("Compared with the healthy machine of 2 records")
     faulty = diagnose(RIG, flown(rng, 4.0), healthy=well)
     assert faulty.verdict in ("effect", "mostly")
     assert faulty.effects[0].name == "coulomb_friction"

@@ -81,7 +81,7 @@ def test_the_one_that_moves_the_aircraft_is_fixed_first(rig: Rig, record: Record
     assert found[0].share > 0.95  # though inertia has all of the elevator's change, which is small
     assert found[1].shares["elevator_rad"] > 0.9
     assert sum(one.share for one in found) == pytest.approx(1.0)
-    assert in_words(found).endswith("fix elevator effectiveness first.")
+    assert in_words(found).endswith("Correct elevator effectiveness first.")
 
 
 def test_what_is_in_the_record_alone_does_nothing(rig: Rig, record: Record) -> None:

@@ -79,7 +79,7 @@ def test_a_healthy_record_has_no_gap(falcon: Rig) -> None:
     assert (found.verdict, found.effects) == ("no_gap", ())
     surface = found.stage("surface")
     assert not surface.judged
-    assert surface.why == "the aircraft's laws move it, too; judged with the airframe"
+    assert surface.why == "control laws of the aircraft also move it; judged with the airframe"
     compared = {output.channel: output for output in airframe_outputs(falcon, record)}
     assert compared["elevator_rad"].gap(falcon) < 1.1
 

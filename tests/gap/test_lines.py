@@ -85,7 +85,7 @@ def test_a_hum_is_a_finding_of_sensing_with_its_line(tmp_path: Path) -> None:
     assert where is not None and where.line is not None
     assert where.line.seen_Hz == pytest.approx(50.0, abs=0.01)
     assert not where.line.folded
-    assert "stands at 50 Hz in column_computed_m" in found.summary
+    assert "is at 50 Hz in column_computed_m" in found.summary
     said = json.loads(json.dumps(found.as_dict(), allow_nan=False))
     line = said["stages"]["sensing"]["where"]["line"]
     assert line["amplitude"] == pytest.approx(3e-4, rel=0.02)

@@ -14,7 +14,7 @@ from coupled.errors import InputError
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import FrequencySweep
 from coupled.gap.signals.live import Live, judged_part, live_of
-from coupled.live.host import Host, Plan, Word
+from coupled.live.host import Host, Plan, Request
 from coupled.live.session import LiveFlight, fly_live
 from coupled.record.channels import FADED, LOST, REPEATED, SWITCHED, VALIDITY
 from coupled.record.record import Record
@@ -68,7 +68,7 @@ def test_samples_are_brought_to_equal_steps_of_the_loader_s_clock() -> None:
     assert np.abs(record[FORCE] - signal(usual)).max() > 0.05
     assert np.sqrt(np.mean(wrong**2)) < 5e-4
     assert live.judged.all()
-    assert "samples did not come" in live.left_out[0]
+    assert "samples are missing" in live.left_out[0]
 
 
 def test_a_record_as_it_should_be_is_taken_as_it_is() -> None:
@@ -181,17 +181,17 @@ def test_a_damaged_manifest_is_said(live: dict[str, Any]) -> None:
 class Switcher:
     """A watcher that switches as it is told to: when, s, and what."""
 
-    def __init__(self, *words: tuple[float, Word]) -> None:
+    def __init__(self, *words: tuple[float, Request]) -> None:
         self._words, self._time_s = list(words), 0.0
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Begin."""
         self._host = host
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing."""
 
-    def words(self) -> list[Word]:
+    def requests(self) -> list[Request]:
         """Return what is due."""
         due = [word for at, word in self._words if at <= self._host.time_s]
         self._words = [(at, word) for at, word in self._words if at > self._host.time_s]
@@ -201,7 +201,7 @@ class Switcher:
         """End."""
 
 
-def swept(*words: tuple[float, Word]) -> LiveFlight:
+def swept(*words: tuple[float, Request]) -> LiveFlight:
     rig = load_rig("report-column")
     noise = {FORCE: 0.15, "column_computed_m": 2e-5, "column_deflection_m": 2e-5}
     pilot = FrequencySweep(force_N=40, start_s=0.5, low_Hz=0.2, high_Hz=2.0, duration_s=14.0)
@@ -211,10 +211,10 @@ def swept(*words: tuple[float, Word]) -> LiveFlight:
 
 def test_a_host_that_was_switched_in_flight_has_no_gap() -> None:
     flight = swept(
-        (4.0, Word("set", "deflection", "column", 0.0)),
-        (6.0, Word("set", "assumed_bend", "column", 5e-5)),
-        (8.0, Word("set", "deflection", "column", 1.0)),
-        (11.0, Word("set", "gradient", "column", 0.0)),
+        (4.0, Request("set", "deflection", "column", 0.0)),
+        (6.0, Request("set", "assumed_bend", "column", 5e-5)),
+        (8.0, Request("set", "deflection", "column", 1.0)),
+        (11.0, Request("set", "gradient", "column", 0.0)),
     )
     found = diagnose(load_rig("report-column"), flight.record)
     gaps = {stage.name: stage.gap for stage in found.stages}

@@ -25,7 +25,7 @@ def test_a_floor_that_hides_a_gap_lets_no_one_say_that_there_is_none() -> None:
     assert loader["floor_share"] > 0.3
     assert "noise of column_force_N is" in loader["why"]
     assert "less noise" in found.next_test
-    assert "cannot be said" in found.summary
+    assert "cannot be decided" in found.summary
 
 
 NOISY = (5.0, 2e-6)

@@ -38,11 +38,11 @@ def test_a_state_is_read_once_and_complete() -> None:
     memory = shared_memory()
     host, page = Board(memory), Board(memory)
     assert page.state(0) == (0, "")
-    host.say({"phase": "flying"})
+    host.write_state({"phase": "flying"})
     seen, text = page.state(0)
     assert json.loads(text) == {"phase": "flying"}
     assert page.state(seen) == (seen, "")
-    host.say({"long": "x" * STATE_bytes})  # left out
+    host.write_state({"long": "x" * STATE_bytes})  # left out
     assert page.state(seen) == (seen, "")
 
 
@@ -63,10 +63,10 @@ def test_a_state_is_read_once_and_complete() -> None:
 )
 def test_an_invalid_message_of_the_page_is_dropped(text: str) -> None:
     server = pytest.importorskip("coupled.live.dashboard.server")
-    assert server.word_of(text) is None
+    assert server.request_of(text) is None
 
 
 def test_a_valid_message_of_the_page_is_accepted() -> None:
     server = pytest.importorskip("coupled.live.dashboard.server")
-    word = server.word_of('{"what": "set", "control": "column", "text": "bend", "value": 1e-4}')
+    word = server.request_of('{"what": "set", "control": "column", "text": "bend", "value": 1e-4}')
     assert word == {"what": "set", "control": "column", "text": "bend", "value": 1e-4}

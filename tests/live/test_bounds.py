@@ -14,7 +14,7 @@ import pytest
 
 from coupled.flight.runfile import read_run
 from coupled.live.dashboard.page import Page
-from coupled.live.host import Host, Plan, SAVE_EVERY_s, Word
+from coupled.live.host import Host, Plan, Request, SAVE_EVERY_s
 from coupled.live.session import fly_live
 from coupled.record.record import Record
 
@@ -80,10 +80,10 @@ def test_a_viewer_that_sends_too_many_requests_is_disconnected(page: Any) -> Non
             viewer.send('{"what": "save"}')
         while True:
             viewer.recv(timeout=5.0)
-    words = page.words()
+    words = page.requests()
     quiet = time.monotonic() + 0.5
     while time.monotonic() < quiet:
-        if more := page.words():
+        if more := page.requests():
             words += more
             quiet = time.monotonic() + 0.5
         time.sleep(0.01)
@@ -96,7 +96,7 @@ def test_the_last_of_many_hand_positions_counts(page: Any) -> None:
             viewer.send(f'{{"what": "hand", "control": "column", "value": {n / 2000}}}')
         deadline = time.monotonic() + 5.0
         while page.read("column") != 1999 / 2000 and time.monotonic() < deadline:
-            page.words()
+            page.requests()
             time.sleep(0.005)
         assert page.read("column") == 1999 / 2000
 
@@ -112,15 +112,15 @@ def test_a_rate_limit_allows_more_requests_with_time() -> None:
 class Saver:
     """A watcher that asks for a save at each frame."""
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         """Begin."""
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing."""
 
-    def words(self) -> list[Word]:
+    def requests(self) -> list[Request]:
         """Ask."""
-        return [Word("save")]
+        return [Request("save")]
 
     def close(self) -> None:
         """End."""

@@ -15,7 +15,7 @@ from coupled.flight.loop import fly
 from coupled.flight.pilot import Step
 from coupled.live.attach import rig_live, run_live
 from coupled.live.hands import Follower
-from coupled.live.host import Host, Plan, Word
+from coupled.live.host import Host, Plan, Request
 from coupled.live.session import fly_live
 from coupled.live.stick import Stick, axes_of
 
@@ -77,16 +77,16 @@ class Wanted:
 class Looker:
     """A watcher that gives commands at given times."""
 
-    def __init__(self, *words: tuple[float, Word]) -> None:
+    def __init__(self, *words: tuple[float, Request]) -> None:
         self._words = list(words)
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         self._host = host
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing at a frame."""
 
-    def words(self) -> list[Word]:
+    def requests(self) -> list[Request]:
         due = [word for time, word in self._words if time <= self._host.time_s]
         self._words = self._words[len(due) :]
         return due
@@ -108,11 +108,11 @@ def test_the_hand_follows_the_stick_with_the_force_that_the_loader_needs() -> No
 def test_switches_marks_and_stop_act_at_their_frame() -> None:
     warned: list[str] = []
     words = [
-        (2.0, Word("set", "deflection", "column", 0.0)),
-        (2.5, Word("mark", "here")),
-        (3.0, Word("set", "friction", "column", 1e6)),
-        (3.0, Word("set", "nonsense", "column", 1.0)),
-        (3.5, Word("stop")),
+        (2.0, Request("set", "deflection", "column", 0.0)),
+        (2.5, Request("mark", "here")),
+        (3.0, Request("set", "friction", "column", 1e6)),
+        (3.0, Request("set", "nonsense", "column", 1.0)),
+        (3.5, Request("stop")),
     ]
     plan = Plan(paced=False, wishes=Wanted(), watchers=[Looker(*words)], warn=warned.append)
     flight = fly_live(rig_live("report-column", None), plan)
@@ -136,7 +136,7 @@ def test_a_service_set_live_is_recorded_as_the_event_of_a_run() -> None:
     plain = replace(plain, pilots={"column": Step(force_N=30.0, start_s=0.2)})
     events = {name: Event(service=name, control="column", at=at, to=to) for name, at, to in led}
     batch = fly(replace(plain, conditions=Conditions(event=events)))
-    words = [(at, Word("lead", name, "column", to)) for name, at, to in led]
+    words = [(at, Request("lead", name, "column", to)) for name, at, to in led]
     live = fly_live(plain, Plan(paced=False, watchers=[Looker(*words)])).record
     assert live.channels == batch.channels
     assert np.array_equal(live.data, batch.data)

@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from coupled.live.pacing import EDGES_ms, Pacer, first_place
+from coupled.live.pacing import EDGES_ms, Pacer, real_time_priority
 
 FRAME_s = 1.0 / 128.0  # exact in binary, so that the sums are
 
@@ -121,7 +121,7 @@ def test_the_histogram_counts_every_frame() -> None:
 def test_only_the_thread_that_flies_goes_first_and_only_while_it_flies() -> None:
     before = os.sched_getscheduler(0)
     seen: list[int] = []
-    with first_place() as granted:
+    with real_time_priority() as granted:
         mine = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
         assert mine == (os.SCHED_FIFO if granted else before)
         other = threading.Thread(target=lambda: seen.append(os.sched_getscheduler(0)))
@@ -136,7 +136,7 @@ def test_a_flight_continues_without_real_time_priority(monkeypatch: pytest.Monke
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse, raising=False)
-    with first_place() as granted:
+    with real_time_priority() as granted:
         assert not granted
-    with first_place(wanted=False) as granted:
+    with real_time_priority(wanted=False) as granted:
         assert not granted

@@ -94,7 +94,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_flight(tmp_path: Path) -> No
         assert len(flight.record) == 300
         (line,) = said
         assert "the recording ended: File too large" in line
-        assert "the flight goes on" in line
+        assert "the flight continues" in line
         with pytest.raises(InputError, match="File too large") as fault:
             write_record(flight.record, path)
         error = recording.instead_of(fault.value)

@@ -21,9 +21,9 @@ def test_an_answer_is_timed_from_its_own_order_and_once() -> None:
     assert trips.as_dict() is None
     assert str(trips) == "no order was answered"
     for sequence in range(1, 6):
-        trips.send(sequence, 10 * sequence * MS_ns)
+        trips.record_order(sequence, 10 * sequence * MS_ns)
     for echo, at_ms in ((1, 11.0), (3, 34.0), (2, 43.0), (3, 90.0), (9, 99.0), (5, 49.0)):
-        trips.hear(echo, int(at_ms * MS_ns))  # 3 again, 9 never sent, 5 ahead of its order
+        trips.record_answer(echo, int(at_ms * MS_ns))  # 3 again, 9 never sent, 5 ahead of its order
     # 1, 4 and 23 ms
     figures = {"answers": 3, "p50_ms": 4.0, "p99_ms": 22.62, "largest_ms": 23.0, "stamped": False}
     assert trips.as_dict() == pytest.approx(figures)
@@ -37,10 +37,10 @@ def test_an_answer_is_timed_from_its_own_order_and_once() -> None:
 def test_orders_that_nobody_answers_are_forgotten() -> None:
     trips = RoundTrips()
     for sequence in range(KEPT + 1):
-        trips.send(sequence, 0)
-    trips.hear(0, MS_ns)
+        trips.record_order(sequence, 0)
+    trips.record_answer(0, MS_ns)
     assert trips.as_dict() is None
-    trips.hear(1, MS_ns)
+    trips.record_answer(1, MS_ns)
     assert trips.as_dict() is not None
 
 

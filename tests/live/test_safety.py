@@ -78,7 +78,7 @@ def watched(force: Floats, computed: Floats, more: Floats, gauge: bool = True) -
     servo = Servo(COLUMN, FRAME_s)
     places = [servo.move(float(one)) for one in computed]
     samples = zip(force, computed, places + K * force + more, strict=True)
-    return [plausible.look(Measured(*map(float, sample))) for sample in samples]
+    return [plausible.update(Measured(*map(float, sample))) for sample in samples]
 
 
 def hand(seconds: float, noise: float = 0.05) -> tuple[Floats, Floats]:

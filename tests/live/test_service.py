@@ -21,7 +21,7 @@ def seen(bend: float, force: np.ndarray, noise: float, seed: int) -> ServiceBend
     estimator = BendEstimator(COLUMN, FRAME_s)
     random = np.random.default_rng(seed)
     for f in force:
-        estimator.look(float(f), 0.0, bend * f + 1e-3 + noise * random.standard_normal())
+        estimator.update(float(f), 0.0, bend * f + 1e-3 + noise * random.standard_normal())
     return estimator.now
 
 
@@ -58,7 +58,7 @@ def test_the_interval_has_its_coverage_with_correlated_noise() -> None:
         noise = 1e-4 * correlated(frames, memory, np.random.default_rng(seed))
         estimator = BendEstimator(COLUMN, FRAME_s)
         for f, off in zip(force.tolist(), noise.tolist(), strict=True):
-            estimator.look(f, 0.0, K * f + off)
+            estimator.update(f, 0.0, K * f + off)
         found = estimator.now
         assert found.bend is not None and found.error is not None
         held += abs(found.bend - K) < 1.96 * found.error
@@ -91,10 +91,10 @@ def test_too_little_excitation_freezes_the_estimate() -> None:
     idle = 0.5 * LEAST_N * np.sin(2.0 * np.pi * 0.5 * FRAME_s * np.arange(3600))
     estimator = BendEstimator(COLUMN, FRAME_s)
     for f in active:
-        estimator.look(float(f), 0.0, K * f)
+        estimator.update(float(f), 0.0, K * f)
     before = estimator.now.bend
     for f in idle:
-        estimator.look(float(f), 0.0, 3.0 * K * f)
+        estimator.update(float(f), 0.0, 3.0 * K * f)
     assert estimator.now.frozen
     assert estimator.now.bend == pytest.approx(before, rel=0.02)  # but for the second it takes
 
@@ -119,14 +119,14 @@ def test_a_repeated_sample_does_not_change_the_estimate() -> None:
     deflection = servoed(computed) + K * force
     estimator = BendEstimator(COLUMN, FRAME_s)
     for f, c, d in zip(force[:1500], computed, deflection, strict=False):
-        estimator.look(float(f), float(c), float(d))
+        estimator.update(float(f), float(c), float(d))
     before = estimator.now
     for _ in range(500):  # the loader is lost: its last sample is repeated
-        estimator.look(float(f), float(c), float(d), fresh=False)
+        estimator.update(float(f), float(c), float(d), fresh=False)
     assert estimator.now.bend == before.bend
     assert estimator.now.frozen
     for f, c, d in zip(force[2000:], computed[2000:], deflection[2000:], strict=True):
-        estimator.look(float(f), float(c), float(d))
+        estimator.update(float(f), float(c), float(d))
     assert not estimator.now.frozen
     assert estimator.now.bend == pytest.approx(K, rel=2e-3)
 
@@ -138,7 +138,7 @@ def test_lost_samples_leave_k_without_bias() -> None:
     estimator, held = BendEstimator(COLUMN, FRAME_s), (0.0, 0.0, 0.0)
     for missing, *sample in zip(lost, force, computed, deflection, strict=True):
         held = held if missing else (float(sample[0]), float(sample[1]), float(sample[2]))
-        estimator.look(*held, fresh=not missing)
+        estimator.update(*held, fresh=not missing)
     assert estimator.now.bend == pytest.approx(K, rel=2e-3)
 
 
@@ -146,18 +146,18 @@ def test_adaptation_is_slow_and_bounded_and_needs_a_small_error() -> None:
     sure = ServiceBend(3.0 * K, 0.01 * K, 20.0, frozen=False, alarm=True)
     adaptation, used = Adaptation(K, 2189.0), K
     for k in range(60 * 120):
-        found = adaptation.look(k * FRAME_s, sure)
+        found = adaptation.update(k * FRAME_s, sure)
         if found is not None:
             assert abs(found - used) <= 0.05 * 0.25 * K * (1.0 + 1e-9)
             used = found
     assert used == pytest.approx(2.0 * K)  # its bound
     unsure = ServiceBend(3.0 * K, 0.5 * K, 20.0, frozen=False, alarm=True)
     idle = ServiceBend(3.0 * K, 0.01 * K, 20.0, frozen=True, alarm=True)
-    assert Adaptation(K, 2189.0).look(0.0, unsure) is None
-    assert Adaptation(K, 2189.0).look(0.0, idle) is None
+    assert Adaptation(K, 2189.0).update(0.0, unsure) is None
+    assert Adaptation(K, 2189.0).update(0.0, idle) is None
     stiff = Adaptation(K, 0.5 / K)  # K̂·G_T stays below 0.8
     for k in range(60 * 120):
-        stiff.look(k * FRAME_s, sure)
+        stiff.update(k * FRAME_s, sure)
     assert stiff.assumed == pytest.approx(1.6 * K)
 
 

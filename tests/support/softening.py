@@ -11,7 +11,7 @@ from pathlib import Path
 from coupled.api.rigs import load_rig
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import FrequencySweep
-from coupled.live.host import Host, Plan, Word
+from coupled.live.host import Host, Plan, Request
 from coupled.live.session import fly_live
 from coupled.plots.saving import save
 from coupled.plots.service import draw_service
@@ -27,17 +27,17 @@ class Saboteur:
     def __init__(self, at_s: float, bend: float) -> None:
         self._at_s, self._bend = at_s, bend
 
-    def board(self, host: Host) -> None:
+    def begin(self, host: Host) -> None:
         self._host = host
 
-    def look(self, host: Host, k: int) -> None:
+    def observe(self, host: Host, k: int) -> None:
         """Do nothing at a frame."""
 
-    def words(self) -> Sequence[Word]:
+    def requests(self) -> Sequence[Request]:
         if self._host.time_s < self._at_s:
             return ()
         self._at_s = float("inf")
-        return [Word("set", "bend", "column", self._bend)]
+        return [Request("set", "bend", "column", self._bend)]
 
     def close(self) -> None:
         """Nothing is open."""

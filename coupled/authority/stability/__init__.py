@@ -1,1 +1,1 @@
-"""Stability: where the loader, its host and the hand begin to oscillate or to run away."""
+"""Stability limits of loader, host and hand: oscillation and divergence."""

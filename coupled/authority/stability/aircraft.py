@@ -2,13 +2,13 @@
 
     F_bob = −b·(n_z − 1)  →  loader  →  δ̂ = δc  →  elevator  →  n_z
 
-n_z is read at a frame and its force held over it; the loader answers as held from node to node,
-the surface is commanded at the next frame, and the aircraft answers a step later. With P(z) the
+n_z is read at a frame and its force held over it; the loader responds as held from node to node,
+the surface is commanded at the next frame, and the aircraft responds a step later. With P(z) the
 loop for one N per g the closed loop is that of 1 + b·P(z), so it begins to oscillate at
 
-    b = 1/|P| where P has turned by half a circle.
+    b = 1/|P| at a phase of P of −180°.
 
-The aircraft's answer is found by flying it, one frequency at a time.
+The aircraft's frequency response is found by flying it, one frequency at a time.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 _RATES_rad_per_s = np.geomspace(1.0, 30.0, 12)
-_TAP_N = 1e-3  # linear, and far above rounding
+_TAP_N = 1e-3  # within the linear range, and far above rounding
 _FLOWN_s = 12.0
 _SETTLED_s = 2.0
-_SPAN = 1.2  # to either side of the limit by theory, which is where it is sought
+_SPAN = 1.2  # factor to either side of the theoretical limit, within which it is searched
 
 
 @dataclass(frozen=True)
 class BobWeight:
     """The bob weight at which the loop through the aircraft begins to oscillate, and the rig's.
 
-    `simulated` is None where flying finds none within a fifth of theory's.
+    `simulated` is None if no limit is found in flight within a fifth of the theoretical one.
     """
 
     own_N_per_g: float
@@ -54,7 +54,7 @@ class BobWeight:
 
 
 def bob_weight(rig: Rig, file: Path) -> BobWeight | None:
-    """Return the limit of a rig's bob weight; None without aircraft or column, or without limit."""
+    """Return the limit of a rig's bob weight; None without aircraft, column or limit."""
     if rig.flight is None or "column" not in rig.controls:
         return None
     found = bob_weight_limit(rig, file)
@@ -76,9 +76,9 @@ def hands_off_rig(rig: Rig, bob_weight_N_per_g: float, gradient: float) -> Rig:
 
 
 def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:
-    """Return the least bob weight, N per g, that oscillates hands off, and at which rad/s.
+    """Return the least bob weight, N per g, that oscillates hands off, and its rad/s.
 
-    By theory, at the gradient of the rig's own trim; None where no frequency turns so far.
+    By theory, at the gradient of the rig's own trim; None if no frequency has that phase.
     """
     response = _response(rig, file)
     pressure = response(float(_RATES_rad_per_s[0])).pressure_Pa
@@ -86,7 +86,7 @@ def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:
     linear = hands_off_rig(rig, 0.0, gradient)
 
     def turn(rate: float) -> float:
-        """Return the imaginary part of −P, which is none where P has turned by half a circle."""
+        """Return the imaginary part of −P, which is zero at a phase of ±180°."""
         return -_loop(linear, response(rate), rate).imag
 
     rates = _RATES_rad_per_s.tolist()
@@ -99,9 +99,10 @@ def bob_weight_limit(rig: Rig, file: Path) -> tuple[float, float] | None:
 
 
 def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float) -> float | None:
-    """Return the bob weight, N per g, at which a tapped column's motion neither grows nor dies.
+    """Return the bob weight, N per g, at which a tapped column neither diverges nor settles.
 
-    Found by flying the coupled rig; None where it does not change within a fifth of `near`.
+    Found by flying the coupled rig; None if the sign of the growth does not change within a fifth
+    of `near`.
     """
     pressure = _response(rig, file)(float(_RATES_rad_per_s[0])).pressure_Pa
     gradient = specified_gradient(rig.controls["column"].schedule, pressure)
@@ -118,8 +119,8 @@ def flown_limit(rig: Rig, file: Path, near_N_per_g: float, rate_rad_per_s: float
 def flown_growth(rig: Rig, rate_rad_per_s: float) -> float:
     """Return the growth of a tapped column's motion at a frequency, 1/s, hands off.
 
-    Half the difference of a push and a pull leaves what the trim drifts out; of each period
-    the size about a straight line is taken.
+    Half the difference of a push and a pull removes the drift of the trim. The amplitude of each
+    period is taken about a straight line.
     """
     up, down = (fly(_tapped(rig, side * _TAP_N)) for side in (1.0, -1.0))
     swing = 0.5 * (up["column_computed_m"] - down["column_computed_m"])
@@ -153,7 +154,7 @@ def _loop(linear: Rig, response: Response, rate: float) -> complex:
 
 
 def _loader(linear: Rig, rate: float, frame_s: float) -> complex:
-    """Return δc at a frame over the force, m/N, which is held from frame to frame."""
+    """Return δc at a frame over the force, m/N, with the force held from frame to frame."""
     column = linear.controls["column"]
     loader = column.loader
     spring = loader.basic_gradient + added_gradient(column)

@@ -1,4 +1,4 @@
-"""The limits of a rig at its stiffest gradient, and how the motion of the rig itself dies."""
+"""The stability limits of a rig at its stiffest gradient, and the decay of its own motion."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from coupled.rig.packing import Hand
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
-ARM_N_per_d = 500.0  # the stiffness of a pilot's arm unless a run says otherwise
+ARM_N_per_d = 500.0  # default stiffness of a pilot's arm
 _POINTS = 41
 _SIMULATED_s = 8.0
 _CLAMP_rad_per_s = 6.0
-# From which end of its values a question is asked: where a rig is at its most stable.
+# The planes searched from above, where the rig is most stable.
 _FROM_ABOVE: tuple[Kind, ...] = ("servo", "gauge")
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Where one quantity, at the stiffest gradient, first makes a control unstable.
+    """The value of one quantity, at the stiffest gradient, at which a control becomes unstable.
 
-    `stable` says on which side it is stable: `below` or `above` the limit; or `everywhere`
-    or `nowhere` within the values tried, from `least` to `greatest`, and there is none. `filed` is
-    the rig's own value, None where its file has none.
+    `stable` is the stable side: `below` or `above` the limit; or `everywhere` or `nowhere` within
+    the values tried, from `least` to `greatest`, without a limit. `filed` is the rig's own value,
+    None if its file has none.
     """
 
     kind: Kind
@@ -53,7 +53,7 @@ class Limit:
 
     @property
     def outside(self) -> bool:
-        """Whether the rig's own value lies where the control is unstable."""
+        """Whether the rig's own value is on the unstable side."""
         if self.filed is None or self.stable == "everywhere":
             return False
         if self.simulated is None:
@@ -63,7 +63,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class HandGrowth:
-    """Growth in 1/s of the motion of a control in a hand, at its stiffest gradient."""
+    """Growth in 1/s of the motion of a control with a hand, at its stiffest gradient."""
 
     hand: str
     simulated: float
@@ -72,7 +72,7 @@ class HandGrowth:
 
 @dataclass(frozen=True)
 class StabilityLimits:
-    """A control's greatest K·G_T as `share`, its limits, and how its motion dies as filed."""
+    """A control's largest K·G_T as `share`, its limits, and the decay of its motion as filed."""
 
     control: ControlName
     gradient: float
@@ -81,12 +81,12 @@ class StabilityLimits:
     filed: tuple[HandGrowth, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON takes it."""
+        """Return the JSON."""
         return asdict(self)
 
 
 def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
-    """Return a control's limits; its structure must bend."""
+    """Return a control's limits; its structure must have a bend."""
     control = rig.controls[name]
     stiffest = gradient_range(control)[1]
     limits = tuple(
@@ -98,9 +98,9 @@ def stability_limits(rig: Rig, name: ControlName) -> StabilityLimits:
 
 
 def filed(rig: Rig, name: ControlName, kind: Kind) -> float | None:
-    """Return what a rig itself has of a plane's quantity, None where its file has none.
+    """Return a rig's own value of a plane's quantity, None if its file has none.
 
-    Of a hand's stiffness there is only what a pilot's arm usually has.
+    For a hand's stiffness it is the usual one of a pilot's arm.
     """
     control = rig.controls[name]
     bend, loader, sensing = control.loader.bend, control.loader, control.sensing
@@ -128,10 +128,10 @@ def gradient_range(control: Control) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How far simulated limits lie from those of linear theory, as shares.
+    """The differences of simulated limits from those of linear theory, as shares.
 
-    `most` bounds 95 % of those that both have, `worst` all; None where they share none. `alone` is
-    the number of simulated limits that linear theory does not have.
+    `most` bounds 95 % of the common ones, `worst` all; None if there are none. `alone` is the
+    number of simulated limits that linear theory does not have.
     """
 
     limits: int
@@ -141,7 +141,7 @@ class Disagreement:
 
     @property
     def words(self) -> str:
-        """What the comparison shows, in a sentence."""
+        """The result of the comparison, in a sentence."""
         said = f"{self.limits} limits on the map"
         if self.alone:
             said += f", {self.alone} of which linear theory does not have"
@@ -154,7 +154,7 @@ class Disagreement:
 
 
 def disagreement(planes: Iterable[Plane]) -> Disagreement:
-    """Return how far simulated limits lie from linear ones."""
+    """Return the differences of simulated limits from linear ones."""
     every = [c.difference for plane in planes for c in plane.crossings]
     found = [share for share in every if share is not None]
     most = float(np.quantile(found, 0.95)) if found else None

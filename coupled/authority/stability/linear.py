@@ -5,27 +5,26 @@
     grip      δ = x + K·F
     hand      F = −k_h·δ − c_h·δ' − k_I·∫δ dt
 
-A force that does not answer to the grip (a free hand) leaves the loader alone: it is stable
-while its spring G_B + ΔG is positive, that is while K̂·G_T < 1. A hand closes a loop around
-loader, servo and structure, whose stiffness is at most 1/K. τ is the loader's delay and one
-substep, in which hand and loader exchange force and motion; it is taken by its Padé fraction
-of second order.
+With a force independent of the grip (a free hand) the loader is stable while its spring G_B + ΔG is
+positive, that is while K̂·G_T < 1. A hand closes a loop around loader, servo and structure, whose
+stiffness is at most 1/K. τ is the loader's delay and one substep, in which hand and loader exchange
+force and motion; it is approximated by its Padé fraction of second order.
 
     gauge     F_g = F − m_g·x''  through its amplifier, its delay, half a sample of its converter
 
-A mass m_g between gauge and grip closes a loop of its own, also in a free hand. Fast beside the
-springs it is 1 + (m_g/m)·S(s)·A(s) = 0 with the servo S and the amplifier A; with a first-order
-amplifier of lag τ that has a closed form, `mass_limit`.
+A mass m_g between gauge and grip closes a loop of its own, also with a free hand. If it is fast
+compared with the springs the loop is 1 + (m_g/m)·S(s)·A(s) = 0 with the servo S and the amplifier
+A; with a first-order amplifier of lag τ it has a closed form, `mass_limit`.
 
-The digital product ΔG·δc stands still over a frame of T seconds, so the state goes by
+The digital product ΔG·δc is held over a frame of T seconds, so the state follows
 
     z(t + T) = (exp(A·T) − ∫exp(A·s) ds·B·ΔG·C)·z(t),    δc = C·z
 
-whose eigenvalues λ tell of stability; the growth is ln|λ|/T. Without a basic gradient and with
-c/m = a the criterion has a closed form, `held_limit`; for small frames T < 2c/ΔG, since the
-product comes half a frame late: the damping ratio falls by ω·T/4.
+with eigenvalues λ and the growth ln|λ|/T. Without a basic gradient and with c/m = a the limit has a
+closed form, `held_limit`; for small frames T < 2c/ΔG, since the product is half a frame late and
+reduces the damping ratio by ω·T/4.
 
-δ̂ = δc + K̂·F goes to the surface only. It closes no loop but that of the aircraft.
+δ̂ = δc + K̂·F moves the surface only, and closes no loop but that of the aircraft.
 """
 
 from __future__ import annotations
@@ -42,15 +41,15 @@ from coupled.rig.parameters import Compensation, Control, Sensing
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-_TERMS = 18  # of the exponential's series, which leave 1e-23 of a norm of a half
+_TERMS = 18  # of the exponential's series, with a remainder of 1e-23 at a norm of a half
 _COMPUTED, _RATE, _POSITION, _SPEED = range(4)
-FOLLOWS_per_s = 1e4  # of a grip without a servo; far beyond any growth that is looked for
+FOLLOWS_per_s = 1e4  # of a grip without a servo; far above any growth of interest
 
 
 def added_gradient(control: Control) -> float:
     """Return ΔG as it acts on δc, N/d, at the first gradient of the schedule: eq. (12).
 
-    By the scales of ΔF and of the δc that is multiplied: v₁, or what the host reads of it.
+    It includes the scales of ΔF and of the δc that is multiplied: v₁, or the host's reading of it.
     """
     host = control.compensation
     bend = host.bend if host.gradient else 0.0
@@ -63,18 +62,18 @@ def added_gradient(control: Control) -> float:
 
 
 def poles_growth(matrices: Floats) -> Floats:
-    """Return the greatest real part of the eigenvalues of matrices, 1/s, shape (…, n, n)."""
+    """Return the largest real part of the eigenvalues of matrices, 1/s, shape (…, n, n)."""
     return np.asarray(np.max(np.linalg.eigvals(matrices).real, axis=-1))
 
 
 def map_growth(maps: Floats, frame_s: Floats | float) -> Floats:
-    """Return how fast what a map makes of a frame grows, 1/s, for maps of shape (…, n, n)."""
+    """Return the growth of a frame's map, 1/s, for maps of shape (…, n, n)."""
     radius = np.max(np.abs(np.linalg.eigvals(maps)), axis=-1)
     return np.asarray(np.log(np.maximum(radius, 1e-300)) / frame_s)
 
 
 def growth(rig: Rig, hand: Hand) -> float:
-    """Return the growth of a linear rig's only control, 1/s, as its multiplier has it."""
+    """Return the growth of a linear rig's only control, 1/s, by its kind of multiplier."""
     (control,) = rig.controls.values()
     matrix = motion_matrix(rig, hand)
     if control.loader.multiplier == "hybrid":
@@ -83,7 +82,7 @@ def growth(rig: Rig, hand: Hand) -> float:
 
 
 def growths(posed: Sequence[tuple[Rig, Hand]]) -> list[float]:
-    """Return the growths of linear rigs, 1/s; those of hybrid ones at once, which is quicker."""
+    """Return the growths of linear rigs, 1/s; hybrid ones in one call, which is faster."""
     found = [next(iter(rig.controls.values())).loader.multiplier for rig, _ in posed]
     matrices = [motion_matrix(rig, hand) for rig, hand in posed if set(found) == {"hybrid"}]
     if not matrices or len({matrix.shape for matrix in matrices}) > 1:
@@ -95,7 +94,7 @@ def growths(posed: Sequence[tuple[Rig, Hand]]) -> list[float]:
 def motion_matrix(rig: Rig, hand: Hand) -> Floats:
     """Return A of z' = A·z; its first states are δc, δc', x, x'.
 
-    A hybrid ΔG is in it, a digital one is not.
+    It includes a hybrid ΔG, but not a digital one.
     """
     (control,) = rig.controls.values()
     matrix = _with_servo(rig, control, hand)
@@ -105,7 +104,7 @@ def motion_matrix(rig: Rig, hand: Hand) -> Floats:
 
 
 def _follow(a: Floats) -> None:
-    """Put x = δc in place of the servo: the difference, which starts at 0, is let die quickly."""
+    """Set x = δc in place of the servo, with a difference that starts at 0 and decays quickly."""
     a[_POSITION], a[_SPEED] = 0.0, a[_RATE]
     a[_POSITION, [_RATE, _COMPUTED, _POSITION]] = 1.0, FOLLOWS_per_s, -FOLLOWS_per_s
     a[_SPEED, [_RATE, _SPEED]] += FOLLOWS_per_s, -FOLLOWS_per_s
@@ -149,7 +148,7 @@ def _with_servo(rig: Rig, control: Control, hand: Hand) -> Floats:
 
 
 def _add_hand(a: Floats, hand: Hand, bend: float) -> tuple[int, Floats]:
-    """Add the hand's own states; return how many there are now, and F as a row of all, N."""
+    """Add the hand's own states; return their new number, and F as a row of all, N."""
     width, force = 4, np.zeros(len(a))
     answer = np.zeros(len(a))
     answer[[_POSITION, _SPEED]] = -hand.stiffness, -hand.damping
@@ -158,7 +157,7 @@ def _add_hand(a: Floats, hand: Hand, bend: float) -> tuple[int, Floats]:
         answer[integral] = 1.0
         width += 1
     give = 1.0 + bend * hand.stiffness
-    if bend * hand.damping > 0.0:  # the bend's own speed is damped too: F has a lag
+    if bend * hand.damping > 0.0:  # the hand damps the bend's own speed, so F has a lag
         a[width] = answer / (bend * hand.damping)
         a[width, width] = -give / (bend * hand.damping)
         force[width] = 1.0
@@ -172,7 +171,7 @@ def _add_hand(a: Floats, hand: Hand, bend: float) -> tuple[int, Floats]:
 
 
 def _add_amplifier(a: Floats, sensing: Sensing, width: int, force: Floats) -> tuple[int, Floats]:
-    """Add the gauge's amplifier behind a force; return how many states there are, and its row."""
+    """Add the gauge's amplifier behind a force; return the number of states, and its row."""
     if sensing.gauge_frequency == 0.0:
         return width, force
     w, passed = 2.0 * math.pi * sensing.gauge_frequency, np.zeros(len(a))
@@ -187,7 +186,7 @@ def _add_amplifier(a: Floats, sensing: Sensing, width: int, force: Floats) -> tu
 
 
 def _add_lead(a: Floats, host: Compensation, width: int, force: Floats) -> tuple[int, Floats]:
-    """Add the lead on the force, the first of its table; return states and the force's row."""
+    """Add the lead on the force, the first of its table; return the states and the force's row."""
     lead, lag = (host.force_lead or [0.0])[0], host.force_lead_lag
     if lead == 0.0:
         return width, force
@@ -197,10 +196,10 @@ def _add_lead(a: Floats, host: Compensation, width: int, force: Floats) -> tuple
 
 
 def mass_limit(servo_rad_per_s: float, damping_ratio: float, lag_s: float) -> float:
-    """Return the greatest m_g/m of a free loader without spring and damping, by Routh.
+    """Return the largest m_g/m of a free loader without spring and damping, by Routh.
 
-    Of τ·s³ + (1 + 2ζωτ)·s² + (2ζω + τω²)·s + ω²·(1 + m_g/m), the servo's ω and ζ, and τ the lag
-    of a first-order amplifier. Without lag any mass is stable.
+    For τ·s³ + (1 + 2ζωτ)·s² + (2ζω + τω²)·s + ω²·(1 + m_g/m), with the servo's ω and ζ, and the
+    lag τ of a first-order amplifier. Without lag any mass is stable.
     """
     w, z = servo_rad_per_s, damping_ratio
     if lag_s == 0.0:
@@ -209,7 +208,7 @@ def mass_limit(servo_rad_per_s: float, damping_ratio: float, lag_s: float) -> fl
 
 
 def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:
-    """Return the exact map of a frame over which the digital product stands still."""
+    """Return the exact map of a frame over which the digital product is held."""
     n = len(matrix)
     grown = np.zeros((n + 1, n + 1))
     grown[:n, :n] = matrix
@@ -223,10 +222,10 @@ def frame_map(matrix: Floats, control: Control, frame_s: float) -> Floats:
 
 
 def exponential(matrix: Floats) -> Floats:
-    """Return e to the power of a small matrix, by its series, scaled and squared.
+    """Return the exponential of a small matrix, by its series with scaling and squaring.
 
-    A general one chooses its order by norms of powers, in threads that cost a hundred times
-    as much as these few products of five rows.
+    SciPy's chooses its order by norms of powers, in threads that cost a hundred times as much as
+    these few products of small matrices.
     """
     norm = float(np.max(np.sum(np.abs(matrix), axis=0)))
     halvings = max(0, math.ceil(math.log2(2.0 * norm))) if norm > 0.0 else 0
@@ -240,11 +239,11 @@ def exponential(matrix: Floats) -> Floats:
 
 
 def held_limit(mass: float, damping: float, frame_s: float) -> float:
-    """Return the greatest ΔG in N/d whose product may stand still over a frame, where G_B = 0.
+    """Return the largest ΔG in N/d with a product held over a frame, for G_B = 0.
 
-    By Jury's criterion for the two eigenvalues, with a = c/m and e = exp(−a·T): they pass
-    through the unit circle as a pair at ΔG = m·a²·(1 − e)/(1 − e − a·T·e), or one of them
-    through −1 at 2·m·a²·(1 + e)/(a·T·(1 + e) − 2·(1 − e)), whichever comes first.
+    By Jury's criterion for the two eigenvalues, with a = c/m and e = exp(−a·T): a pair crosses the
+    unit circle at ΔG = m·a²·(1 − e)/(1 − e − a·T·e), or one of them crosses −1 at
+    2·m·a²·(1 + e)/(a·T·(1 + e) − 2·(1 − e)), whichever is smaller.
     """
     a = damping / mass
     turn, decay = a * frame_s, math.exp(-a * frame_s)

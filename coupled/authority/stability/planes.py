@@ -1,17 +1,17 @@
 """Maps of stability: the growth found in simulation over K·G_T and a second quantity.
 
-Each plane asks one question of a control as its rig file has it, with friction, breakout, play and
-limits taken out, which only ever hold or bound a motion:
+Each plane is of a control as its rig file has it, without friction, breakout, backlash and limits,
+which only hold or bound a motion:
 
     assumed  K̂/K, a free hand: the commanded spring G_T/(1 − K̂·G_T), eq. (12)
-    frame    T, a free hand: the digital product ΔG·δc that stands still over a frame
+    frame    T, a free hand: the digital product ΔG·δc held over a frame
     hand     K·k_h, hybrid: a hand of that stiffness, on the structure's 1/K
     servo    its frequency, hybrid: the grip held fast
     gauge    the bandwidth of its amplifier, hybrid: a hand as stiff as the structure
     mass     between gauge and grip over the loader's own, hybrid: a free hand
 
-Where a growth changes its sign along the second quantity is found by bisection, in simulation
-and by theory.
+A change of the growth's sign along the second quantity is located by bisection, in simulation and
+by theory.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ KINDS: tuple[Kind, ...] = ("assumed", "frame", "hand", "servo", "gauge", "mass")
 
 
 def kinds_of(control: Control) -> tuple[Kind, ...]:
-    """Return the planes of a control: what lies beyond the gauge moves with a servo only."""
+    """Return the planes of a control; that of a mass at the grip requires a servo."""
     return KINDS if control.loader.servo_frequency > 0.0 else KINDS[:-1]
 
 
-GAUGE_Hz = 50.0  # the amplifier of a gauge that a rig file says nothing of
+GAUGE_Hz = 50.0  # default bandwidth of a gauge's amplifier
 FIRM = 1.0  # K·k_h of a hand as stiff as the structure
-HELD_FAST = 100.0  # K·k_h of a hand that gives 1 % of the structure's bend
+HELD_FAST = 100.0  # K·k_h of a hand that moves by 1 % of the structure's bend
 
 _SIMULATED_s = 4.0
 CELLS, POINTS = (31, 25), (61, 49)  # cells of the simulation, points of the theory
@@ -61,14 +61,14 @@ _VALUES: dict[Kind, tuple[float, float]] = {
     "gauge": (0.5, 200.0),
     "mass": (0.05, 50.0),
 }
-_FAR = 1e12  # a stop that a linear rig never meets
+_FAR = 1e12  # a stop that a linear rig never reaches
 
 
 @dataclass(frozen=True)
 class Crossing:
     """A value of the second quantity at which the growth changes its sign at one K·G_T.
 
-    `theory` is None where it has none in that cell of the simulation or in one beside it.
+    `theory` is None if it has none in that cell of the simulation or in one beside it.
     """
 
     share: float
@@ -77,7 +77,7 @@ class Crossing:
 
     @property
     def difference(self) -> float | None:
-        """By how much simulation and theory differ, as a share; None without theory."""
+        """The relative difference of simulation and theory; None without theory."""
         return abs(self.simulated / self.theory - 1.0) if self.theory else None
 
 
@@ -85,8 +85,8 @@ class Crossing:
 class Plane:
     """Growth in 1/s over K·G_T (`shares`) and a second quantity (`values`).
 
-    `simulated` and `theory` have shape (shares, values), `fine`, the theory once more to draw
-    its boundary, (fine_shares, fine_values).
+    `simulated` and `theory` have shape (shares, values); `fine`, the theory on a finer grid for its
+    boundary, (fine_shares, fine_values).
     """
 
     control: ControlName
@@ -103,7 +103,7 @@ class Plane:
 
 @dataclass(frozen=True)
 class Question:
-    """What a linear rig has in place of its own values, where it is given."""
+    """Values of a linear rig that replace its own, if given."""
 
     multiplier: Literal["hybrid", "digital"] | None = None
     servo_frequency_Hz: float | None = None
@@ -119,8 +119,8 @@ def linear_rig(
 ) -> Rig:
     """Return the rig with this control alone, linear, at one gradient in N/d.
 
-    The rig may be one that cannot be built: a gradient stiffer than the structure is what some
-    questions are about. The rig's own values are checked against their own bounds only.
+    The rig may be one that cannot be built, such as one with a gradient stiffer than the structure.
+    The rig's own values are checked against their own bounds only.
     """
     return _asked(_linear(rig, name, gradient), name, question)
 
@@ -162,9 +162,9 @@ def _linear(rig: Rig, name: ControlName, gradient: float) -> Rig:
 
 
 def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
-    """Return a linear rig with what a question puts in place of its own.
+    """Return a linear rig with the values of a question.
 
-    A plane asks thousands, each of a value that such a section takes: none is checked again.
+    A plane has thousands of them, all within valid bounds, so none is checked again.
     """
     control = linear.controls[name]
     loader = {"multiplier": question.multiplier, "servo_frequency": question.servo_frequency_Hz}
@@ -181,7 +181,7 @@ def _asked(linear: Rig, name: ControlName, question: Question) -> Rig:
 
 
 def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
-    """Return m and c as they are at one gradient, in place of what goes by it."""
+    """Return m and c at one gradient, in place of their schedules."""
     host, loader = control.compensation, control.loader
     table = host.inertia_gradient
     if table is None:
@@ -201,7 +201,7 @@ def _inertia_there(control: Control, gradient: float, d: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Along:
-    """What a plane asks at one gradient, in N/d. The linear rig there is made once."""
+    """The rigs of a plane at one gradient, in N/d; the linear rig is made once."""
 
     rig: Rig
     name: ControlName
@@ -210,7 +210,7 @@ class Along:
 
     @cached_property
     def linear(self) -> Rig:
-        """The linear rig, before it is asked anything."""
+        """The linear rig with its own values."""
         return _linear(self.rig, self.name, self.gradient)
 
     def posed(self, value: float) -> tuple[Rig, Hand]:
@@ -242,7 +242,7 @@ class Along:
 
 
 def axis(kind: Kind, points: int) -> Floats:
-    """Return values of a plane's second quantity: K̂/K evenly, the others by their logarithm."""
+    """Return values of a plane's second quantity: K̂/K linearly, the others logarithmically."""
     low, high = _VALUES[kind]
     if kind == "assumed":
         return np.linspace(low, high, points)
@@ -250,7 +250,7 @@ def axis(kind: Kind, points: int) -> Floats:
 
 
 def plane(rig: Rig, name: ControlName, kind: Kind) -> Plane:
-    """Return one plane of a control, whose structure must bend."""
+    """Return one plane of a control, whose structure must have a bend."""
     bend = rig.controls[name].loader.bend
     shares, values = np.linspace(_LEFT, _RIGHT, CELLS[0]), axis(kind, CELLS[1])
     fine_shares, fine_values = np.linspace(_LEFT, _RIGHT, POINTS[0]), axis(kind, POINTS[1])
@@ -281,7 +281,7 @@ def simulated_along(
 def crossings(
     rig: Rig, name: ControlName, kind: Kind, gradient: float, values: Floats, simulated: Floats
 ) -> list[Crossing]:
-    """Return where the growth changes its sign along `values`, given it there as simulated."""
+    """Return where the growth, given as simulated, changes its sign along `values`."""
     found, along = [], Along(rig, name, kind, gradient)
     share = gradient * rig.controls[name].loader.bend
     last = len(values) - 1
@@ -297,7 +297,7 @@ def crossings(
 
 
 def _bisected(growth: Callable[[float], float], low: float, high: float) -> float | None:
-    """Return where a growth changes its sign, by its logarithm; None where the ends agree."""
+    """Return the zero of a growth over the logarithm; None if both ends have one sign."""
     low, high = float(low), float(high)
     rising = growth(high) > 0.0
     if (growth(low) > 0.0) == rising:

@@ -1,3 +1,3 @@
-"""Sealed trials: drawn, made, sized, answered and scored."""
+"""Sealed trials: drawn, simulated, answered and scored."""
 
 NEWEST = 5  # version of the trials

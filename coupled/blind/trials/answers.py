@@ -1,4 +1,4 @@
-"""Diagnoses read back, and each held against the truth of its record."""
+"""Diagnoses read back, each compared with the truth of its record."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from coupled.errors import InputError
 from coupled.files import read_json
 from coupled.gap.findings.document import KeptEffect, diagnosis_from
 
-NAMING = ("effect", "mostly")  # those that name effects as certain
+NAMING = ("effect", "mostly")  # verdicts that name effects as certain
 MISSING = "missing"  # the verdict of a record without a diagnosis
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A 95 % interval of a parameter, SI; None at an end that the record leaves open."""
+    """A 95 % interval of a parameter, SI; a bound is None if it is open."""
 
     low: float | None
     high: float | None
 
     @property
     def whole(self) -> bool:
-        """Whether it has both ends."""
+        """Whether it has both bounds."""
         return self.low is not None and self.high is not None
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value lies within; an open end holds none."""
+        """Tell whether a value lies within; an open interval contains none."""
         return self.low is not None and self.high is not None and self.low <= value <= self.high
 
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that a diagnosis found, its probability in 0 to 1, and its parameters."""
+    """An effect of a diagnosis, its probability, 0 to 1, and its parameters."""
 
     probability: float
     intervals: Mapping[str, Interval]
@@ -44,14 +44,14 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class Answer:
-    """A record's truth, and what a diagnosis made of it.
+    """A record's truth, and its diagnosis.
 
     found     the effects of the diagnosis by name
-    possible  every name that the diagnosis leaves possible
-    guilty    the stages that it finds a gap in
-    lacking   channels whose lack it says
-    closed    share of the gap that it closed, where it says so
-    budget    {guilty stage: {effect: its share of the residual's power}}
+    possible  all effects that the diagnosis does not exclude
+    guilty    the faulty stages of the diagnosis
+    lacking   channels that it reports as missing
+    closed    share of the gap that it closed, if given
+    budget    {faulty stage: {effect: its share of the residual's power}}
     """
 
     record: str
@@ -66,9 +66,10 @@ class Answer:
 
     @property
     def exact(self) -> bool:
-        """Whether it names what is there, nothing else, and is sure of it.
+        """Whether it names exactly the true effects, with certainty.
 
-        Where another effect is the same law on this record, naming just these two is exact.
+        If another effect is the same law on this record, naming exactly these two as alternatives
+        is exact, too.
         """
         if self.verdict in NAMING:
             return self.names_right
@@ -77,25 +78,25 @@ class Answer:
 
     @property
     def _known(self) -> frozenset[str]:
-        """The names of the truth by any reading that is the same law."""
+        """The names of the true effects in all equivalent readings."""
         return self.truth.names.union(*self._laws)
 
     @property
     def _laws(self) -> list[frozenset[str]]:
-        """The sets of effects that are the truth, each by all of its names."""
+        """The sets of effects that are the truth, in all equivalent readings."""
         sure = [one.names for one in self.truth.readings if one.sure]
         same = [one.names for names in sure for one in same_law(names)]
         return [self.truth.names, *map(frozenset, (*sure, *same))]
 
     @property
     def names_right(self) -> bool:
-        """Whether it names what is there, and beyond that only what the rig has besides."""
+        """Whether it names the true effects, and otherwise only other properties of the rig."""
         found, also = frozenset(self.found), frozenset(self.truth.also)
         return any(names <= found <= names | also for names in self._laws)
 
     @property
     def contains(self) -> bool:
-        """Whether it is exact, or names no more than it holds possible, the truth among them."""
+        """Whether it is exact, or its possible effects include the truth and all that it names."""
         if self.verdict in NAMING:
             return self.names_right
         if self.verdict != "ambiguous":
@@ -105,20 +106,20 @@ class Answer:
 
     @property
     def wrong(self) -> bool:
-        """Whether it is sure of something that is not so."""
+        """Whether it names an effect with certainty that is not true."""
         return self.verdict in NAMING and not self.exact
 
     @property
     def stage_right(self) -> bool:
-        """Whether just the stages that have something are guilty."""
+        """Whether its faulty stages are exactly the true ones."""
         known = [self.truth.stages, *(one.stages for one in self.truth.readings)]
         return self.guilty in [frozenset(stages) for stages in known]
 
     def shares(self, stage: str) -> list[tuple[float, float]]:
-        """Return each true effect's share of a stage's power, as said and as it is.
+        """Return each true effect's share of a stage's power, as diagnosed and true.
 
-        Where one effect's name is that of two, as a bend that stiffens is of a bend beside it, the
-        two are one.
+        Two effects with one name in the diagnosis, such as a stiffening bend and a bend beside it,
+        are added.
         """
         true = self.truth.budget[stage]
         within = self.truth.names - self.found.keys()
@@ -127,7 +128,7 @@ class Answer:
         return [(self.share(stage, name), share) for name, share in true.items()]
 
     def share(self, stage: str, effect: str) -> float:
-        """Return the share of a stage's power that it gives an effect, by whatever name."""
+        """Return the diagnosed share of a stage's power of an effect, in any equivalent reading."""
         shares = self.budget.get(stage, {})
         if effect in self.found:
             return shares.get(effect, 0.0)
@@ -135,9 +136,9 @@ class Answer:
         return sum(share for name, share in shares.items() if name in others)
 
     def interval(self, effect: str, parameter: str) -> Interval | None:
-        """Return the interval of a true effect's parameter, by any name that is the same law.
+        """Return the interval of a true effect's parameter, in any equivalent reading.
 
-        A rival is another law, in which a number of the same name is another number.
+        In an alternative, which is another law, a parameter of the same name has another meaning.
         """
         others = sorted({*self.found} & self._known - self.truth.names)
         names = [effect] if effect in self.found else others

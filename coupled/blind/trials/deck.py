@@ -1,8 +1,8 @@
-"""What the trials of a version are drawn from: effects, outsiders and rigs, frozen with it.
+"""The pool of a version's trials: effects, outsiders and rigs, fixed with the version.
 
-A published score is of a version and a seed. So what a version draws from is data of its own,
-`versions/vN/`, and not what the package ships or its twin can do: those grow. The order of the
-lists counts, since a draw is a place in a list.
+A published score is of a version and a seed. So the pool of a version is data of its own,
+`versions/vN/`, not the package's rigs or its twin's effects, which grow. The order of the lists
+matters, since a draw is an index into a list.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ DEFAULT = NEWEST
 
 @dataclass(frozen=True)
 class Deck:
-    """What the trials of a version are drawn from.
+    """The pool of a version's trials.
 
-    `built` says that budgets and readings are of the rig as it was built, with what it has besides.
+    `built`: budgets and readings are of the rig as built, with its other properties.
     """
 
     version: int
@@ -43,16 +43,16 @@ class Deck:
     built: bool = False
 
     def kinds(self, category: str) -> tuple[Kind, ...]:
-        """Return what a trial of a category may have."""
+        """Return the kinds that a trial of a category may have."""
         return self.outsiders if category == "outsider" else self.effects
 
     def kind(self, category: str, name: str) -> Kind:
-        """Return one of them by name."""
+        """Return a kind by name."""
         return next(kind for kind in self.kinds(category) if kind.name == name)
 
 
 def read_deck(version: int) -> Deck:
-    """Return the deck of a version. Raises InputError for one that there is not."""
+    """Return the deck of a version. Raises InputError for an unknown version."""
     if version not in KNOWN:
         known = ", ".join(map(str, KNOWN))
         raise InputError("--trials", "", f"there is no version {version}; known: {known}")
@@ -76,7 +76,7 @@ def read_deck(version: int) -> Deck:
 
 
 def _sized(path: Path, table: Mapping[str, Any], kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:
-    """Return kinds with the least sizes that the deck gives some of them."""
+    """Return kinds with the least sizes of the deck, if it gives them."""
     least = table.get("least", {})
     for name in least:
         if name not in [kind.name for kind in kinds]:

@@ -1,6 +1,6 @@
 """The key of a set of trials, and the seal that proves which key it was.
 
-A key's format bears the version of its trials; a seal, which lies with the records, names the
+A key's format has the version of its trials. A seal is stored with the records, and has the
 version and the numbers of its set besides the key's hash.
 """
 
@@ -45,7 +45,7 @@ class KeptSeal(Lenient):
 
 @dataclass(frozen=True)
 class Key:
-    """The truth of every record of a set; `salt` keeps it from being guessed by its hash."""
+    """The truth of every record of a set; `salt` prevents guessing it from its hash."""
 
     version: int
     seed: int
@@ -53,7 +53,7 @@ class Key:
     records: Mapping[str, Truth]
 
     def text(self) -> str:
-        """Return the key as its file has it."""
+        """Return the text of the key's file."""
         [name] = [name for name, version in FORMATS.items() if version == self.version]
         records = {record: truth.as_dict() for record, truth in self.records.items()}
         table = {"format": name, "salt": self.salt, "seed": self.seed, "records": records}
@@ -62,9 +62,9 @@ class Key:
 
 @dataclass(frozen=True)
 class Seal:
-    """What lies with the records: the key's hash, and the numbers that the set was made by.
+    """The seal of a set, stored with the records: the key's hash, and the numbers of the set.
 
-    A seal from before it had a format is of version 1, and has None for the numbers.
+    A seal without a format is of version 1, and has None for the numbers.
     """
 
     key_sha256: str
@@ -73,7 +73,7 @@ class Seal:
     rigs: int | None = None
 
     def text(self) -> str:
-        """Return the seal as its file has it."""
+        """Return the text of the seal's file."""
         return (
             "# The hash of the key to these records. Publish it before the key is opened:\n"
             "# diagnoses made meanwhile are then proven to be made without it.\n"
@@ -122,9 +122,9 @@ def read_seal(path: Path) -> Seal:
 
 
 def check_seal(key: Path, seal: Path) -> None:
-    """Refuse a key that is not the sealed one, and a seal whose numbers are not those of the key.
+    """Refuse a key that is not the sealed one, and a seal whose numbers differ from the key's.
 
-    The seal's `rigs` cannot be checked: a key names only those rigs that its records have.
+    The seal's `rigs` cannot be checked, since a key has only the rigs of its records.
     """
     sealed = read_seal(seal)
     if sealed.key_sha256 != digest(read_text(key, "the key of coupled blind make is wanted")):

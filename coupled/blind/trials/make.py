@@ -1,4 +1,4 @@
-"""A folder of sealed trials: records, nominal rigs, the seal; and the key, elsewhere."""
+"""A folder of sealed trials: records, nominal rigs, the seal; and the key in another place."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from coupled.schema import Lenient, quantity, read_as
 Progress = Callable[[str, int, int], None]
 RECORDS, RIGS, LIST, NOTE = "records", "rigs", "records.toml", "make.json"
 UNREADABLE = "is no note of an unfinished make; delete its folder, and make anew"
-AHEAD = 4  # records that wait for each worker
+AHEAD = 4  # records in the queue of each worker
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """What a set is made by: the same numbers give the same bytes."""
+    """The numbers of a set: equal numbers give equal bytes."""
 
     seed: int
     records: int
@@ -41,16 +41,16 @@ class Numbers:
     version: int = DEFAULT
 
     def like(self, other: Numbers) -> bool:
-        """Tell whether the other differs in its seed at most."""
+        """Tell whether the other differs at most in its seed."""
         return replace(self, seed=other.seed) == other
 
     def __str__(self) -> str:
-        """Return what of them is no secret."""
+        """Return the numbers that are not secret."""
         return f"{self.records} records and {self.rigs} rigs of version {self.version}"
 
 
 class KeptNumbers(Lenient):
-    """The numbers of an unfinished make, as its note has them."""
+    """The numbers of an unfinished make in its note."""
 
     seed: int = quantity("", ge=0)
     records: int = quantity("", ge=1)
@@ -60,20 +60,20 @@ class KeptNumbers(Lenient):
 
 @dataclass(frozen=True)
 class Places:
-    """Where a set goes: the folder of its records, and the file of its key."""
+    """The paths of a set: the folder of its records, and the file of its key."""
 
     folder: Path
     key: Path
 
     @property
     def parts(self) -> Path:
-        """Where an unfinished make keeps what it knows."""
+        """The folder of an unfinished make's notes."""
         return self.key.with_name(self.key.name + ".parts")
 
 
 @dataclass(frozen=True)
 class Made:
-    """A set that is finished; `before` says that a former call had finished it."""
+    """A finished set; `before`: an earlier call had finished it."""
 
     numbers: Numbers
     before: bool
@@ -93,10 +93,10 @@ def make(
 ) -> Made:
     """Write a set of trials into `folder` and their key to `key`.
 
-    What an interrupted make of the same numbers has written is kept, and the rest is made. The
-    same seed gives the same bytes from any number of workers (0: one a core), or from a dask
-    `cluster`; without a seed it is drawn, and stands in the key alone. Raises InputError for a
-    folder that holds anything else, a set of other numbers included.
+    The records of an interrupted make of the same numbers are kept, and the rest is made. The same
+    seed gives the same bytes with any number of workers (0: one for each core), or from a dask
+    `cluster`; by default the seed is random, and written to the key only. Raises InputError for a
+    folder with anything else, including a set of other numbers.
     """
     places = Places(folder, key)
     read_deck(version)
@@ -138,7 +138,7 @@ def _make(
 def _trials(
     places: Places, numbers: Numbers, todo: list[Plan], workers: Executor, ahead: int
 ) -> Iterator[tuple[str, Truth]]:
-    """Yield each record's name and truth, once both are written; those that are, are kept."""
+    """Yield each record's name and truth, once both are written; existing ones are kept."""
     lacking = []
     for i, plan in enumerate(todo):
         name = record_name(i)
@@ -169,15 +169,15 @@ def make_one(numbers: Numbers, i: int, plan: Plan) -> tuple[int, Truth, str]:
 
 @lru_cache(maxsize=1)
 def _drawn(numbers: Numbers) -> tuple[Deck, Mapping[str, Rig]]:
-    """Return the deck of a set and its rigs; a worker reads and draws them once."""
+    """Return the deck of a set and its rigs, cached in each worker."""
     deck = read_deck(numbers.version)
     return deck, rig_pool(deck.rigs, numbers.seed, numbers.rigs)
 
 
 def _finished(places: Places, asked: Numbers, any_seed: bool) -> Numbers | None:
-    """Return the numbers of a finished set in these places, None where there is none.
+    """Return the numbers of a finished set at these paths, None if there is none.
 
-    Refuses a finished set of other numbers, and one whose key is not there.
+    Refuses a finished set of other numbers, and one without its key.
     """
     seal_file = places.folder / SEAL
     if not seal_file.is_file():
@@ -201,7 +201,7 @@ def _finished(places: Places, asked: Numbers, any_seed: bool) -> Numbers | None:
 
 
 def _begin(places: Places, asked: Numbers, any_seed: bool) -> Numbers:
-    """Check the places, and return the numbers: those of an unfinished make, or those asked."""
+    """Check the paths, and return the numbers: those of an unfinished make, or those requested."""
     note = places.parts / NOTE
     if note.is_file():
         begun = _read_numbers(note)
@@ -223,7 +223,7 @@ def _begin(places: Places, asked: Numbers, any_seed: bool) -> Numbers:
 
 
 def _clear(places: Places) -> None:
-    """Remove the notes of an unfinished make, the one that says so last."""
+    """Remove the notes of an unfinished make, the one that identifies it last."""
     if not places.parts.is_dir():
         return
     for part in sorted(places.parts.iterdir(), key=lambda part: part.name == NOTE):

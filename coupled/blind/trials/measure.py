@@ -1,4 +1,4 @@
-"""How wide a trial's gap is under its nominal rig, measured as a diagnosis measures it."""
+"""The gap of a trial under its nominal rig, measured as in a diagnosis."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from coupled.rig.rig import Rig
 
 
 def outputs_of(rig: Rig, record: Record, airframe: bool) -> list[Output]:
-    """Return what a record lets judge; `airframe` says whether to fly for that."""
+    """Return the outputs of a record; `airframe`: with those that need a flight."""
     outputs = Reader(rig, record, "column", surface_points).outputs()
     return outputs + (airframe_outputs(rig, record) if airframe else [])
 
 
 def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, float]:
-    """Return each stage's rms residual over its floor under the nominal rig.
+    """Return each stage's RMS residual over its noise floor under the nominal rig.
 
-    The loader's is the larger of its motion's and its multiplier's, and sensing, which has no
-    output of its own, stands at the widest of those that a wrong scale shows in. `airframe`
-    says whether to fly for the airframe's, which takes longest.
+    The loader's is the larger of its motion's and its multiplier's. Sensing has no output of its
+    own, so its gap is the largest of those in which a wrong scale shows. `airframe`: with the
+    airframe's, which takes longest.
     """
     gaps: dict[str, float] = {}
     for output in outputs_of(rig, record, airframe):
@@ -33,13 +33,13 @@ def stage_gaps(rig: Rig, record: Record, airframe: bool = True) -> dict[str, flo
     return gaps | ({"sensing": max(shown)} if shown else {})
 
 
-# Two effects that are one law wherever the gradient rises in proportion to q̄.
+# Two effects that are one law if the gradient is proportional to q̄.
 SAME_LAW = {"pressure_scale": "schedule_slope", "schedule_slope": "pressure_scale"}
-ALIKE = 0.02  # floors: what the other may leave more than the true effect
+ALIKE = 0.02  # noise floors: largest additional residual of the other effect
 
 
 def alike(rig: Rig, record: Record, effect: str) -> tuple[str, ...]:
-    """Return the effect that no record of this rig at these pressures could tell from `effect`."""
+    """Return the effects that no record of this rig at these pressures can discriminate from it."""
     if effect not in SAME_LAW:
         return ()
     outputs = Reader(rig, record, "column", surface_points).outputs()

@@ -1,8 +1,8 @@
-"""Other readings of a trial's truth: the same law by other names, and what its record cannot tell.
+"""Other readings of a trial's truth: equivalent laws, and laws that its record cannot discriminate.
 
-A reading that is the same law whatever is recorded may be named with confidence, and so may a
-plainer law that this record does not tell from the truth. Another that it does not tell from the
-truth may only be named beside it.
+A reading that is equivalent in any record may be named with certainty, and so may a simpler law
+that this record does not discriminate from the truth. Any other law that the record does not
+discriminate may only be named as an alternative to the truth.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-# One law by other names, where friction yields: friction by direction is plain friction of the
-# mean with a force of half the difference, and how far any yields is in the twin's rigs.
+# Equivalent laws with presliding: friction by direction is plain friction of the mean with a force
+# of half the difference, and the twin's rigs have their own presliding length.
 PLAIN, YIELDS = "coulomb_friction", "presliding_friction"
 SAME = {
     (PLAIN,): ((YIELDS,),),
@@ -27,11 +27,10 @@ SAME = {
     ("asymmetric_friction",): ((PLAIN, "force_offset"), (YIELDS, "force_offset")),
     (PLAIN, "force_offset"): (("asymmetric_friction",), (YIELDS, "force_offset")),
 }
-# One law in a limit that a record may not leave; a contact may be stiff, too.
+# Laws equivalent in a limit that a record may not leave; a contact may be stiff, too.
 NEAR = (*ONE_LAW, ("backlash", "soft_backlash"))
-# Laws that are the plainer one beside them where a record shows nothing of what they add: a mode
-# far above what the pilot excites is a bend, and a short dead time is a slower servo. The plainer
-# one is then named, and rightly.
+# Laws with their simpler law, which is right if a record shows nothing of the difference: a mode
+# far above the pilot's frequencies is a bend, and a short dead time is a slower servo.
 PLAINER = (
     ("structural_mode", "bend"),
     ("stiffening_bend", "bend"),
@@ -44,14 +43,14 @@ PLAINER = (
 
 
 def same_law(effects: Sequence[str]) -> Iterator[Reading]:
-    """Yield the readings of effects that are the same law, whatever the record holds."""
+    """Yield the readings that are equivalent to effects in any record."""
     for names, others in SAME.items():
         if set(names) <= set(effects):
             rest = set(effects) - set(names)
             for other in others:
                 yield reading(rest | set(other), sure=True)
-    # The twin has one bend, one servo and one contact: an effect that sets another's numbers, too,
-    # is what the record holds of both.
+    # The twin has one bend, one servo and one contact: an effect that also sets another's numbers
+    # includes that effect.
     for name in effects:
         own = _numbers(name)
         if own and any(own < _numbers(other) for other in effects):
@@ -59,7 +58,7 @@ def same_law(effects: Sequence[str]) -> Iterator[Reading]:
 
 
 def _numbers(name: str) -> set[str]:
-    """Return the numbers of the rig that an effect of the library sets."""
+    """Return the rig's parameters that an effect of the library sets."""
     return {number.key for number in BY_NAME[name].free} if name in BY_NAME else set()
 
 
@@ -69,11 +68,11 @@ def not_distinguished(
     effects: Sequence[str],
     numbers: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Iterator[Reading]:
-    """Yield the readings of a rig's effects that this record does not tell from them.
+    """Yield the readings that this record does not discriminate from a rig's effects.
 
-    What is left with the other effect fitted is likelier by less than a diagnosis asks for. The
-    true effect's fit begins at its true `numbers`, by effect, where they are given: one that begins
-    elsewhere may end where it does something else, better by chance.
+    Their log-likelihood differs by less than the gain required in a diagnosis. The true effect's
+    fit begins at its true `numbers`, by effect, if given, since the fit from another start may end
+    in a local minimum that is better by chance.
     """
     start = _start(numbers or {})
     both_ways = [(pair, False) for one in NEAR for pair in (one, one[::-1])]
@@ -91,7 +90,7 @@ def not_distinguished(
 
 
 def _start(numbers: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """Return the values at which a fit begins by the true numbers of effects."""
+    """Return the start values of a fit at the true numbers of effects."""
     return {
         BY_NAME[name].value_key(p): min(max(float(given[p.named("column")]), p.low), p.high)
         for name, given in numbers.items()

@@ -1,4 +1,4 @@
-"""The score of a set of diagnoses as data, and as JSON has it."""
+"""The score of a set of diagnoses as data and JSON."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Share:
-    """A share of so many, and its exact 95 % interval; None where of nothing."""
+    """A share, and its exact 95 % interval; None if the total is zero."""
 
     right: int
     of: int
@@ -30,7 +30,7 @@ class ClearSingles:
 
 @dataclass(frozen=True)
 class FaintSingles:
-    """Single effects that show less."""
+    """Single effects with a smaller gap."""
 
     right: Share
     no_gap: Share
@@ -40,7 +40,7 @@ class FaintSingles:
 
 @dataclass(frozen=True)
 class Outsiders:
-    """What the library does not have."""
+    """Faults outside the library."""
 
     unexplained: Share
     stage: Share
@@ -58,7 +58,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Intervals:
-    """How often a parameter's interval holds the truth, and how many lack an end."""
+    """The share of parameters' intervals that contain the truth, and how many are open."""
 
     covered: Share
     without_interval: int
@@ -66,7 +66,7 @@ class Intervals:
 
 @dataclass(frozen=True)
 class Reliability:
-    """Effects of about the same stated probability, and the share of them that is true."""
+    """Effects of similar stated probability, and the share of them that is true."""
 
     stated: float
     true: Share
@@ -74,7 +74,7 @@ class Reliability:
 
 @dataclass(frozen=True)
 class Probabilities:
-    """Brier score and reliability of the stated probabilities; None without an effect found."""
+    """Brier score and reliability of the stated probabilities; None if no effect was found."""
 
     brier: float | None
     effects: int
@@ -83,7 +83,7 @@ class Probabilities:
 
 @dataclass(frozen=True)
 class Power:
-    """Single effects of about the same size: from which ratio, their median, and how many named."""
+    """Single effects of similar size: the bin's lower ratio, their median, and the share named."""
 
     least: float
     ratio: float
@@ -93,7 +93,7 @@ class Power:
 
 @dataclass(frozen=True)
 class ByEffect:
-    """How often an effect or outsider was answered rightly, and what was said instead."""
+    """The number of right answers for an effect or outsider, and the wrong answers."""
 
     right: int
     of: int
@@ -120,7 +120,7 @@ class Score:
     effects: Mapping[str, ByEffect]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the score as JSON has it."""
+        """Return the JSON."""
         stated = self.probabilities
         return {
             "records": self.records,

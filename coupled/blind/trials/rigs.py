@@ -1,7 +1,7 @@
-"""The nominal rigs of a set: those of its version, and others of believable numbers.
+"""The nominal rigs of a set: those of its version, and others with realistic numbers.
 
-All keep to the description of the rig that diagnoses are judged by: one gradient at a time and
-F_mod = ΔG·δc, so neither the second segment of the schedule nor the preload's term in F_mod.
+All have the features that diagnoses are judged by: one gradient at a time and F_mod = ΔG·δc, so
+neither a second segment of the schedule nor the preload's term in F_mod.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from coupled.errors import InputError
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
-DRAWN = "rig-"  # how the name of a rig that was drawn begins
-MOST_BENT = 0.6  # K·G_T at the most
+DRAWN = "rig-"  # prefix of the name of a random rig
+MOST_BENT = 0.6  # largest K·G_T
 COLUMN = "controls.column"
 
 
 def rig_pool(own: Mapping[str, Rig], seed: int, rigs: int) -> dict[str, Rig]:
-    """Return the rigs of a version, and `rigs` others drawn from the seed."""
+    """Return the rigs of a version, and `rigs` random others."""
     pool = dict(own)
     rng = np.random.default_rng([seed, 0])
     for i in range(rigs):
@@ -31,7 +31,7 @@ def rig_pool(own: Mapping[str, Rig], seed: int, rigs: int) -> dict[str, Rig]:
 
 
 def random_rig(rng: np.random.Generator, name: str, own: Mapping[str, Rig]) -> Rig:
-    """Return a rig of a version with its numbers moved as far as another real rig's might be."""
+    """Return a random variation of a rig of a version, within the range of real rigs."""
     while True:
         rig = own[str(rng.choice(sorted(own)))]
         changes = _moved_column(rng, rig.controls["column"])
@@ -42,7 +42,7 @@ def random_rig(rng: np.random.Generator, name: str, own: Mapping[str, Rig]) -> R
             changes["flight.altitude_m"] = _short(height)
         try:
             return rig.changed({"name": name, **changes})
-        except InputError:  # a gradient stiffer than the structure, say: draw again
+        except InputError:  # for example a gradient stiffer than the structure: draw again
             continue
 
 
@@ -80,5 +80,5 @@ def _log(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _short(value: float) -> float:
-    """Return a number as a rig file would give it: four digits."""
+    """Return a number in four digits, as in a rig file."""
     return float(f"{value:.4g}")

@@ -1,6 +1,6 @@
-"""The score of a set of diagnoses: a share with its exact interval for each thing promised.
+"""The score of a set of diagnoses: a share with its exact interval for each claim.
 
-A record without a diagnosis is right in nothing; that it is missing is said.
+A record without a diagnosis is wrong in everything, and reported as missing.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from coupled.blind.trials.result import (
     Share,
 )
 
-CLEAR = 2.0  # a single that at least doubles its stage's residual is to be named
+CLEAR = 2.0  # a single effect that at least doubles its stage's residual should be named
 CLOSED = 0.95
 NO_SHARE = 0.01
-SHARE_NEAR = 0.05  # of a stage's power, by which a share of the budget may be off
+SHARE_NEAR = 0.05  # of a stage's power, tolerance of a share of the budget
 SIZES = (0.0, 1.1, 1.3, 1.6, 2.0, 3.0, 5.0, 10.0, 20.0, float("inf"))  # bins of ratio
 PROBABILITIES = (0.0, 0.5, 0.7, 0.9, 0.97, 1.0)
 
 
 def share(right: int, total: int) -> Share:
-    """Return a share and its 95 % interval after Clopper and Pearson, None where of nothing."""
+    """Return a share and its 95 % interval by Clopper and Pearson, None if the total is zero."""
     if total == 0:
         return Share(0, 0, None, None, None)
     low = float(beta.ppf(0.025, right, total - right + 1)) if right else 0.0
@@ -100,12 +100,12 @@ def _alarm(answer: Answer) -> bool:
 
 
 def _undecided(answer: Answer) -> bool:
-    """Tell whether it owns to a gap, but not to a cause, nor to sets that hold the true one."""
+    """Tell whether it reports a gap without a cause, and without the true one as possible."""
     return answer.verdict in ("ambiguous", "unexplained") and not answer.contains
 
 
 def _intervals(right: Sequence[Answer]) -> Intervals:
-    """Return how often the true parameter lies within its interval, where there is a whole one."""
+    """Return the coverage of the parameters' intervals, for closed intervals."""
     covered = total = without = 0
     for answer in right:
         for effect in answer.truth.effects:
@@ -120,13 +120,13 @@ def _intervals(right: Sequence[Answer]) -> Intervals:
 
 
 def _budget(right: Sequence[Answer]) -> Share:
-    """Return how often an effect's share of its stage's power is as the twin's own."""
+    """Return how often an effect's share of its stage's power agrees with the twin's own."""
     off = [
         abs(said - true)
         for answer in right
         for stage in answer.truth.budget
         for said, true in answer.shares(stage)
-        if abs(true) > NO_SHARE  # it acts there
+        if abs(true) > NO_SHARE  # it contributes there
     ]
     return share(sum(one <= SHARE_NEAR for one in off), len(off))
 
@@ -149,7 +149,7 @@ def _probabilities(answers: Sequence[Answer]) -> Probabilities:
 
 
 def _power(singles: Sequence[Answer]) -> tuple[Power, ...]:
-    """Return the share named against how many times the effect widens its stage's residual."""
+    """Return the share named by the factor by which the effect enlarges its stage's residual."""
     found = []
     for low, high in pairwise(SIZES):
         held = [a for a in singles if low <= a.truth.ratio < high]
@@ -161,10 +161,10 @@ def _power(singles: Sequence[Answer]) -> tuple[Power, ...]:
 
 
 def _by_effect(answers: Sequence[Answer]) -> dict[str, ByEffect]:
-    """Return for each kind how often it was answered rightly, and what was said instead.
+    """Return the number of right answers for each kind, and the wrong answers.
 
-    A single is held right where named exactly, an outsider where unexplained; faint singles
-    are left out.
+    A single effect is right if named exactly, an outsider if unexplained; faint single effects are
+    left out.
     """
     right: Counter[str] = Counter()
     total: Counter[str] = Counter()

@@ -1,10 +1,10 @@
-"""What each effect of a trial truly holds of its stages' gaps, by flying the twin without it.
+"""The true share of each effect of a trial in its stages' gaps, by simulation without it.
 
-The budget of a diagnosis shares out the power of a stage's residual (docs/diagnosis.md). Here the
-twin is flown with every subset of its effects, the same noise in each, and an effect's share is
-what it takes off on the mean over all orders (Shapley). What the rig has besides, settings and
-friction that yields, is no part of it. Noise is what the rig leaves without any effect, and no more
-than the floor: the rest of that is what it has besides.
+The budget of a diagnosis divides the power of a stage's residual (docs/diagnosis.md). Here the twin
+is simulated with every subset of its effects and the same noise, and an effect's share is its
+Shapley value. The rig's other properties, nuisance parameters and presliding, are not effects.
+Noise is the residual of the rig without any effect, up to the noise floor: the rest of it is from
+these properties.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ def true_shares(
 ) -> dict[str, dict[str, float]]:
     """Return {stage: {effect: its share of the residual's power}}.
 
-    `rig` is what the residuals are of: the nominal one, or the one built. `records` are the twin's,
-    by the effects that it had: all subsets of all of them. With `apart`, a stage is shared
-    out to those of its effects that show there: another that only moves its input stays.
+    `rig` is the reference of the residuals: the nominal one, or the one built. `records` are the
+    twin's, by its effects: all subsets of them. With `apart`, a stage is divided among its effects
+    that show there; another effect that only changes its input stays.
     """
     flown = "airframe" in stages
     outputs = {had: outputs_of(rig, record, flown) for had, record in records.items()}
@@ -63,9 +63,9 @@ def shares_of_outputs(
 def judged_outputs(
     stage: str, outputs: Sequence[Output], rig: Rig, effects: Subset
 ) -> list[Output]:
-    """Return the outputs whose power is shared out: those that show a gap.
+    """Return the outputs whose power is divided: those with a gap.
 
-    They are the stage's own, or of a stage without any those in which its effects show.
+    They are the stage's own, or for a stage without any those in which its effects show.
     """
     here = [BY_NAME[name] for name in effects if name in BY_NAME]
     shown = {output for effect in here if effect.stage == stage for output in effect.shows_in}
@@ -76,7 +76,7 @@ def judged_outputs(
 
 
 def effects_shown(judged: Sequence[Output], effects: Subset) -> Subset:
-    """Return the effects that show in some outputs, all of them where none does."""
+    """Return the effects that show in some outputs; all of them if none does."""
     seen = {output.stage for output in judged}
     shown = {name for name in effects if name in BY_NAME and seen & {*BY_NAME[name].shows_in}}
     return frozenset(shown) or effects
@@ -93,9 +93,9 @@ def _power(judged: Sequence[Output], made: Sequence[Output], rig: Rig) -> float:
 
 
 def share_power(every: Subset, powers: Mapping[Subset, float]) -> dict[str, float]:
-    """Return each effect's share of the power with all of them, and of noise.
+    """Return each effect's share of the power with all effects, and that of noise.
 
-    Noise is what is left without any, at most one floor².
+    Noise is the power without any effect, at most one floor².
     """
     names = sorted(every)
     explained = [

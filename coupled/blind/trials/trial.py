@@ -1,4 +1,4 @@
-"""One trial drawn: its category, what is wrong with its rig and how much, and its record."""
+"""One random trial: its category, the effects of its rig with their sizes, and its record."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from coupled.rig.rig import Rig
 
 Rng = np.random.Generator
 SHARES = {"none": 0.20, "single": 0.50, "pair": 0.12, "outsider": 0.15, "lacking": 0.03}
-TOLERANCE = 0.007  # standard deviation of a nominal number's setting
-FAINTEST, WIDEST = 0.5, 30.0  # of a single's excess residual, in floors
-CLEAR, CLEAREST = 2.5, 20.0  # a pair's and an outsider's gap, in floors
+TOLERANCE = 0.007  # standard deviation of a nominal number within its tolerance
+FAINTEST, WIDEST = 0.5, 30.0  # excess residual of a single effect, in noise floors
+CLEAR, CLEAREST = 2.5, 20.0  # gap of a pair's effects and an outsider, in noise floors
 SIZINGS = 5
-# What a record may lack, as the rig of a stranger does: one of these groups.
+# Channels that a record may lack, as an external rig's: one of these groups.
 GROUPS = (
     ("column_deflection_m",),
     ("column_gradient_N_per_m",),
@@ -43,7 +43,7 @@ GROUPS = (
 
 @dataclass(frozen=True)
 class Plan:
-    """What a record is to be: its category, and the names of what its rig has."""
+    """The plan of a record: its category, and the names of its rig's effects."""
 
     category: str
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class _Sized:
-    """A kind at the size it was given, the gap that it makes alone, and that record."""
+    """A kind with its size, its gap alone, and that record."""
 
     put: Installed
     gap: float
@@ -68,7 +68,7 @@ class _Sized:
 
 
 def plans(rng: Rng, records: int, deck: Deck) -> list[Plan]:
-    """Return what each record is to be, in random order, every kind about equally often."""
+    """Return the plan of each record, in random order, with every kind about equally often."""
     counts = {category: math.floor(share * records) for category, share in SHARES.items()}
     counts["single"] += records - sum(counts.values())
     known = [kind.name for kind in deck.effects]
@@ -91,7 +91,7 @@ def plans(rng: Rng, records: int, deck: Deck) -> list[Plan]:
 
 
 def _shuffled(rng: Rng, names: Sequence[str], least: int) -> list[str]:
-    """Return the names shuffled, again and again, at least so many."""
+    """Return the names in repeated random permutations, at least `least` of them."""
     dealt: list[str] = []
     while len(dealt) < least:
         dealt = [str(name) for name in rng.permutation(list(names))] + dealt
@@ -99,10 +99,10 @@ def _shuffled(rng: Rng, names: Sequence[str], least: int) -> list[str]:
 
 
 def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Trial:
-    """Return a trial of a plan, on a rig of the pool that can have it.
+    """Return a trial of a plan, on a suitable rig of the pool.
 
-    What cannot be made clear on one rig is drawn anew on another; after many, the kinds
-    themselves are drawn anew, so that the work always ends.
+    If the effects cannot be made large enough on one rig, another rig is drawn; after many, the
+    kinds themselves are drawn again, so that the loop always ends.
     """
     kinds = [deck.kind(plan.category, name) for name in plan.names]
     for attempt in range(60):
@@ -120,7 +120,7 @@ def draw_trial(rng: Rng, plan: Plan, deck: Deck, pool: Mapping[str, Rig]) -> Tri
 
 
 def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], deck: Deck) -> Setting:
-    """Return a setting; with a wheel where a kind needs one, and in a share of the others."""
+    """Return a setting; with a wheel if a kind needs one, and in a share of the others."""
     realism = deck.realism
     setting = replace(draw_setting(rng, rig, realism), built=deck.built)
     if any(kind.other for kind in kinds) or (realism.wheels and rng.uniform() < realism.wheels):
@@ -129,9 +129,9 @@ def _set(rng: Rng, rig: Rig, kinds: Sequence[Kind], deck: Deck) -> Setting:
 
 
 def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig | None:
-    """Return a rig that suits: a drawn one in one of three draws; a bench in one of four.
+    """Return a suitable rig: a random one in one of three draws; a bench in one of four.
 
-    None for kinds that no rig can have together.
+    None if no rig can have all of the kinds.
     """
     names = {kind.name for kind in kinds}
     if any(names & {*kind.excludes} for kind in kinds):
@@ -147,7 +147,7 @@ def _choose_rig(rng: Rng, kinds: Sequence[Kind], pool: Mapping[str, Rig]) -> Rig
 def _flown(
     rng: Rng, plan: Plan, kinds: Sequence[Kind], setting: Setting, clean: Clean
 ) -> Trial | None:
-    """Return the trial in its setting, or None where its kinds cannot be made as wide as wanted."""
+    """Return the trial in its setting, or None if its gaps cannot be made as large as wanted."""
     if plan.category == "none":
         return _without(rng, setting)
     bare = stage_gaps(clean.rig, clean.record, any(k.widens == "airframe" for k in kinds))
@@ -191,7 +191,7 @@ def _flown(
 def _read_otherwise(
     truth: Truth, setting: Setting, clean: Clean, parts: Sequence[_Sized], record: Record
 ) -> Truth:
-    """Return the truth with its other readings, and what each effect holds of the gap."""
+    """Return the truth with its other readings, and each effect's share of the gap."""
     names = [effect.name for effect in truth.effects]
     records = {frozenset[str](): clean.record, frozenset(names): record}
     if len(names) > 1:
@@ -207,8 +207,8 @@ def _read_otherwise(
 def _part(
     rng: Rng, plan: Plan, kind: Kind, setting: Setting, clean: Clean, bare: Mapping[str, float]
 ) -> _Sized | None:
-    """Return a kind at a size that makes it as wide as its category wants, or None."""
-    if kind.widens not in bare:  # a gradient that never changes shows nothing of its schedule
+    """Return a kind at a size with the gap of its category, or None."""
+    if kind.widens not in bare:  # a constant gradient shows nothing of its schedule
         return None
     clear = plan.category in ("pair", "outsider")
     low, high = (CLEAR * 1.1, CLEAREST * 0.8) if clear else (FAINTEST, WIDEST)
@@ -222,7 +222,7 @@ def _part(
 
 
 def _without(rng: Rng, setting: Setting) -> Trial | None:
-    """Return a trial without an effect; in one of three, numbers are off as their setting lets."""
+    """Return a trial without effects; in one of three, numbers deviate within their tolerance."""
     tolerance = {}
     if rng.uniform() < 1.0 / 3.0:
         names = ("mass", "damping", "servo_rate")
@@ -243,7 +243,7 @@ def _without(rng: Rng, setting: Setting) -> Trial | None:
 
 
 def _also(setting: Setting) -> tuple[str, ...]:
-    """Return what the rig has beside its category: friction that yields, in the later versions."""
+    """Return the rig's other properties: in later versions, presliding friction."""
     dry = setting.rig.controls["column"].loader.friction > 0.0
     return ("presliding_friction",) if dry and setting.conditions.presliding_m else ()
 
@@ -260,9 +260,9 @@ def _lacking(rng: Rng, trial: Trial) -> Trial:
 def _sized(
     setting: Setting, clean: Clean, kind: Kind, draw: Draw, wanted: float, bare: float
 ) -> _Sized | None:
-    """Return a kind flown alone at a size whose excess residual is about as wide as wanted.
+    """Return a kind simulated alone at a size with about the wanted excess residual.
 
-    The excess grows about as the size; a few trials correct it. None where all are lost.
+    The excess is about proportional to the size; a few iterations correct it. None if all fail.
     """
     size, best, miss = math.sqrt(kind.least * kind.most), None, math.inf
     for _ in range(SIZINGS):

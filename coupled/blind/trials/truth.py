@@ -1,4 +1,4 @@
-"""The truth of a trial: what its real rig has, how wide it shows, and how the record was made."""
+"""The truth of a trial: its rig's effects, their gaps, and the conditions of the record."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEWEST_EFFECTS: Mapping[Category, int] = {
     "outsider": 1,
     "lacking": 1,
 }
-# The conditions of a record that its key need not name.
+# Conditions of a record that its key may omit.
 _CONDITIONS = (
     *("noise", "bristle_J", "presliding_m", "elastic_share", "corner_Hz"),
     *("force_skew_s", "motion_skew_s"),
@@ -27,22 +27,22 @@ _CONDITIONS = (
 
 @dataclass(frozen=True)
 class TrueEffect:
-    """What a real rig has and its nominal model lacks, as a diagnosis names it."""
+    """An effect of the real rig that its nominal model lacks, with the names of a diagnosis."""
 
     name: str
     stage: str
     parameters: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the effect as the key has it."""
+        """Return the effect for the key."""
         return {"name": self.name, "stage": self.stage, "parameters": dict(self.parameters)}
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """How wide the effects of a trial show, residual over floor under the nominal rig.
+    """The gaps of a trial's effects, residual over noise floor under the nominal rig.
 
-    clean_gap  at each effect's stage, on the same rig without any effect
+    clean_gap  of each effect's stage, on the same rig without any effect
     alone      of each effect alone, in the order of the effects
     ratio      the least of `alone` over `clean_gap`: 2 doubles the stage's residual
     """
@@ -52,7 +52,7 @@ class Sizes:
     ratio: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the sizes as the key has them."""
+        """Return the sizes for the key."""
         return {
             "clean_gap": dict(self.clean_gap),
             "alone": list(self.alone),
@@ -62,10 +62,10 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Reading:
-    """Effects that are the same law as the truth's, and their stages, sorted.
+    """Effects that are equivalent to the true ones, and their stages, sorted.
 
-    `sure`: whatever is recorded, so that naming them is right; else on this record, so that
-    naming them is right only beside the truth.
+    `sure`: in any record, so that naming them is right; otherwise in this record only, so that
+    naming them is right only as an alternative to the truth.
     """
 
     names: tuple[str, ...]
@@ -73,7 +73,7 @@ class Reading:
     sure: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the reading as the key has it."""
+        """Return the reading for the key."""
         return {"names": list(self.names), "stages": list(self.stages), "sure": self.sure}
 
 
@@ -83,16 +83,16 @@ class Truth:
 
     category    the key's `class`: none, single, pair, outsider or lacking
     rig         name of the nominal rig
-    stages      where something is, sorted
-    gap         each stage's residual over its floor under the nominal rig
-    missing     channels that were taken out
-    alike       effects that are the same law on this record; of a single
-    readings    other effects that are the same law, or are on this record; of the later versions
-    budget      {stage: {effect: its share of the residual's power}}; of the later versions
-    also        what the rig has besides and the nominal one lacks; naming it is not wrong
-    tolerance   factors on numbers that are off within their setting, which is no effect
-    sizes       None where the rig has nothing
-    conditions  what the record was made with
+    stages      stages with effects, sorted
+    gap         each stage's residual over its noise floor under the nominal rig
+    missing     channels that were removed
+    alike       effects that are the same law on this record; of a single effect
+    readings    other effects that are equivalent, in any record or this one; of later versions
+    budget      {stage: {effect: its share of the residual's power}}; of later versions
+    also        other properties of the rig that the nominal one lacks; naming them is not wrong
+    tolerance   factors on numbers within their tolerance, which are not effects
+    sizes       None if the rig has no effects
+    conditions  the conditions of the record
     seed        of the trial's draws
     """
 
@@ -113,22 +113,22 @@ class Truth:
 
     @property
     def names(self) -> frozenset[str]:
-        """The names of what the rig has."""
+        """The names of the rig's effects."""
         return frozenset(effect.name for effect in self.effects)
 
     @property
     def not_distinguished(self) -> frozenset[str]:
-        """The names of the effects that this record does not tell from the truth's."""
+        """The effects that this record does not discriminate from the true ones."""
         others = (one.names for one in self.readings if not one.sure)
         return frozenset(name for names in others for name in names) - self.names
 
     @property
     def ratio(self) -> float:
-        """How many times the effects widen their stages' residuals; 1 where there is none."""
+        """The factor by which the effects enlarge their stages' residuals; 1 without effects."""
         return 1.0 if self.sizes is None else self.sizes.ratio
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the truth as the key has it."""
+        """Return the truth for the key."""
         table: dict[str, Any] = {
             "class": self.category,
             "rig": self.rig,
@@ -156,7 +156,7 @@ class Truth:
 
 
 class KeyEffect(Lenient):
-    """A true effect, as a key has it."""
+    """A true effect in a key."""
 
     name: str
     stage: str
@@ -164,7 +164,7 @@ class KeyEffect(Lenient):
 
 
 class KeyReading(Lenient):
-    """Another reading of the truth, as a key has it."""
+    """Another reading of the truth in a key."""
 
     names: list[str]
     stages: list[str]
@@ -172,7 +172,7 @@ class KeyReading(Lenient):
 
 
 class KeyEntry(Lenient):
-    """The truth of a record, as a key has it; what only some records have is None elsewhere."""
+    """The truth of a record in a key; keys of some records only are None in the others."""
 
     category: Category = named("class")
     rig: str
@@ -202,9 +202,9 @@ class KeyEntry(Lenient):
 
 
 def truth_from(entry: Any, file: object, path: str = "") -> Truth:
-    """Return the truth that `Truth.as_dict` wrote; raises InputError for anything else.
+    """Return the truth written by `Truth.as_dict`; raises InputError for anything else.
 
-    `path` is the dotted place of the entry in `file`.
+    `path` is the dotted path of the entry in `file`.
     """
     table = read_as(KeyEntry, entry, file, path)
     fewest = FEWEST_EFFECTS[table.category]

@@ -1,1 +1,1 @@
-"""The independent twin: its own loader and effects, by other methods than the rig's stages."""
+"""The independent twin: a second implementation of loader and effects, without the rig's stages."""

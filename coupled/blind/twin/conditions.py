@@ -1,4 +1,4 @@
-"""What the records of a version are made with, and what one record was: the key says it."""
+"""The conditions of a version's records, and of one record in its key."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from coupled.blind.twin.twin import Bristles
 
 @dataclass(frozen=True)
 class Realism:
-    """What the rigs and loggers of a version have that the nominal rig does not say.
+    """Properties of a version's rigs and loggers that the nominal rig does not have.
 
-    presliding_m    least and most of the length over which friction yields before it slips,
-                    drawn log-uniform; None for bristles of 0.3 to 1.5 μJ
+    presliding_m    bounds of the presliding length of friction, drawn log-uniform; None for
+                    bristles of 0.3 to 1.5 μJ
     coloured_noise  share of the records in which half of the channels have noise with a corner
-    corner_Hz       least and most of that corner, drawn log-uniform
-    skewed_clock    share of the records in which force or motion is stamped late
-    wheels          share of the records that hold the force on a wheel, too
+    corner_Hz       bounds of that corner frequency, drawn log-uniform
+    skewed_clock    share of the records with late time stamps of force or motion
+    wheels          share of the records with the force on a wheel, too
     """
 
     presliding_m: tuple[float, float] | None = None
@@ -33,15 +33,15 @@ PLAIN = Realism()
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a record was made with, as its key says it.
+    """The conditions of a record in its key.
 
     level_N        of the pilot's force
     noise          standard deviation of each channel's noise, SI
-    bristle_J      friction times the bristles' length, what a reversal gives back; of version 1
-    presliding_m   the bristles' length, where it is drawn by itself
-    elastic_share  of that length which bends before any of it slips
-    corner_Hz      of the channels whose noise is a first-order lag's and not white
-    force_skew_s, motion_skew_s  how late force and motion are stamped
+    bristle_J      friction times the bristles' length; of version 1
+    presliding_m   the bristles' length, if drawn by itself
+    elastic_share  share of that length below which nothing slips
+    corner_Hz      of the channels with noise of a first-order lag
+    force_skew_s, motion_skew_s  delays of the time stamps of force and motion
     """
 
     duration_s: float
@@ -63,7 +63,7 @@ class Conditions:
         return Bristles(self.presliding_m, elastic_share=self.elastic_share)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the conditions as the key has them."""
+        """Return the conditions for the key."""
         table: dict[str, Any] = {
             "duration_s": self.duration_s,
             "excitation": list(self.excitation),

@@ -1,4 +1,4 @@
-"""The library's effects as the twin has them, by the names and units of a diagnosis."""
+"""The library's effects in the twin, by the names and units of a diagnosis."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def _bend(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _stiffening(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Saturate the bend; a rig that is held to be rigid bends first.
+    """Saturate the bend; a rig filed as rigid gets a bend first.
 
-    At full force K·F falls short by about size²/3; K itself is off by no more, or with a far limit
-    a trial would be of a plain bend.
+    At full force K·F is smaller by about size²/3. K itself deviates by no more, since with a far
+    limit the trial would be of a plain bend.
     """
     nominal = clean.loader.bend
     off = (draw.u[0] - 0.5) * min(0.4, 0.6 * size**2)
@@ -115,7 +115,7 @@ def _surface_limit(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def in_air(field: str) -> Install:
-    """Return an installer of a factor exp(±size) on what the airframe does."""
+    """Return an installer of a factor exp(±size) on a property of the airframe."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
         factor = math.exp(draw.side * size)
@@ -126,7 +126,7 @@ def in_air(field: str) -> Install:
 
 
 def _gust(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Blow a vertical gust of Dryden's spectrum, MIL-F-8785C, its length drawn from 50 to 300 m."""
+    """Add vertical gusts with the Dryden spectrum, MIL-F-8785C, of a length of 50 to 300 m."""
     length = 50.0 * 6.0 ** draw.u[0]
     speed = clean.mean("true_airspeed_m_per_s")
     gust = dryden(len(clean.record), clean.rig.frame_rate, size, length / speed, draw.seed)
@@ -137,9 +137,9 @@ def _gust(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 def dryden(
     frames: int, frame_rate_Hz: float, rms: float, time_s: float, seed: int
 ) -> NDArray[np.float64]:
-    """Return the air's vertical speed, m/s, shape (frames,): white noise through a filter.
+    """Return the air's vertical speed, m/s, shape (frames,): filtered white noise.
 
-    H(s) = (1 + √3·T·s)/(1 + T·s)², T = L/V, made discrete by the bilinear rule.
+    H(s) = (1 + √3·T·s)/(1 + T·s)², T = L/V, discretised by the bilinear rule.
     """
     c = 2.0 * frame_rate_Hz * time_s
     r3 = math.sqrt(3.0)
@@ -148,7 +148,7 @@ def dryden(
     rng = np.random.default_rng(seed)
     warm = round(8.0 * time_s * frame_rate_Hz)
     blown = lfilter(up, down, rng.standard_normal(frames + warm))[warm:]
-    # Unit density gives ∫|H|²df = 1/T over both sides; per sample of a second's 1/rate.
+    # Unit density gives ∫|H|²df = 1/T, two-sided; a sample has the density 1/rate.
     blown *= rms * math.sqrt(frame_rate_Hz * time_s)
     rise = np.clip(np.arange(frames) / frame_rate_Hz, 0.0, 1.0)  # still air at trim
     return np.asarray(blown * rise)
@@ -159,7 +159,7 @@ def _pressure_lag(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
     return {"lag_s": size}
 
 
-# What a rig is set to is off by less in trials without an effect, so less is none.
+# In trials without effects, deviations within the tolerance are smaller, and no effects.
 BEYOND = 0.03
 
 EFFECTS = (

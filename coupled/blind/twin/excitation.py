@@ -1,7 +1,7 @@
-"""What the pilot does in a trial, and the dynamic pressure that a bench's host gets.
+"""The pilot's force in a trial, and the dynamic pressure of a bench.
 
-A force is `level` times a shape in ±1, and what friction and breakout hold is added on the
-shape's side, so that the control moves. All is smooth on the scale of a frame.
+A force is `level` times a shape in ±1, plus what friction and breakout hold on the shape's side, so
+that the control moves. All signals are smooth on the scale of a frame.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _go(t: Floats, shape: Floats, start: float, change: float, rise: float) -> N
 
 
 def _steps(rng: Rng, t: Floats) -> Floats:
-    """Pushes and pulls of random size, each followed by its opposite, and rests."""
+    """Add pushes and pulls of random size, each followed by its opposite, and rests."""
     shape, at = np.zeros_like(t), 1.0
     while at < t[-1] - 6.0:
         length, size, rise = rng.uniform(0.5, 2.5), rng.uniform(-1, 1), rng.uniform(0.2, 0.5)
@@ -36,7 +36,7 @@ def _steps(rng: Rng, t: Floats) -> Floats:
 
 
 def _multistep(rng: Rng, t: Floats) -> Floats:
-    """3-2-1-1s of random unit and size."""
+    """Add 3-2-1-1s of random unit and size."""
     shape, at = np.zeros_like(t), 1.0
     while at < t[-1] - 8.0:
         unit, size = rng.uniform(0.3, 0.9), rng.choice([-1, 1]) * rng.uniform(0.4, 1.0)
@@ -64,7 +64,7 @@ def _sweep(rng: Rng, t: Floats) -> Floats:
 
 
 def _triangles(rng: Rng, t: Floats) -> Floats:
-    """Slow ramps to and fro, their corners rounded over 0.3 s."""
+    """Add slow ramps to and fro, their corners rounded over 0.3 s."""
     corners, values, side = [0.0, 1.0], [0.0, 0.0], float(rng.choice([-1, 1]))
     while corners[-1] < t[-1] - 2.0:
         corners.append(corners[-1] + rng.uniform(1.5, 4.5))
@@ -95,9 +95,9 @@ SHAPES: dict[str, Callable[[Rng, Floats], Floats]] = {
 
 
 def pilot_shape(rng: Rng, frames: int, frame_rate_Hz: float) -> tuple[Floats, list[str]]:
-    """Return a shape in ±1 on the force's nodes, shape (frames·NODES + 1,), and what it is of.
+    """Return a shape in ±1 on the force's nodes, shape (frames·NODES + 1,), and its kinds.
 
-    Alone, two one after the other, or a slow and a quick one at once.
+    One kind, two in sequence, or a slow and a fast one added.
     """
     t = np.arange(frames * NODES + 1) / (frame_rate_Hz * NODES)
     first, second = rng.choice(sorted(SHAPES), 2, replace=False).tolist()
@@ -113,14 +113,14 @@ def pilot_shape(rng: Rng, frames: int, frame_rate_Hz: float) -> tuple[Floats, li
 
 
 def pilot_force(rig: Rig, shape: Floats, level_N: float) -> Floats:
-    """Return the pilot's force for a shape, N: beyond what friction and breakout hold."""
+    """Return the pilot's force for a shape, N: in addition to what friction and breakout hold."""
     loader = rig.controls["column"].loader
     held = 1.1 * (loader.breakout + loader.friction)
     return level_N * shape + held * np.tanh(4.0 * shape)
 
 
 def bench_pressure(rng: Rng, rig: Rig, frames: int) -> Floats:
-    """Return the q̄ that a bench's host gets, shape (frames,), Pa: holds, steps and ramps."""
+    """Return the q̄ of a bench, shape (frames,), Pa: holds, steps and ramps."""
     table = rig.controls["column"].schedule.dynamic_pressure
     low, high = table[0] + 0.05 * (table[-1] - table[0]), table[-1]
     t = np.arange(frames) / rig.frame_rate

@@ -1,7 +1,7 @@
-"""The twin's frame, compiled: the rig's equations once more, by other numerical means.
+"""The twin's frame, compiled: the rig's equations, with other numerical methods.
 
-A trial that flies the library's own stages would test them against themselves. The twin
-shares nothing with them but the description of the rig.
+A trial with the library's own stages would test them against themselves. The twin shares with them
+only the description of the rig.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from coupled.rig.compiled import entry, stage
 
 Floats = NDArray[np.float64]
 STEPS = 128  # of the loader in a frame
-NODES = 8  # of the pilot's force in a frame, straight between
+NODES = 8  # of the pilot's force in a frame, linear in between
 
 
 @stage
@@ -39,7 +39,7 @@ def _force(nodes: Floats, at: float) -> float:
 
 @stage
 def _gradient(p: TwinParameters, table: Floats, pressure: float) -> float:
-    """Return the schedule's answer with its slope and an outsider's tent and steps, N/m."""
+    """Return the schedule's gradient with its slope and an outsider's tent and steps, N/m."""
     rows = p.knots
     rest = np.interp(0.0, p.pressures[:rows], table[:rows])
     found = float(rest + p.slope * (np.interp(pressure, p.pressures[:rows], table[:rows]) - rest))
@@ -65,7 +65,7 @@ def _host(p: TwinParameters, s: TwinState, pressure: float, read: float) -> floa
     s.break_at, first = p.break_deflection, total
     if s.break_at > 0.0:
         s.break_at -= k * (preload + total * p.break_deflection)
-        if s.break_at <= 0.0:  # the grip has passed the break before the loader leaves neutral
+        if s.break_at <= 0.0:  # the grip passes the break before the loader leaves neutral
             preload += (total - beyond) * p.break_deflection
             s.break_at, first = 0.0, beyond
     s.first = first / (1.0 - k * first) - p.host_gradient
@@ -79,7 +79,7 @@ def _host(p: TwinParameters, s: TwinState, pressure: float, read: float) -> floa
 
 @stage
 def _grip(p: TwinParameters, s: TwinState, force: float, time: float) -> float:
-    """Return what the transducer at the grip reads, m."""
+    """Return the reading of the grip's transducer, m."""
     bend = p.bend * force + p.bend_uneven * abs(force) + p.bend_loop * s.loop
     if p.bend_limit > 0.0:
         bend = p.bend_limit * math.tanh(p.bend * force / p.bend_limit)
@@ -95,7 +95,7 @@ def _grip(p: TwinParameters, s: TwinState, force: float, time: float) -> float:
 
 @stage
 def _misses(p: TwinParameters, s: TwinState) -> bool:
-    """Tell whether the host misses this frame, by a number hashed from the last one."""
+    """Tell whether the host misses this frame, by a pseudorandom number."""
     if p.missed_share <= 0.0:
         return False
     s.random = math.sin(12.9898 * s.random + p.missed_seed) * 43758.5453 % 1.0
@@ -134,7 +134,7 @@ def twin_frame(
 
     parameters, state  shape (1,)
     nodes, others      shape (frames·NODES + 1,): the pilot's force, and that on another control, N
-    row                shape (7,): F, δc, δ, δ̂, G_T, F_mod, q̄; comes holding their noise
+    row                shape (7,): F, δc, δ, δ̂, G_T, F_mod, q̄; contains their noise on entry
     `pressure` is q̄ in Pa, `load_factor` +1 in level flight.
     """
     p, s = parameters[0], state[0]

@@ -1,4 +1,4 @@
-"""What a trial may put into a real rig: an entry, and what its size is held against."""
+"""The kinds of effects and outsiders of a trial, and the references of their sizes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from coupled.rig.rig import Rig
 
 @dataclass(frozen=True)
 class Draw:
-    """What is drawn once for a kind, whatever its size: a side, three shares, a seed."""
+    """The random numbers of a kind, for any size: a side, three shares, a seed."""
 
     side: float
     u: tuple[float, float, float]
@@ -25,7 +25,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Clean:
-    """The record of the same rig, pilot and noise without anything, to size a kind by."""
+    """The record of the same rig, pilot and noise without effects, as a reference of sizes."""
 
     rig: Rig
     record: Record
@@ -42,11 +42,11 @@ class Clean:
         return len(self.record) / self.rig.frame_rate
 
     def peak(self, name: str) -> float:
-        """Return the 99th percentile of a channel's size."""
+        """Return the 99th percentile of a channel's absolute value."""
         return float(np.percentile(np.abs(self.record[name]), 99.0))
 
     def speed(self, name: str) -> float:
-        """Return the 99th percentile of a channel's rate, taken over 0.1 s."""
+        """Return the 99th percentile of a channel's absolute rate, over 0.1 s."""
         step = max(1, round(0.1 * self.rig.frame_rate))
         moved = self.record[name][step:] - self.record[name][:-step]
         return float(np.percentile(np.abs(moved), 99.0)) / (step / self.rig.frame_rate)
@@ -56,22 +56,22 @@ class Clean:
         return float(np.mean(self.record[name]))
 
     def spread(self, name: str) -> float:
-        """Return the span of the inner 96 % of a channel."""
+        """Return the span of the central 96 % of a channel."""
         low, high = np.percentile(self.record[name], [2.0, 98.0])
         return float(high - low)
 
 
-# Puts a kind of some size into the twin, and returns its parameters by the names of a diagnosis.
+# Puts a kind of some size into the twin; returns its parameters by the names of a diagnosis.
 Install = Callable[[Twin, Clean, float, Draw], dict[str, float]]
 
 
 @dataclass(frozen=True)
 class Kind:
-    """An effect or an outsider: its stage, its sizes, and how it enters the twin.
+    """An effect or an outsider: its stage, its sizes, and its installer.
 
-    `least` and `most` bound the size, which the residual grows with; equal for a switch.
-    `shows` is the stage whose residual it widens, where that is not its own; `other` says that it
-    needs another control's force. Nothing is left of the kinds in `excludes` beside it.
+    `least` and `most` bound the size, with which the residual grows; equal for a discrete effect.
+    `shows` is the stage whose residual it enlarges, if not its own; `other`: it needs the force on
+    another control. A kind cannot be combined with those in `excludes`.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Kind:
 
     @property
     def widens(self) -> str:
-        """The stage whose residual it widens."""
+        """The stage whose residual it enlarges."""
         return self.shows or self.stage
 
     def suits(self, rig: Rig) -> bool:
@@ -94,7 +94,7 @@ class Kind:
         column = rig.controls["column"]
         if self.flown and rig.flight is None:
             return False
-        if self.name == "arc_geometry":  # in flight the deflections are too small to show it
+        if self.name == "arc_geometry":  # deflections in flight are too small
             return column.length > 0.0 and rig.flight is None
         if self.stage == "schedule" and rig.flight is not None:
             return _sloped(rig)
@@ -102,7 +102,7 @@ class Kind:
 
 
 def _sloped(rig: Rig) -> bool:
-    """Tell whether the schedule changes with q̄ where the aircraft flies."""
+    """Tell whether the schedule depends on q̄ where the aircraft flies."""
     assert rig.flight is not None
     table = rig.controls["column"].schedule
     q = 0.5 * 1.225 * rig.flight.calibrated_airspeed**2

@@ -1,13 +1,13 @@
-"""The twin's mechanism, compiled: loader, servo, play and structure, by other means than the rig's.
+"""The twin's mechanism, compiled: loader, servo, backlash and structure, by methods of its own.
 
-loader    averaged vector field (the mean force over a step's path, so a preload that is
-passed within a step acts for its share), 128 steps a frame
-friction  LuGre (Canudas de Wit, Olsson, Åström and Lischinsky, IEEE TAC 40, 1995): bristles
-whose ODE is solved exactly over a step, and damping that fades with speed; or
-elastoplastic (Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002): bristles
-that bend a share of their length before any of it slips, exactly too
-servo     fourth-order Runge–Kutta, and so the structure's mode; its dead time is a look into the
-          δc of steps past, straight between two
+loader    averaged vector field (the mean force over a step's path, so that a preload passed within
+          a step acts for its share), 128 steps a frame
+friction  LuGre (Canudas de Wit, Olsson, Åström and Lischinsky, IEEE TAC 40, 1995): bristles whose
+          ODE is solved exactly over a step, and damping that fades with speed; or elastoplastic
+          (Dupont, Hayward, Armstrong and Altpeter, IEEE TAC 47, 2002): bristles that deflect by a
+          share of their length before any slip, solved exactly too
+servo     fourth-order Runge–Kutta, and likewise the structure's mode; its dead time uses the δc of
+          past steps, linear between two
 preload   a steep spring about neutral
 relaxing  a spring in series with a damper, exact over a step
 """
@@ -21,8 +21,8 @@ import numpy as np
 from coupled.blind.twin.numbers import KEPT, TwinParameters, TwinState
 from coupled.rig.compiled import stage
 
-ROUNDS = 6  # of the implicit step's fixed point, which shrinks the error tenfold or more each
-NEUTRAL_m = 2e-6  # the preload's spring is that wide on either side
+ROUNDS = 6  # fixed-point iterations of the implicit step; each reduces the error tenfold or more
+NEUTRAL_m = 2e-6  # half width of the preload's spring
 FADE_m_per_s = 1e-3  # speed over which the bristles' damping fades
 
 
@@ -37,7 +37,7 @@ def product(s: TwinState, x: float) -> float:
 
 @stage
 def mean_sign(x0: float, x1: float) -> float:
-    """Return the mean over the way from x0 to x1 of the preload's sign, steep about 0."""
+    """Return the mean of the preload's sign, steep about 0, from x0 to x1."""
     if min(x0, x1) >= NEUTRAL_m:
         return 1.0
     if max(x0, x1) <= -NEUTRAL_m:
@@ -59,9 +59,9 @@ def _fading(p: TwinParameters, v: float) -> float:
 
 @stage
 def _bent(p: TwinParameters, most: float, z: float, way: float) -> tuple[float, float]:
-    """Return elastoplastic bristles after a way, and their mean over it, m.
+    """Return elastoplastic bristles after a displacement, and their mean over it, m.
 
-    In the direction of motion z rises as the way up to a share of `most`, and from there
+    In the direction of motion z rises with the displacement up to a share of `most`, and from there
     towards `most` by dz/dx = (most − z)/(most − share·most), which is solved exactly.
     """
     if way == 0.0:
@@ -94,7 +94,7 @@ def _relaxing(p: TwinParameters, s: TwinState, v: float, h: float) -> tuple[floa
 
 @stage
 def _given(p: TwinParameters, force: float) -> float:
-    """Return what the actuator gives of a modifying force, N."""
+    """Return a modifying force limited to the actuator's."""
     if p.force_limit > 0.0:
         return min(max(force, -p.force_limit), p.force_limit)
     return force
@@ -168,9 +168,9 @@ def step_loader(p: TwinParameters, s: TwinState, pull: float, time: float, h: fl
 
 @stage
 def heard(p: TwinParameters, s: TwinState, h: float) -> float:
-    """Keep δc after a step of h seconds; return that of the servo's dead time ago, m.
+    """Store δc after a step of h seconds; return that of the servo's dead time ago, m.
 
-    Before the start δc stood at neutral.
+    Before the start δc was at neutral.
     """
     if p.servo_delay <= 0.0:
         return s.x
@@ -195,7 +195,7 @@ def _servo_slope(p: TwinParameters, wanted: float, x: float, v: float) -> tuple[
 
 @stage
 def step_servo(p: TwinParameters, s: TwinState, before: float, after: float, h: float) -> None:
-    """Advance the servo by h seconds in which δc goes straight, and the play behind it."""
+    """Advance the servo by h seconds with δc linear, and the backlash behind it."""
     if p.servo_rate > 0.0:
         _step_servo(p, s, before, after, h)
     else:
@@ -225,7 +225,7 @@ def _mode_slope(p: TwinParameters, wanted: float, y: float, v: float) -> tuple[f
 
 @stage
 def step_structure(p: TwinParameters, s: TwinState, before: float, after: float, h: float) -> None:
-    """Advance what bends by h seconds in which the force at the grip, N, goes straight."""
+    """Advance the structure by h seconds with the force at the grip, N, linear."""
     if p.mode_rate > 0.0:
         y, v, middle = s.bent, s.bent_v, 0.5 * p.bend * (before + after)
         a1, b1 = _mode_slope(p, p.bend * before, y, v)

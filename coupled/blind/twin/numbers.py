@@ -1,4 +1,4 @@
-"""The twin's numbers and its state, as the kernel holds them."""
+"""The twin's parameters and its state in the kernel."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from coupled.rig.compiled import layout
 
 Floats = NDArray[np.float64]
 KNOTS = 32  # of the schedule's table
-KEPT = 8192  # of the latest δc, one a step: half a second at 120 Hz
+KEPT = 8192  # latest values of δc, one a step: half a second at 120 Hz
 
 
 class TwinParameters(Protocol):
@@ -23,7 +23,7 @@ class TwinParameters(Protocol):
     pressure_scale: float
     pressure_gain: float  # of the lag, a frame
     slope: float
-    tent_height: float  # outsider: share by which the table is wrong at `tent_at`
+    tent_height: float  # outsider: relative error of the table at `tent_at`
     tent_at: float
     tent_width: float
     gradient_step: float  # outsider: quantised
@@ -58,18 +58,18 @@ class TwinParameters(Protocol):
     stribeck_rate: float
     bristle: float  # stiffness σ₀, N/m
     bristle_damping: float  # σ₁, N·s/m
-    elastic_share: float  # of the bristles' length, bent before any of it slips; 0 for LuGre's
-    pull_friction: float  # N more in motion aft, and forward
+    elastic_share: float  # of the bristles' length below which nothing slips; 0 for LuGre's
+    pull_friction: float  # additional N in motion aft, and forward
     push_friction: float
     relaxing: float  # stiffness of a spring in series with a damper, N/m
     relaxing_s: float
     force_limit: float  # of the modification, N
-    crosstalk: float  # share of another control's force that reaches the loader
+    crosstalk: float  # share of another control's force that acts on the loader
     bob_weight: float
     offset: float
     delay: float
-    modifying_lag: float  # s, of F_mod on its way to the loader
-    aft: float  # where the loader stops on either side, m, as sizes
+    modifying_lag: float  # s, of F_mod on the loader
+    aft: float  # stops of the loader on either side, m, as sizes
     forward: float
     load_friction: float  # N of friction per N of force
     cog_force: float  # periodic in δc, N
@@ -86,12 +86,12 @@ class TwinParameters(Protocol):
     servo_ratio: float
     servo_limit: float
     servo_delay: float  # dead time, s
-    servo_push: float  # the most that it accelerates by, m/s²; 0 for no limit
+    servo_push: float  # largest acceleration of the servo, m/s²; 0 for no limit
     play: float
     bend: float
     bend_limit: float
     arc: float
-    mode_rate: float  # of the structure that bends, rad/s; 0 without mass
+    mode_rate: float  # of the structure's mode, rad/s; 0 without mass
     mode_ratio: float
     bend_share: float  # of the bend, through a play of the force
     bend_width: float  # of that play, full, N
@@ -120,7 +120,7 @@ class TwinParameters(Protocol):
 
 
 class TwinState(Protocol):
-    """What moves."""
+    """The state of the twin."""
 
     x: float
     v: float
@@ -129,15 +129,15 @@ class TwinState(Protocol):
     bent: float  # the structure's mode
     bent_v: float
     carried: float  # the force behind the bend's play
-    touch: float  # grip against servo, in a contact that yields
+    touch: float  # grip relative to the servo, with a soft contact
     random: float  # of missed frames, in 0 to 1
-    last_gradient: float  # what the host holds over a missed frame
+    last_gradient: float  # held by the host over a missed frame
     last_estimate: float
     second_x: float
     second_v: float
     servo: float
     servo_v: float
-    heard: float  # δc as the servo has it, m
+    heard: float  # the servo's input δc, m
     stepped: int  # steps since the start
     kept: Floats  # the latest δc, m
     grip: float

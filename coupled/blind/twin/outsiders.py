@@ -1,4 +1,4 @@
-"""What real rigs do and the library has no word for: a diagnosis is to say so, and where."""
+"""Faults of real rigs outside the library, which a diagnosis should report as unexplained."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Found = dict[str, float]
 
 
 def _plain(field: str, name: str) -> Install:
-    """Return an installer of one number, to either side."""
+    """Return an installer of one number, with random sign."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
         twin.set(**{field: draw.side * size})
@@ -41,7 +41,7 @@ def _quadratic(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _second_mass(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Hang a part of the loader's mass on a spring of its own."""
+    """Put a part of the loader's mass on a spring of its own."""
     mass, rate = size * clean.loader.mass, 2.0 * math.pi * (1.0 + 2.5 * draw.u[0])
     stiffness, ratio = mass * rate**2, 0.02 + 0.05 * draw.u[1]
     twin.set(second_mass=mass, second_stiffness=stiffness)
@@ -103,7 +103,7 @@ def _flutter(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _moment(name: str, law: Callable[[float, Sequence[float], Clean], float]) -> Install:
-    """Return an installer of a moment, in elevator command, of time and change of motion."""
+    """Return an installer of a moment, in elevator command, over time and change of motion."""
 
     def install(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
         value = draw.side * size
@@ -119,7 +119,7 @@ def _quantised(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _tent(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Let one place of the table, within the q̄ of the record, be wrong."""
+    """Make the table wrong around one point, within the q̄ of the record."""
     span = clean.spread("dynamic_pressure_Pa")
     at = clean.mean("dynamic_pressure_Pa") + (draw.u[0] - 0.5) * 0.4 * span
     height, width = draw.side * size, max(0.2 * span, 5.0)

@@ -1,7 +1,7 @@
-"""The effects of the contract's second revision as the twin has them.
+"""The effects of the contract's second revision in the twin.
 
-Friction is in newtons above the nominal one, as `coulomb_friction` has it, here too; a bend is the
-real one, whole.
+Friction is in newtons above the nominal one here too, as in `coulomb_friction`; a bend is the whole
+real one.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from coupled.blind.twin.numbers import KEPT
 from coupled.blind.twin.twin import Bristles, Twin, set_bristles, set_friction
 
 Found = dict[str, float]
-CONTACT_s = 2e-3  # damping over stiffness of a contact in the play
+CONTACT_s = 2e-3  # damping over stiffness of a backlash's contact
 OF_SERVO = (
     *("servo_lag", "servo_delay", "servo_tuning", "servo_rate_limit"),
     "servo_acceleration_limit",
 )
-STIFF_BEND_m_per_N = 1e-4  # what a rig that is filed as rigid bends, times the size
+STIFF_BEND_m_per_N = 1e-4  # bend of a rig filed as rigid, times the size
 
 
 def _presliding(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Add friction that yields over 50 to 500 μm."""
+    """Add presliding friction with a length of 50 to 500 μm."""
     travel = 5e-5 * 10.0 ** draw.u[0]
     bristles = Bristles(travel, elastic_share=clean.bristles.elastic_share or 0.3)
     loader = clean.loader
@@ -36,7 +36,7 @@ def _presliding(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _asymmetric(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Add friction to one direction of motion, and up to six tenths of it to the other."""
+    """Add friction in one direction of motion, and up to six tenths of it in the other."""
     less = 0.6 * draw.u[0] * size
     pull, push = (size, less) if draw.side > 0.0 else (less, size)
     twin.set(pull_friction=pull, push_friction=push)
@@ -76,14 +76,14 @@ def _crosstalk(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _servo_delay(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Let δc reach the servo late; the servo itself is as filed, so its frequency's factor is 1."""
+    """Delay the servo's δc; the servo itself is as filed, so its frequency's factor is 1."""
     assert size < (KEPT - 2) / STEPS * twin.get("frame_s")
     twin.set(servo_delay=size)
     return {"delay_s": size, "factor": 1.0}
 
 
 def _servo_push(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Let the servo accelerate by no more than the fastest motions ask for, and by less."""
+    """Limit the servo's acceleration to that of the fastest motions, or less."""
     step, rate_Hz = 6, clean.rig.frame_rate
     way = clean.record["column_computed_m"][::step]
     asked = np.abs(np.diff(way, 2)) * (rate_Hz / step) ** 2
@@ -93,7 +93,7 @@ def _servo_push(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _servo_tuning(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Let δc reach a servo late that is tuned otherwise."""
+    """Delay the δc of a servo with other tuning."""
     factor, damping = math.exp(draw.side * size), math.exp((draw.u[0] - 0.5) * size)
     twin.set(servo_delay=0.1 * size, servo_rate=twin.get("servo_rate") * factor)
     twin.set(servo_ratio=twin.get("servo_ratio") * damping)
@@ -120,7 +120,7 @@ def _stops(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _mode(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Give what bends a mass: a lightly damped mode of 2/size hertz."""
+    """Give the structure a mass: a lightly damped mode of 2/size hertz."""
     bend = clean.loader.bend or STIFF_BEND_m_per_N * size
     bend *= 1.0 + 0.2 * (draw.u[0] - 0.5)
     frequency = 2.0 / size
@@ -136,7 +136,7 @@ def _bend_hysteresis(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found
 
 
 def _soft_backlash(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Hold the grip in its play by a contact that yields by 0.2 to 1 play at full force."""
+    """Hold the grip in its backlash by a contact that deflects by 0.2 to 1 play at full force."""
     stiffness = clean.peak("column_force_N") / (size * (0.2 + 0.8 * draw.u[0]))
     twin.set(play=size, contact=stiffness, contact_s=CONTACT_s)
     return {"play_m": size, "stiffness_N_per_m": stiffness}
@@ -176,7 +176,7 @@ def _motion_skew(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
 
 
 def _hum(twin: Twin, clean: Clean, size: float, draw: Draw) -> Found:
-    """Lay a tone near 50 Hz, or in one of three near 60 Hz, on δc as read."""
+    """Add a tone near 50 Hz, or in one of three near 60 Hz, to δc as read."""
     mains = 50.0 if draw.u[0] < 2.0 / 3.0 else 60.0
     frequency = mains + 0.4 * (draw.u[1] - 0.5)
     twin.set(tone=size, tone_rate=2.0 * math.pi * frequency, tone_phase=2.0 * math.pi * draw.u[2])

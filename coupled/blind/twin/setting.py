@@ -1,4 +1,4 @@
-"""The setting of a trial: rig, pilot, noise; and the records flown in it."""
+"""The setting of a trial: rig, pilot, noise; and the records simulated in it."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 
 OTHER_FORCE = "wheel_force_N"
 
-# Standard deviation of each channel's white noise on a rig of middling care, and the digits
-# after the point that its logger writes.
+# Standard deviation of each channel's white noise on an average rig, and the decimals of its
+# logger.
 NOISE = {
     "column_force_N": (0.15, 3),
     "column_computed_m": (2e-5, 7),
@@ -41,16 +41,16 @@ NOISE = {
     "altitude_m": (0.2, 3),
     OTHER_FORCE: (0.15, 3),
 }
-GENTLER = 0.6  # factor on the pilot's force after an aircraft is lost
+GENTLER = 0.6  # factor on the pilot's force after the aircraft left the envelope
 TRIES = 8
 
 
-SKEW_s = 5e-4  # the most by which a clock is skewed: settings, no effect
+SKEW_s = 5e-4  # largest error of a clock: a nuisance parameter, no effect
 
 
 @dataclass(frozen=True)
 class Installed:
-    """A kind put into a twin: its size, what was drawn for it, and so its parameters."""
+    """A kind in a twin: its size, its random numbers, and so its parameters."""
 
     kind: Kind
     size: float
@@ -59,7 +59,7 @@ class Installed:
 
 @dataclass(frozen=True)
 class Flown:
-    """A record as a logger writes it, and the parameters of each kind put into its rig."""
+    """A record as written by a logger, and the parameters of each kind in its rig."""
 
     record: Record
     parameters: tuple[Mapping[str, float], ...]
@@ -75,13 +75,13 @@ class Other:
 
 @dataclass(frozen=True)
 class Setting:
-    """All of a trial but what is wrong with its rig.
+    """A trial without its effects.
 
     shape      of the pilot's force, in ±1, shape (frames·NODES + 1,)
-    pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
+    pressures  q̄ of a bench, shape (frames,), Pa; None with an aircraft
     noise      shape (frames, channels without time), SI
-    other      the force on another control, where the record holds it
-    built      whether its truth is of the rig as it was built
+    other      the force on another control, if recorded
+    built      whether its truth is of the rig as built
     """
 
     rig: Rig
@@ -100,10 +100,10 @@ class Setting:
 
     @property
     def known(self) -> Rig:
-        """The rig that a truth is held against: the nominal one, or the one that was built.
+        """The reference rig of the truth: the nominal one, or the one built.
 
-        That one has what the nominal rig does not say, and no effect: how far its friction yields,
-        and how late its force and its motion are stamped.
+        The latter has properties that the nominal rig lacks, and no effect: its presliding, and the
+        delays of its time stamps of force and motion.
         """
         if not self.built:
             return self.rig
@@ -129,11 +129,11 @@ class Setting:
         kinds: Sequence[Installed] = (),
         tolerance: Mapping[str, float] | None = None,
     ) -> Flown:
-        """Return the record of a rig that has these kinds.
+        """Return the record of a rig with these kinds.
 
-        `clean` is the record of the rig without any, which sizes are held against; `tolerance`
-        are factors on the twin's own numbers within their setting, which is no effect. Raises
-        LostError where the aircraft leaves the envelope.
+        `clean` is the record of the rig without them, the reference of sizes; `tolerance` are
+        factors on the twin's own numbers within their tolerance, which are not effects. Raises
+        LostError if the aircraft leaves the envelope.
         """
         twin = nominal_twin(self.rig, self.conditions.bristles)
         twin.set(force_late=self.conditions.force_skew_s)
@@ -155,7 +155,7 @@ class Setting:
 
 
 def with_other(rng: np.random.Generator, setting: Setting) -> Setting:
-    """Return the setting with a wheel beside the column: pushes at its rim, and their noise."""
+    """Return the setting with a wheel beside the column: forces at its rim, and their noise."""
     shape, _ = pilot_shape(rng, setting.frames, setting.rig.frame_rate)
     level_N = _log_uniform(rng, 10.0, 60.0)
     noise = NOISE[OTHER_FORCE][0] * rng.standard_normal(setting.frames)
@@ -163,14 +163,14 @@ def with_other(rng: np.random.Generator, setting: Setting) -> Setting:
 
 
 def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -> Setting:
-    """Return a setting drawn for a rig: 20 to 60 s of a pilot's work, and noise."""
+    """Return a random setting for a rig: 20 to 60 s of a pilot's force, and noise."""
     frames = round(rng.uniform(20.0, 60.0) * rig.frame_rate)
     shape, shapes = pilot_shape(rng, frames, rig.frame_rate)
     pressures = bench_pressure(rng, rig, frames) if rig.flight is None else None
     reach = (0.1, 0.7) if rig.flight is None else (0.03, 0.25)
     share = float(np.exp(rng.uniform(*np.log(reach))))
     column = rig.controls["column"]
-    # A pull goes against the gradient in the middle of the table: the scale of force, no more.
+    # A force against the gradient in the middle of the table: the order of magnitude.
     gradient = float(np.median(column.schedule.total_gradient))
     level = share * gradient * column.travel
     names = channels(rig)
@@ -213,10 +213,10 @@ def draw_setting(rng: np.random.Generator, rig: Rig, realism: Realism = PLAIN) -
 
 
 def coloured(white: Floats, corner_Hz: float, frame_rate_Hz: float) -> Floats:
-    """Return noise of the same standard deviation, its spectrum falling beyond a corner.
+    """Return noise of the same standard deviation, with a spectrum that falls beyond a corner.
 
-    A first-order lag, x[k] = a·x[k − 1] + √(1 − a²)·white[k], a = e^(−2π·corner/rate), begun in
-    its steady state; so neighbours correlate by a.
+    A first-order lag, x[k] = a·x[k − 1] + √(1 − a²)·white[k], a = e^(−2π·corner/rate), started in
+    its steady state; a is the correlation of neighbours.
     """
     a = float(np.exp(-2.0 * np.pi * corner_Hz / frame_rate_Hz))
     gain = np.sqrt(1.0 - a * a)
@@ -234,7 +234,7 @@ def channels(rig: Rig) -> tuple[str, ...]:
 
 
 def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
-    """Return the setting, gentle enough for the aircraft to stay, and its clean record."""
+    """Return the setting, with a force that keeps the aircraft in its envelope, and its record."""
     for _ in range(TRIES):
         try:
             record = setting.fly().record
@@ -246,7 +246,7 @@ def fly_clean(setting: Setting) -> tuple[Setting, Clean] | None:
 
 
 def _logged(record: Record) -> Record:
-    """Return the record rounded to the digits that the logger writes."""
+    """Return the record rounded to the decimals of its logger."""
     data = record.data.copy()
     for i, name in enumerate(record.channels):
         data[:, i] = np.round(data[:, i], NOISE[name][1] if name in NOISE else 6)

@@ -1,4 +1,4 @@
-"""The twin flown: a rig's numbers as the kernel has them, and the frame loop round it."""
+"""Simulation of the twin: a rig's numbers in the kernel, and the frame loop."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ RIG_CHANNELS = (
 
 @dataclass(frozen=True)
 class Bristles:
-    """How friction yields before it slips: by a length, or by what a reversal gives back.
+    """The bristles of presliding friction, by a length or an energy.
 
-    travel_m       the bristles' length, m; where it is None,
+    travel_m       the bristles' length, m; if it is None,
     energy_J       friction times that length
-    elastic_share  of the length that bends before any of it slips; 0 for LuGre's
+    elastic_share  share of the length below which nothing slips; 0 for LuGre's
     """
 
     travel_m: float | None = None
@@ -65,11 +65,11 @@ class Bristles:
 
 @dataclass
 class Air:
-    """What the air and the airframe do beyond the model.
+    """Effects of the air and of the airframe beyond the model.
 
-    `gust` is the air's upward speed, m/s a frame; `moment` makes a command, added at the
-    airframe but not seen at the surface, from time in s and the change of motion since trim.
-    `late_s` is how late the motion is stamped against all other channels.
+    `gust` is the air's upward speed, m/s in each frame; `moment` is a command, added at the
+    airframe but not at the surface, as a function of time in s and the change of motion since trim.
+    `late_s` is the delay of the motion's time stamps.
     """
 
     effectiveness: float = 1.0
@@ -86,7 +86,7 @@ class Air:
 class Twin:
     """A real rig: the kernel's numbers, shape (1,), its air, and the force on another control.
 
-    `others` is that force on the nodes of the pilot's, N; None where the rig has no other control.
+    `others` is that force on the nodes of the pilot's, N; None if the rig has no other control.
     """
 
     numbers: NDArray[np.void]
@@ -104,7 +104,7 @@ class Twin:
 
 
 def first_order(lag_s: float, step_s: float) -> float:
-    """Return the share of its way that a lag goes in a step."""
+    """Return the step response of a lag after one step."""
     return -math.expm1(-step_s / lag_s) if lag_s > 0.0 else 1.0
 
 
@@ -161,21 +161,21 @@ def nominal_twin(rig: Rig, bristles: Bristles = STIFF) -> Twin:
 def set_friction(
     twin: Twin, running_N: float, breakaway_N: float, rate_m_per_s: float, bristles: Bristles
 ) -> None:
-    """Set the twin's friction, and the bristles that it has."""
+    """Set the twin's friction and its bristles."""
     level = max(running_N, breakaway_N)
     twin.set(running=running_N, breakaway=level, stribeck_rate=rate_m_per_s)
     set_bristles(twin, level, bristles)
 
 
 def set_bristles(twin: Twin, level_N: float, bristles: Bristles) -> None:
-    """Set the stiffness and damping of bristles that carry a friction of `level_N`."""
+    """Set the stiffness and damping of bristles with a friction of `level_N`."""
     stiffness = bristles.stiffness(level_N)
     twin.set(bristle=stiffness, elastic_share=bristles.elastic_share)
     twin.set(bristle_damping=0.3 * math.sqrt(stiffness * twin.get("mass")))
 
 
 class LostError(RuntimeError):
-    """The aircraft left the envelope in which a trial means something."""
+    """The aircraft left the envelope in which a trial is valid."""
 
 
 def fly_twin(
@@ -185,9 +185,9 @@ def fly_twin(
 
     rig        the nominal rig: its aircraft and frame rate
     nodes      the pilot's force, shape (frames·NODES + 1,), N
-    pressures  q̄ of a bench, shape (frames,), Pa; None where the rig flies
+    pressures  q̄ of a bench, shape (frames,), Pa; None with an aircraft
     noise      shape (frames, channels without time), SI
-    Raises LostError where the aircraft leaves the envelope.
+    Raises LostError if the aircraft leaves the envelope.
     """
     rows = noise[:, :7].copy()
     state = np.zeros(1, TWIN_STATE)
@@ -209,7 +209,7 @@ def fly_twin(
 
 
 def _stamped(motions: Floats, late: float) -> Floats:
-    """Return the motion as recorded, stamped so many frames late; surface and q̄ are in time."""
+    """Return the motion as recorded, stamped `late` frames late; surface and q̄ without delay."""
     if late == 0.0:
         return motions
     at = np.arange(len(motions), dtype=float)
@@ -220,7 +220,7 @@ def _stamped(motions: Floats, late: float) -> Floats:
 
 
 def airframe(flight: Flight, frame_s: float) -> JSBSimAirframe:
-    """Return the aircraft, trimmed, its column alone."""
+    """Return the aircraft, trimmed, with its column only."""
     return make_aircraft(flight, frame_s, ["column"], [aircraft_folder()])
 
 
@@ -246,7 +246,7 @@ def _fly(
     assert real is not None
     try:
         craft = airframe(real, frame_s)
-    except InputError as error:  # it does not trim with such factors
+    except InputError as error:  # no trim with such factors
         raise LostError from error
     moment, gust = twin.air.moment, twin.air.gust
     motions, commands = [], np.zeros(len(rows))
@@ -267,7 +267,7 @@ def _fly(
             craft.set_gust(float(gust[k]))
         craft.step((command, 0.0, 0.0))
     flown = np.array(motions)
-    if moment is not None:  # the surface stands where the rig put it
+    if moment is not None:  # the surface is at the rig's position
         asked, positions = airframe(rig.flight, frame_s).surface_map()
         flown[1:, ELEVATOR] = np.interp(commands[:-1], asked, positions)
     return flown

@@ -10,28 +10,28 @@ from coupled.cli.tables.whole import print_whole
 
 
 def _lines(score: Score) -> list[tuple[str, Share]]:
-    """Return what the table says, a line a share."""
+    """Return the lines of the table, one for each share."""
     clear, faint, outside = score.clear_singles, score.faint_singles, score.outsiders
     return [
-        ("one effect, residual doubled or more: named", clear.named),
-        ("  named, or among an ambiguous few", clear.named_or_in_the_set),
-        ("  its stage, and no other", clear.stage),
-        ("  another named with confidence", clear.wrong),
-        ("one effect, fainter: named, or among a few", faint.right),
-        ("  no gap seen", faint.no_gap),
-        ("  a gap seen, no cause claimed", faint.undecided),
-        ("  another named with confidence", faint.wrong),
-        ("no gap: false alarms", score.false_alarms),
-        ("outside the library: said to be unexplained", outside.unexplained),
-        ("  its stage, and no other", outside.stage),
-        ("  put down to an effect with confidence", outside.false_attributions),
-        ("two effects: both named, nothing else", score.pairs.whole),
-        ("  or both among an ambiguous few", score.pairs.whole_or_in_the_set),
-        ("  their stages, and no other", score.pairs.stages),
-        ("channels lacking, and said so", score.lack_said),
-        ("where right: 95 % intervals that hold the truth", score.intervals.covered),
-        ("where right: budget's shares within 5 points", score.budget),
-        ("where right: more than 95 % of the gap closed", score.closed),
+        ("single effect, residual doubled: identified", clear.named),
+        ("  identified, or among the alternatives", clear.named_or_in_the_set),
+        ("  faulty stage correct, and no other", clear.stage),
+        ("  wrong effect stated as certain", clear.wrong),
+        ("fainter single effect: identified or alternative", faint.right),
+        ("  no gap detected", faint.no_gap),
+        ("  gap detected, no effect stated", faint.undecided),
+        ("  wrong effect stated as certain", faint.wrong),
+        ("no effect: false alarms", score.false_alarms),
+        ("fault outside the library: left unexplained", outside.unexplained),
+        ("  faulty stage correct, and no other", outside.stage),
+        ("  attributed to an effect as certain", outside.false_attributions),
+        ("two effects: both identified, and no other", score.pairs.whole),
+        ("  identified, or among the alternatives", score.pairs.whole_or_in_the_set),
+        ("  faulty stages correct, and no others", score.pairs.stages),
+        ("missing channels: reported", score.lack_said),
+        ("if correct: true value in its 95 % interval", score.intervals.covered),
+        ("if correct: shares of the budget within 5 points", score.budget),
+        ("if correct: more than 95 % of the gap closed", score.closed),
     ]
 
 
@@ -54,20 +54,20 @@ def print_score(console: Console, score: Score) -> None:
 
 
 def percent(share: float | None) -> str:
-    """Return a share in per cent, nothing where there is none."""
+    """Return a share in per cent, empty if there is none."""
     return "" if share is None else f"{100.0 * share:.0f} %"
 
 
 def span(found: Share) -> str:
-    """Return the interval of a share in per cent, nothing where there is none."""
+    """Return the interval of a share in per cent, empty if there is none."""
     if found.low is None or found.high is None:
         return ""
     return f"{100.0 * found.low:.0f} to {100.0 * found.high:.0f} %"
 
 
 def _print_power(console: Console, score: Score) -> None:
-    table = Table("residual widened", box=None, pad_edge=False, title_justify="left")
-    for head in ("named", "95 % interval", "wrong", "of"):
+    table = Table("residual enlarged", box=None, pad_edge=False, title_justify="left")
+    for head in ("identified", "95 % interval", "wrong", "of"):
         table.add_column(head, justify="right")
     for row in score.power:
         named = row.named
@@ -78,7 +78,7 @@ def _print_power(console: Console, score: Score) -> None:
 
 
 def _print_effects(console: Console, score: Score) -> None:
-    table = Table("", "right", "said instead", box=None, pad_edge=False)
+    table = Table("", "correct", "given instead", box=None, pad_edge=False)
     for name, row in score.effects.items():
         instead = "; ".join(
             (f"{times} × " if times > 1 else "") + said.replace("_", " ")

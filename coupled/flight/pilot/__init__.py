@@ -1,4 +1,4 @@
-"""Pilots: what a run file's `[pilot.CONTROL]` may say, and what it does to the grip."""
+"""Pilots: the kinds of a run file's `[pilot.CONTROL]`, and their actions on the grip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A hand that looks at the attitude, with gains of its own."""
+"""A pilot who controls the attitude, with given gains."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ from coupled.schema import quantity
 
 @public
 class Attitude(Pilot):
-    """A hand that captures an attitude `change_rad` from where it finds it, and holds it.
+    """A pilot who captures and holds an attitude `change_rad` from the initial one.
 
-    On the column the attitude is pitch, on the wheel roll, on the pedals heading. Force
-    through the muscle's lag: gain on the error, its integral, and the rate about that axis.
-    Limited to `force_limit_N`. On a rig that flies. Raises InputError as a run file does.
+    The attitude is pitch on the column, roll on the wheel, heading on the pedals. The force is
+    gain on the error, on its integral, and on the rate about that axis, through the muscle's lag,
+    limited to `force_limit_N`. Only on a rig with an aircraft. Raises InputError as a run file
+    does.
 
     >>> import coupled
     >>> coupled.Attitude(change_rad=0.05, gain_N_per_rad=900, rate_gain_N_s_per_rad=150).lag_s
@@ -50,7 +51,7 @@ class Attitude(Pilot):
         needs_aircraft(rig, control, file)
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
-        """Return the hand, with a memory of its own."""
+        """Return the hand, with its own state."""
         needs_aircraft(rig, control, start.file)
         found, integral, last = None, 0.0, self.start_s
         names = motion_channels(list(rig.controls), flown=True)

@@ -1,4 +1,4 @@
-"""What every pilot is: a section of a run file, or an object in Python, that moves one control."""
+"""The base of pilots: a section of a run file, or an object in Python, that moves one control."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ Floats = NDArray[np.float64]
 if TYPE_CHECKING:
     Values = Sequence[float] | Floats
 else:
-    Values = list[float]  # a section holds what a file would give
+    Values = list[float]  # a section has the values of a file
 Look = Callable[[float, tuple[float, ...]], float]
 
 
 @dataclass(frozen=True)
 class Action:
-    """What a pilot does on one control.
+    """The action of a pilot on one control.
 
-    `force` in N and `held` in d are functions of time in s (arrays in, arrays out); `hand`
-    is the impedance; `look`, where given, maps time and motion to a further force in N,
-    once a frame.
+    `force` in N and `held` in d are functions of time in s (arrays in, arrays out); `hand` is the
+    impedance; `look`, if given, maps time and motion to a further force in N, once a frame.
     """
 
     force: Callable[[Floats], Floats] | None = None
@@ -42,10 +41,10 @@ class Action:
 
 @dataclass(frozen=True)
 class Start:
-    """What a pilot finds at the start of a flight, and what is named in faults.
+    """The conditions at the start of a flight, and the files named in faults.
 
     `gradient` is the specified one at the q̄ of trim, N/d; `seed` that of the pilot's noise;
-    `file` names the run, `rig_file` the rig.
+    `file` is the run's, `rig_file` the rig's.
     """
 
     gradient: float
@@ -54,15 +53,15 @@ class Start:
     rig_file: object = "rig"
 
 
-STRONGEST = 5000.0  # N; 14 CFR 25.143 asks at most 670 N of a pilot, for a short time
+STRONGEST = 5000.0  # N; 14 CFR 25.143 allows at most 670 N, for a short time
 
 
 @public
 class Pilot(Given):
-    """What every pilot has.
+    """The common keys of all pilots.
 
-    `start_s` is when the pilot begins; `reach_m` (`reach_rad` on a wheel) the deflection on
-    either side beyond which the arm cannot follow, 0 for none.
+    `start_s` is when the pilot begins; `reach_m` (`reach_rad` on a wheel) the deflection on either
+    side beyond which the arm cannot follow, 0 for none.
     """
 
     kind: str
@@ -79,12 +78,12 @@ class Pilot(Given):
         return {key: name for key, name in file_keys(cls, "m").items() if key not in wrong}
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Raise InputError for what cannot be flown on a rig's control; `file` is named."""
+        """Raise InputError for an action impossible on a rig's control; `file` is named."""
         given = {key: None for key in file_keys(type(self), "m") if key in self.model_fields_set}
         known_keys(given, self.keys_on(control), file, f"pilot.{control}")
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
-        """Return what this pilot does on a rig's control."""
+        """Return the pilot's action on a rig's control."""
         raise NotImplementedError
 
     @property
@@ -98,7 +97,7 @@ class Pilot(Given):
 
 
 def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> Floats:
-    """Return a signal that goes to each (time, level) in turn, over `rise` seconds from it.
+    """Return a signal that moves to each (time, level) in turn, over `rise` seconds.
 
     `times` rise; each edge is a half cosine.
     """
@@ -114,13 +113,13 @@ def edges(times: Floats, levels: Sequence[tuple[float, float]], rise: float) -> 
 
 
 def needs_aircraft(rig: Rig, control: ControlName, file: object) -> None:
-    """Refuse a pilot who looks at the motion, on a rig that has none."""
+    """Refuse a pilot who observes the motion, on a rig without aircraft."""
     if rig.flight is None:
-        problem = "looks at the aircraft's motion, and the rig has no aircraft; give one that flies"
+        problem = "uses the aircraft's motion, and the rig has no aircraft; give one that flies"
         raise InputError(file, f"pilot.{control}", problem)
 
 
 def turned(found_rad: float, now_rad: float) -> float:
-    """Return by how much an angle differs from another, within half a turn, rad."""
+    """Return the difference of two angles, within half a turn, rad."""
     away = now_rad - found_rad
     return away - 2.0 * math.pi * round(away / (2.0 * math.pi))

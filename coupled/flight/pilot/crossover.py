@@ -5,14 +5,13 @@ controlled element together are ω_c/s with a delay. Here
 
     Y_p = K·(T_L·s + 1)/(T_I·s + 1)·(1 + ω_I/s)·e^(−τs)
 
-where lead T_L or lag T_I, never both, gives the phase margin, and K the frequency. All is
-computed in the discrete time of the frames, in which the pilot looks, so nothing is lost to
-them.
+where either lead T_L or lag T_I gives the phase margin, and K the frequency. All is computed in the
+discrete time of the frames, in which the pilot acts, so the result is exact.
 
-The remnant is noise that the pilot adds. Kleinman, Baron and Levison (1970): white noise on what is
-seen, of covariance π·ρ·σ² with ρ = 0.01 (−20 dB) for a practised pilot and σ² the mean square of
-what is seen. Here a first-order lag, the muscle's, filters it, so that the pilot's lead does not
-amplify its high frequencies; σ² is the mean square of the last seconds.
+The remnant is noise that the pilot adds. Kleinman, Baron and Levison (1970): white noise on the
+displayed quantity, of covariance π·ρ·σ² with ρ = 0.01 (−20 dB) for a practised pilot and σ² the
+mean square of that quantity. Here a first-order lag, the muscle's, filters it, so that the pilot's
+lead does not amplify its high frequencies; σ² is the mean square of the last seconds.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ import numpy as np
 
 from coupled.rig.packing import first_order_gain
 
-_MOST_rad = math.radians(80.0)  # of lead or lag: T_L = 5.7/ω_c; a pilot gives no more
+_MOST_rad = math.radians(80.0)  # largest lead or lag of a pilot: T_L = 5.7/ω_c
 _MEMORY_s = 5.0  # of the mean square that scales the remnant
 
 
@@ -41,7 +40,7 @@ class Compensation:
 
 
 class Acting:
-    """A compensation at work, frame by frame, with the memory it needs."""
+    """The discrete filter of a compensation, with its state."""
 
     def __init__(self, pilot: Compensation, frame_s: float) -> None:
         self._pilot, self._frame_s = pilot, frame_s
@@ -49,7 +48,7 @@ class Acting:
         self._lagged = self._integral = 0.0
 
     def __call__(self, error: float) -> float:
-        """Return what the pilot asks for on seeing an error."""
+        """Return the output for an error."""
         p, h = self._pilot, self._frame_s
         before = error if self._last is None else self._last
         self._last = error
@@ -60,14 +59,14 @@ class Acting:
 
 
 class Delay:
-    """A delay of any length, straight between frames."""
+    """A delay of any length, with linear interpolation between frames."""
 
     def __init__(self, delay_s: float, frame_s: float) -> None:
         whole, self._part = divmod(delay_s / frame_s, 1.0)
         self._past: deque[float] = deque([0.0] * (int(whole) + 2), maxlen=int(whole) + 2)
 
     def __call__(self, value: float) -> float:
-        """Return the value of so long ago."""
+        """Return the delayed value."""
         self._past.append(value)
         return (1.0 - self._part) * self._past[1] + self._part * self._past[0]
 
@@ -90,14 +89,14 @@ class Remnant:
 
 
 def delay_response(delay_s: float, frame_s: float, rate: float) -> complex:
-    """Return what `Delay` does at a frequency in rad/s."""
+    """Return the frequency response of `Delay` at a frequency in rad/s."""
     whole, part = divmod(delay_s / frame_s, 1.0)
     back = cmath.exp(-1j * rate * frame_s)
     return back ** int(whole) * (1.0 - part + part * back)
 
 
 def compensation_response(pilot: Compensation, frame_s: float, rate: float) -> complex:
-    """Return what `Acting` does at a frequency in rad/s."""
+    """Return the frequency response of `Acting` at a frequency in rad/s."""
     slope = _slope(frame_s, rate)
     shape = (1.0 + pilot.lead_s * slope) / (1.0 + pilot.lag_s * slope)
     return pilot.gain * shape * (1.0 + pilot.integral_per_s / slope)
@@ -106,11 +105,11 @@ def compensation_response(pilot: Compensation, frame_s: float, rate: float) -> c
 def adapt(
     element: complex, crossover: float, margin: float, integral: float, frame_s: float
 ) -> Compensation | float:
-    """Return the compensation that makes the loop cross over where it should, or what it lacks.
+    """Return the compensation for a given crossover and margin, or the phase that it lacks.
 
-    `element` is what the pilot's compensation works on, delay and limbs among it, at the
-    crossover in rad/s; `margin` in rad. A number is the lead in rad (lag negative) that it
-    would take, beyond what a pilot gives.
+    `element` is the response of the controlled element, with delay and limbs, at the crossover in
+    rad/s; `margin` in rad. A number is the required lead in rad (lag negative) beyond a pilot's
+    limit.
     """
     slope = _slope(frame_s, crossover)
     rest = element * (1.0 + integral / slope)
@@ -124,5 +123,5 @@ def adapt(
 
 
 def _slope(frame_s: float, rate: float) -> complex:
-    """Return what a difference from frame to frame does, per second."""
+    """Return the frequency response of a difference from frame to frame, per second."""
     return (1.0 - cmath.exp(-1j * rate * frame_s)) / frame_s

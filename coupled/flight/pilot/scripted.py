@@ -1,6 +1,6 @@
-"""Pilots that follow a script: force (step, ramp, doublet, 3-2-1-1, sweep), or a held deflection.
+"""Pilots with a script: force (step, ramp, doublet, 3-2-1-1, sweep), or a held deflection.
 
-Edges are half cosines over `rise_s`, as a hand's are.
+Edges are half cosines over `rise_s`, as those of a hand.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from coupled.schema import quantity
 
 @public
 class _Levels(Pilot):
-    """A force that goes from level to level."""
+    """A force that moves from level to level."""
 
     force_N: float = quantity("", ge=-STRONGEST, le=STRONGEST)
     rise_s: float = quantity("", 0.1, ge=0, le=7200)
 
     @property
     def rests(self) -> bool:
-        """Whether the force is none."""
+        """Whether the force is zero."""
         return self.force_N == 0.0
 
     def levels(self) -> list[tuple[float, float]]:
-        """Return the (time in s, share of the force) that the signal goes to."""
+        """Return the (time in s, share of the force) of each level."""
         raise NotImplementedError
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
@@ -47,7 +47,7 @@ class _Levels(Pilot):
 
 @public
 class Step(_Levels):
-    """A force held for `duration_s`, or to the end where that is 0.
+    """A force held for `duration_s`, or to the end if that is 0.
 
     `force_N` to ±5000, a pull positive; it begins at `start_s` (1), its edges are half cosines
     of `rise_s` (0.1). Raises InputError as a run file does.
@@ -71,7 +71,7 @@ class Step(_Levels):
 
 @public
 class Ramp(Pilot):
-    """A force that grows evenly over `ramp_s`, and is then held.
+    """A force that grows linearly over `ramp_s`, and is then held.
 
     `force_N` to ±5000, a pull positive; it begins at `start_s` (1). Raises InputError as a run
     file does.
@@ -96,7 +96,7 @@ class Ramp(Pilot):
 
 @public
 class Doublet(_Levels):
-    """A force one way, then as long the other way.
+    """A force in one direction, then for the same time in the other.
 
     `force_N` to ±5000, a pull first where positive; each half lasts `half_period_s`, from
     `start_s` (1), with edges of `rise_s` (0.1). Raises InputError as a run file does.
@@ -155,7 +155,7 @@ class FrequencySweep(Pilot):
     high_Hz: float = quantity("", 2.0, ge=1e-3, le=50)
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse frequencies that the frames cannot show."""
+        """Refuse frequencies above the Nyquist frequency of the frames."""
         super().check(rig, control, file)
         if max(self.low_Hz, self.high_Hz) > 0.5 * rig.frame_rate:
             problem = f"is beyond half the frame rate, {0.5 * rig.frame_rate:g} Hz"
@@ -177,11 +177,10 @@ class FrequencySweep(Pilot):
 
 @public
 class Clamp(Pilot):
-    """Holds the grip at a deflection; the force is what that takes.
+    """Holds the grip at a deflection, with whatever force that requires.
 
-    The clamp inverts the rig's own mass, damping and gradient, so that the error of
-    deflection dies as exp(−bandwidth·t) on any rig, without a lasting error.
-
+    The clamp's impedance is computed from the rig's own mass, damping and gradient, so that the
+    error of deflection decays as exp(−bandwidth·t) on any rig, without a steady-state error.
     `deflection_m` (`deflection_rad` on a wheel) within the travel, reached over `rise_s` (0.5)
     from `start_s` (1), for `duration_s` (0: to the end); `bandwidth_rad_per_s` (6). Raises
     InputError as a run file does.

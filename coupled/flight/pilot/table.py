@@ -18,10 +18,10 @@ from coupled.schema import quantity
 
 @public
 class ForceTable(Pilot):
-    """A force over time, straight between rows, from arrays or from a file.
+    """A force over time, linear between rows, from arrays or from a file.
 
     Arrays: `time_s` and `force_N`, of one length. A file: a CSV with `time_s` and the control's
-    force channel, as `column_force_N`. `start_s` is added to the times; outside of them the
+    force channel, such as `column_force_N`. `start_s` is added to the times; outside of them the
     force is zero. Raises InputError for times that do not rise, gaps, and more than 5000 N.
 
     >>> import coupled
@@ -38,12 +38,12 @@ class ForceTable(Pilot):
     start_s: float = quantity("", 0.0, ge=0, le=7200)
 
     def beside(self, folder: Path) -> ForceTable:
-        """Return this pilot with its file sought in a folder."""
+        """Return this pilot with its file in a folder."""
         given: dict[str, Any] = {key: getattr(self, key) for key in self.model_fields_set}
         return ForceTable(**{**given, "file": str(folder / self.file)})
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse a table that cannot be read, or whose times do not rise."""
+        """Refuse a table that cannot be read, or with times that do not rise."""
         super().check(rig, control, file)
         place = f"pilot.{control}"
         given = self.model_fields_set & {"time_s", "force_N"}
@@ -74,20 +74,20 @@ class ForceTable(Pilot):
 
 
 def read_force_table(path: Path, wanted: str) -> tuple[Floats, Floats]:
-    """Return times in s and forces in N of a CSV; gaps and disorder are refused by row."""
+    """Return times in s and forces in N of a CSV; faults name the row."""
     columns = read_columns(path)
     for name in (TIME, wanted):
         if name not in columns:
             raise InputError(path, name, f"no such column; {nearest(name, columns)}")
     times, forces = columns[TIME], columns[wanted]
-    _check_rows(times, forces, path, (TIME, wanted), 2)  # of a file the second line is row 2
+    _check_rows(times, forces, path, (TIME, wanted), 2)  # the second line of a file is row 2
     return times, forces
 
 
 def _check_rows(
     times: Floats, forces: Floats, file: object, keys: tuple[str, str], first: int
 ) -> None:
-    """Refuse times that do not rise, a force that no pilot has, missing rows; `first` is a row."""
+    """Refuse times that do not rise, excessive forces, missing rows; `first` is a row number."""
     time_key, force_key = keys
     if np.max(np.abs(forces), initial=0.0) > STRONGEST:
         raise InputError(file, force_key, f"holds more than {STRONGEST:g} N, which no pilot can")
@@ -100,7 +100,7 @@ def _check_rows(
 
 
 def _refuse_gaps(times: Floats, file: object, key: str, first: int) -> None:
-    """Refuse a sampled table with missing rows; a few typed breakpoints may lie as they like."""
+    """Refuse a sampled table with missing rows; a few typed breakpoints may have any spacing."""
     steps = np.diff(times)
     usual = float(np.median(steps))
     if np.mean(np.abs(steps - usual) < 0.02 * usual) < 0.8:

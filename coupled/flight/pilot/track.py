@@ -1,12 +1,11 @@
 """A pilot who tracks attitude, path, airspeed, heading or sideslip, by the crossover model.
 
-The pilot has practised on the aircraft with the feel that is specified: gain and lead are
-those which, on a rigid rig without friction and breakout, make the loop cross over at the
-frequency and with the phase margin that are set. On another rig the same pilot flies with
-what practice gave. Path and airspeed are flown through the attitude, as pilots do: an
-outer loop asks for pitch; so is heading with the wheel, through roll.
+The pilot has practised on the aircraft with the specified feel: on a rigid rig without friction and
+breakout, gain and lead give the set crossover frequency and phase margin. On another rig the same
+pilot flies with the same gain and lead. Path and airspeed are controlled through the attitude, by
+an outer loop that commands pitch; heading with the wheel likewise through roll.
 
-The muscles' command works against feel and arm together, so a stiffer feel gives a smaller
+The muscles' command acts against feel and arm together, so a stiffer feel gives a smaller
 deflection:
 
     δ·((m + m_h)·s² + (c + c_h)·s + G_T + k_h) = u/(T_n·s + 1)
@@ -60,28 +59,28 @@ from coupled.rig.rig import Rig
 from coupled.schema import quantity
 
 What = Literal["pitch", "flight_path", "airspeed", "roll", "heading", "sideslip"]
-# What each control may follow, first what it follows where nothing is said.
+# The quantities that each control may track, the default first.
 FOLLOWED: Mapping[ControlName, tuple[What, ...]] = {
     "column": ("pitch", "flight_path", "airspeed"),
     "wheel": ("roll", "heading"),
     "pedals": ("heading", "sideslip"),
 }
-# The attitude through which a control flies the others; pedals have none.
+# The attitude of each control's inner loop; pedals have none.
 _THROUGH: Mapping[ControlName, What] = {"column": "pitch", "wheel": "roll"}
-# Where a positive force makes less of what is followed: a higher nose costs airspeed, and
-# right pedal turns the nose away from a wind that then comes from the left.
+# Quantities that a positive force reduces: a higher nose reduces airspeed, and right pedal turns
+# the nose away from a wind that then comes from the left.
 _LESSENED: tuple[What, ...] = ("airspeed", "sideslip")
 
 
 @public
 class Track(Pilot):
-    """Tracks a target: a change of what the aircraft flew at `start_s`, and a sum of sines.
+    """Tracks a target: a change from the condition at `start_s`, and a sum of sines.
 
-    `what` is, on the column, `pitch` (where nothing is said), `flight_path` or `airspeed`; on
-    the wheel `roll` or `heading`; on the pedals `heading` or `sideslip`. The open loop crosses
-    over at `crossover_rad_per_s` with `phase_margin_rad` (0.7). The target is `change_rad` and
-    `sine_rad`, of airspeed `change_m_per_s` and `sine_m_per_s`. On a rig that flies.
-    Raises InputError as a run file does, and for a loop that no pilot can give.
+    `what` is, on the column, `pitch` (default), `flight_path` or `airspeed`; on the wheel `roll` or
+    `heading`; on the pedals `heading` or `sideslip`. The open loop crosses over at
+    `crossover_rad_per_s` with `phase_margin_rad` (0.7). The target is `change_rad` and `sine_rad`,
+    for airspeed `change_m_per_s` and `sine_m_per_s`. Only on a rig with an aircraft. Raises
+    InputError as a run file does, and for a loop beyond a pilot's lead or lag.
 
     >>> import coupled
     >>> coupled.Track(crossover_rad_per_s=1.5, change_rad=0.05).what
@@ -121,11 +120,11 @@ class Track(Pilot):
     )
 
     def follows(self, control: ControlName) -> What:
-        """Return what is followed with a control."""
+        """Return the quantity tracked with a control."""
         return self.what if "what" in self.model_fields_set else FOLLOWED[control][0]
 
     def check(self, rig: Rig, control: ControlName, file: object) -> None:
-        """Refuse what a control does not follow, another's unit, sines too quick for a frame."""
+        """Refuse quantities of another control, wrong units, and sines too fast for the frames."""
         super().check(rig, control, file)
         needs_aircraft(rig, control, file)
         what = self.follows(control)
@@ -137,7 +136,7 @@ class Track(Pilot):
         for inner in ("pitch", "roll"):
             for key in (f"{inner}_crossover_rad_per_s", f"{inner}_phase_margin_rad"):
                 if key in self.model_fields_set and (inner != through or inner == what):
-                    problem = f"has no part in following {what} with the {control}; leave it out"
+                    problem = f"is not used for {what} with the {control}; leave it out"
                     raise InputError(file, f"pilot.{control}.{key}", problem)
         wrong = "rad" if what == "airspeed" else "m_per_s"
         for key in (f"change_{wrong}", f"sine_{wrong}"):
@@ -149,7 +148,7 @@ class Track(Pilot):
             raise InputError(file, f"pilot.{control}.sine_rates_rad_per_s", problem)
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
-        """Return the arm and its command, practised on the rig as it is specified."""
+        """Return the arm and its command, practised on the specified rig."""
         needs_aircraft(rig, control, start.file)
         hand = Hand(
             *self._arm(control),
@@ -171,14 +170,14 @@ class Track(Pilot):
     def _practised(
         self, rig: Rig, control: ControlName, start: Start
     ) -> tuple[Compensation, Compensation | None]:
-        """Return the compensation on the attitude, and that of what is flown through it, if any.
+        """Return the compensation on the attitude, and that of the outer loop, if any.
 
-        Where nothing is flown through an attitude, the first is on what is followed itself.
+        Without an outer loop the first is on the tracked quantity itself.
         """
         frame_s, controls = 1.0 / rig.frame_rate, tuple(rig.controls)
 
         def element(what: What, rate: float) -> complex:
-            """Return what the aircraft does per newton of the pilot's command."""
+            """Return the aircraft's response per newton of the pilot's command."""
             assert rig.flight is not None
             file = start.rig_file
             answer = control_response(rig.flight, frame_s, controls, control, file, rate)
@@ -216,7 +215,7 @@ class Track(Pilot):
         return inner, replace(outer, gain=sign * outer.gain)
 
     def _limbs(self, rig: Rig, name: ControlName, pressure_Pa: float, rate: float) -> complex:
-        """Return the surface command per newton of the pilot's, on the rig as specified."""
+        """Return the surface command per newton of the pilot's, on the specified rig."""
         control, s, frame_s = rig.controls[name], 1j * rate, 1.0 / rig.frame_rate
         loader, rigging = control.loader, control.rigging
         servo, follows = 2.0 * math.pi * loader.servo_frequency, complex(1.0)
@@ -227,20 +226,20 @@ class Track(Pilot):
         stiffness, damping = self._arm(name)
         arm = (stiffness + damping * s + self.arm_mass_kg * s**2) * follows
         late = np.exp(-s * (0.5 * frame_s + loader.delay))  # the command is held over a frame
-        # The host takes δc, ahead of the servo, which only the arm feels.
+        # The host takes δc, before the servo, which only affects the arm.
         drive: complex = COMMAND_SIGN[control.surface] / control.travel
         drive /= (1.0 + rigging.stretch_loss * pressure_Pa) * (1.0 + rigging.lag * s)
         return complex(drive * late / ((1.0 + self.lag_s * s) * (feel + arm)))
 
     def target(self, times: Floats) -> Floats:
-        """Return what is tracked over time, about what was flown at the start; rad or m/s."""
+        """Return the target over time, relative to the start; rad or m/s."""
         after = np.maximum(times - self.start_s, 0.0)
         sines = np.zeros_like(after)
         for i, rate in enumerate(self.sine_rates_rad_per_s):
-            phase = 2.4 * i * i  # so that the peaks do not meet; each begins at zero
+            phase = 2.4 * i * i  # so that the peaks do not coincide; each begins at zero
             sines += np.sin(rate * after + phase) - np.sin(phase) * np.exp(-after)
         step = edges(times, [(self.start_s, 1.0)], self.rise_s)
-        if self.what == "airspeed":  # which only a column follows
+        if self.what == "airspeed":  # only on a column
             return np.asarray(self.change_m_per_s * step + self.sine_m_per_s * sines)
         return np.asarray(self.change_rad * step + self.sine_rad * sines)
 
@@ -252,7 +251,7 @@ class Track(Pilot):
         around: Compensation | None,
         seed: int,
     ) -> Look:
-        """Return the pilot's eyes and hands, with a memory of their own."""
+        """Return the pilot's function of time and motion, with its own state."""
         frame_s, what = 1.0 / rig.frame_rate, self.follows(control)
         through = _THROUGH.get(control, what)
         inner, late = Acting(on_attitude, frame_s), Delay(self.delay_s, frame_s)
@@ -280,7 +279,7 @@ class Track(Pilot):
 
 
 def _seen(motion: tuple[float, ...], path_rad: float, what: What) -> float:
-    """Return what a pilot looks at, rad or m/s."""
+    """Return the tracked quantity, rad or m/s."""
     if what == "flight_path":
         return path_rad
     places = {"pitch": PITCH, "airspeed": SPEED, "roll": ROLL}
@@ -288,12 +287,12 @@ def _seen(motion: tuple[float, ...], path_rad: float, what: What) -> float:
 
 
 def _away(found: float, now: float, what: What) -> float:
-    """Return how far what is followed is from where it was found; a heading by the nearer way."""
+    """Return the deviation of the tracked quantity from its start; a heading the shorter way."""
     return turned(found, now) if what in ("roll", "heading") else now - found
 
 
 def _motion(answer: Response, what: What) -> complex:
-    """Return what an aircraft makes of a command, of what is followed."""
+    """Return the aircraft's response of the tracked quantity to a command."""
     motions = {"pitch": answer.pitch, "flight_path": answer.flight_path}
     motions |= {"airspeed": answer.airspeed, "roll": answer.roll}
     return (motions | {"heading": answer.heading, "sideslip": answer.sideslip})[what]

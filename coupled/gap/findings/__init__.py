@@ -1,1 +1,1 @@
-"""What is said of the effects found: budget, credibility, flight, verdict, next test."""
+"""Results of the search: verdict, estimates, credibility, budget, flights and the next test."""

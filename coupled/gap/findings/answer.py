@@ -1,4 +1,4 @@
-"""What is said of the effects found: their numbers, how sure each is, and the verdict on all."""
+"""The verdict on all effects found, and of each its probability and estimates."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def verdict_of(
     effects: Sequence[EffectResult],
     budget: Sequence[StageBudget],
 ) -> Verdict:
-    """Return the verdict; `mostly` where what is certain leaves structure, but holds more.
+    """Return the verdict, from the shares of the certain effects in the faulty stages' gaps.
 
-    An effect that is not certain, though no other rivals it, explains nothing: it may imitate what
-    is missing so well that nothing seems to remain. Nor is it open which of two it is, if neither
-    is credible and what is certain holds most. A stage of which nothing is explained leaves the
-    others' effects standing where all of them are certain and hold most of the whole gap.
+    An effect without alternative that is not certain counts as unexplained, since it may imitate
+    a fault outside the library. `mostly`: residual structure remains, but the certain effects hold
+    at least `MOST` of every faulty stage's gap, or of all gaps together. Alternatives do not make
+    the verdict `ambiguous` if none of them is credible and the certain effects hold that share.
     """
     guilty = [stage.name for stage in stages if stage.guilty]
     blamed = {step.effect.stage for step in choice.steps}
@@ -57,7 +57,7 @@ def verdict_of(
     if left and not held and (open_ones or _held_together(stages, known, sure) < MOST):
         return "unexplained"
     if not choice.steps:
-        # A floor that hides much of a stage lets nobody say whether it has a gap.
+        # A stage within a large noise floor may hide a gap.
         return "ambiguous" if any(stage.hidden is not None for stage in stages) else "no_gap"
     rivals = {step.effect.name for step in choice.steps if step.rivals}
     if rivals and not (held and sure and rivals <= incredible(choice, effects)):
@@ -66,29 +66,29 @@ def verdict_of(
 
 
 def doubted(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
-    """Return the effects that are not certain, though no other rivals them."""
+    """Return the effects without alternative whose probability is below `CERTAIN`."""
     alone = {step.effect.name for step in choice.steps if not step.rivals}
     return frozenset(e.name for e in effects if e.name in alone and e.probability < CERTAIN)
 
 
 def incredible(choice: Choice, effects: Sequence[EffectResult]) -> frozenset[str]:
-    """Return the effects that are not certain, and no more so with all their rivals together."""
+    """Return the effects that are not certain even if all alternatives are the same fault."""
     all_of = {step.effect.name: 1 + len(step.rivals) for step in choice.steps}
     return frozenset(e.name for e in effects if e.probability * all_of[e.name] < CERTAIN)
 
 
 def _held(budget: StageBudget | None, effects: Collection[str]) -> float:
-    """Return the share of a stage's gap that some of the effects hold, noise apart."""
+    """Return the share of a stage's residual power, without noise, that the effects explain."""
     return 0.0 if budget is None else sum(budget.of(name) for name in effects)
 
 
 def _held_together(
     stages: Sequence[StageResult], known: Mapping[str, StageBudget], effects: Collection[str]
 ) -> float:
-    """Return the share that some effects hold of the gaps of all guilty stages.
+    """Return the share that the effects explain of the gaps of all faulty stages together.
 
-    A gap counts by its logarithm, as in a likelihood: floors of two stages are no common measure.
-    That of a stage without an output of its own is its neighbours' as filed.
+    A gap is weighted by its logarithm, since the noise floors of two stages have no common unit.
+    A stage without an output of its own has the gap of its neighbours with the filed rig.
     """
     each = {stage.name: stage.settled or stage.gap or 1.0 for stage in stages if stage.guilty}
     sizes = {name: math.log(gap) for name, gap in each.items() if gap > 1.0}
@@ -99,7 +99,7 @@ def _held_together(
 def settings_of(
     choice: Choice, rig: Rig, control: ControlName, outputs: Sequence[Output]
 ) -> tuple[SettingResult, ...]:
-    """Return what the settings of the nominal rig were found to be, over what is filed."""
+    """Return the fitted nuisance parameters, each as a factor on its filed value."""
     found = []
     for setting in settings(rig, control, outputs).values():
         for p in setting.free:
@@ -122,10 +122,10 @@ def effects_of(
     readers: Sequence[Reader],
     stages: Sequence[StageResult],
 ) -> tuple[EffectResult, ...]:
-    """Return the effects found, the largest first.
+    """Return the effects found, the largest log-likelihood gain first.
 
-    What drifts, or stands beside a remainder, may only imitate what is missing: the less credible
-    it is, the less sure. None is stated to be surer than the surest were right (`STATED_MOST`).
+    The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
+    of correct effects among the most probable ones.
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
@@ -149,14 +149,14 @@ def _estimate(
 ) -> ParameterEstimate:
     key, fit = effect.value_key(p), choice.fit
     value = fit.values[key]
-    # The formulas count noise and misfit, and not that a fit may end beside the best.
+    # The covariance includes noise and misfit, but not that the fit may stop off the optimum.
     low = value - UNDERSTATED * (value - fit.low[key])
     high = value + UNDERSTATED * (fit.high[key] - value)
-    if scatter > 0.0:  # the records meet a sample of it
+    if scatter > 0.0:  # sampling error of a random quantity
         low = max(value - math.hypot(value - low, 1.96 * scatter * value), p.low)
         high = value + math.hypot(high - value, 1.96 * scatter * value)
     twin = other_side(value, case.nominal.frame_rate) if p.folds else None
-    if twin is not None:  # the records do not say on which side of the fold it is
+    if twin is not None:  # aliased: the tone may lie on either side of the Nyquist frequency
         low, high = min(low, twin - (value - low)), max(high, twin + (high - value))
     ends = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
     filed = float(p.nominal(case.nominal, case.control))
@@ -179,7 +179,10 @@ def _estimate(
 
 
 def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
-    """Return the relative standard error of an effect's number from what the records meet of it."""
+    """Return the relative sampling error of an effect's parameter over all records.
+
+    It is zero unless the parameter describes a random quantity.
+    """
     one: Callable[[Record, float], float] | None = effect.sample_error
     if one is None:
         return 0.0

@@ -1,19 +1,17 @@
-"""The budget of a gap: how much of a stage's residual each effect found explains, and what is left.
+"""The budget of a gap: the share of a stage's residual power that each effect explains.
 
-A stage's power is the mean square of its residuals over all of the records, in floors, with the
-settings as they were found and no effect. Each effect's share is what it takes off, on the mean
-over all orders in which the effects could be added (Shapley 1953): with one effect, what leaving
-it out brings back. What all of them leave is noise, as far as noise can be that large, and a
-structure that is not explained. The shares sum to 1.
+The power is the mean square of the stage's residuals over all records, in units of the noise
+floor squared, with the fitted nuisance parameters and without effects. The share of an effect is
+the power that adding it removes, averaged over all orders of adding the effects (Shapley 1953).
+The power that remains with all effects is noise, up to the noise floor, and unexplained structure.
+The shares sum to 1.
 
-Noise is that of the residual without any effect, one floor². An effect may raise the floor: the
-air's motion is found with an error, and a contact that yields lets the force's noise pass. By so
-much more it leaves, and that is of its own power, not the rig's noise.
+Noise counts as one floor², that of the filed rig. If an effect raises the noise floor (for example
+because presliding friction transmits the force's noise), the increase counts to the effects.
 
-A few numbers hardly fit thousands of frames' noise, and what happens rarely, as a limit that is met
-twice, lies unevenly in two halves of a record: so all of it counts, not what was held out alone.
-The intervals come from drawing its stretches anew (the bootstrap of `shrink`): they say how far
-another such record's budget would differ.
+All stretches are used, not only those held out: few parameters hardly fit the noise of thousands
+of frames, and a rare event is unevenly divided between two halves of a record. The intervals are
+from a bootstrap over stretches: they include the scatter between records, not the fit's error.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ UNEXPLAINED, NOISE = "unexplained", "noise"
 
 @dataclass(frozen=True)
 class Share:
-    """A share of a stage's residual power, with its 95 % interval. Below 0: it adds to the gap."""
+    """A share of a stage's residual power, with its 95 % interval; negative if it adds power."""
 
     name: str
     value: float
@@ -49,7 +47,7 @@ class Share:
 
 @dataclass(frozen=True)
 class StageBudget:
-    """The shares of a guilty stage: of each effect, of unexplained structure, of noise; sum 1."""
+    """The shares of a faulty stage: of each effect, of unexplained structure, of noise; sum 1."""
 
     stage: str
     effects: tuple[Share, ...]
@@ -58,17 +56,17 @@ class StageBudget:
 
     @property
     def shares(self) -> tuple[Share, ...]:
-        """All of them."""
+        """The shares of the effects, of unexplained structure and of noise."""
         return (*self.effects, self.unexplained, self.noise)
 
     @property
     def remains(self) -> float:
-        """The share of the gap, noise apart, that no effect explains, 0 to 1."""
+        """The share of the power without noise that no effect explains, 0 to 1."""
         gap = 1.0 - self.noise.value
         return min(max(self.unexplained.value / gap, 0.0), 1.0) if gap > 0.0 else 0.0
 
     def of(self, effect: str) -> float:
-        """Return the share of the gap, noise apart, that an effect explains."""
+        """Return the share of the power without noise that an effect explains."""
         gap = 1.0 - self.noise.value
         found = next((share.value for share in self.effects if share.name == effect), 0.0)
         return found / gap if gap > 0.0 else 0.0
@@ -85,9 +83,9 @@ class StageBudget:
 def stage_budget(
     stage: str, case: Case, settled: Fit, found: Fit, floors: Mapping[tuple[int, str], float]
 ) -> StageBudget | None:
-    """Return a stage's budget; None where no output of its own or its neighbours' judges it.
+    """Return a stage's budget; None if neither it nor its neighbours have an output.
 
-    `floors` are those of the improved rig by record and channel, where they are higher.
+    `floors` are the noise floors of the improved rig by record and channel, where they are higher.
     """
     outputs = _outputs(stage, case.outputs, settled, found)
     if not outputs:
@@ -109,10 +107,9 @@ def stage_budget(
 
 
 def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) -> list[Output]:
-    """Return the outputs whose power is shared out: those that show a gap.
+    """Return the stage's outputs with a gap, or the one with the largest if none has.
 
-    They are the stage's own; of a stage without any, those of its neighbours in which its effects
-    show: what else is wrong with a neighbour is no part of it.
+    For a stage without outputs they are those of the stages in which its effects show.
     """
     shown = {at for e in found.effects if e.stage == stage for at in e.shows_in}
     own = [output for output in outputs if output.stage in STAGE_OF[stage].outputs]
@@ -123,7 +120,7 @@ def _outputs(stage: str, outputs: Sequence[Output], settled: Fit, found: Fit) ->
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Sums of squares, floors², by subset of the effects and stretch; and a stretch's frames."""
+    """Sums of squares, floors², by subset of the effects and stretch, and frames by stretch."""
 
     sums: Floats  # (subsets, stretches)
     frames: Floats  # (stretches,)
@@ -132,7 +129,7 @@ class _Blocks:
 def _powers(
     outputs: Sequence[Output], case: Case, found: Fit, players: Sequence[Effect]
 ) -> _Blocks:
-    """Return the power that each subset of the effects leaves; subset 0 has none of them."""
+    """Return the residual power with each subset of the effects; subset 0 is empty."""
     frames: list[float] = []
     sums: list[list[float]] = []
     for subset in range(2 ** len(players)):
@@ -149,21 +146,21 @@ def _powers(
 
 
 class _Weights:
-    """Shapley's weights of each subset's power in each effect's share."""
+    """Shapley weights of each subset's power in each effect's share."""
 
     def __init__(self, players: Sequence[Effect]) -> None:
         self._of = shapley_weights(len(players))
 
     def shares(self, blocks: _Blocks, noise: Floats, pick: NDArray[np.intp]) -> Floats:
-        """Return the shares of the effects, of what is not explained, and of noise; they sum to 1.
+        """Return the shares of the effects, of unexplained structure and of noise; sum 1.
 
-        `noise` is the power that noise alone leaves with the effects on each stretch, floors².
+        `noise` is the power of noise on each stretch with the effects, floors².
         """
         frames = blocks.frames[pick]
         power = blocks.sums[:, pick].sum(axis=1) / frames.sum()
         floor = min(float(noise[pick] @ frames / frames.sum()), float(power[-1]))
         named = self._of @ power
-        if power[0] <= 0.0:  # stretches without any residual: nothing but noise, of size zero
+        if power[0] <= 0.0:  # no residual at all
             return np.array([*(0.0 * named), 0.0, 1.0])
         own, taken = min(floor, 1.0), float(named.sum())
         if taken > 0.0:

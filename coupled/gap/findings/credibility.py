@@ -1,24 +1,19 @@
-"""Whether an effect found is the cause, or only imitates it.
+"""Whether an effect found is the cause of the residual, or only imitates the cause.
 
-A cause has the same size everywhere; what imitates another cause drifts from regime to regime
-(invariant causal prediction: Peters, Bühlmann and Meinshausen, J. R. Statist. Soc. B 78, 2016). An
-effect's size is taken apart in halves of the records that hold as much of its action each: small
-and large force, slow and fast motion, fore and aft, low and high q̄, early and late, and record by
-record. The action is what the residual is more without the effect; the size in a half is what
-part of the action is there, 1 where it is as large as everywhere.
+1. Stationarity. A cause has the same size in all regimes; an imitation has not (invariant causal
+   prediction: Peters, Bühlmann and Meinshausen, J. R. Statist. Soc. B 78, 2016). The size is
+   estimated in halves of the records by force, rate, direction, q̄ and time, and in each record.
+   Each half holds half of the power of the effect's contribution to the residual.
+2. Comparison with a nonparametric model of the stage's own signals (`flexible`), if a residual
+   remains. `beside_flexible` is the share of the model's residual that adding the effect removes.
+   If the model can represent the effect, this share is small for correct and wrong effects alike.
+   Then `against_flexible` decides: a correct effect, with one parameter, leaves no more than the
+   model with a hundred. Both are omitted for effects from outside the stage, such as gusts.
+3. Two friction laws found together that put the friction below its filed value fit an arbitrary
+   curve over speed (`part_of_a_curve`).
 
-And it is held beside a model free in form of the stage's own signals (`flexible`): the share of
-what that leaves without the effect, that it does not leave with it. A law that such a model takes
-up as well says nothing beside it, be it right or wrong: a bend is a function of the force. Then it
-is held against that model: one number that leaves no more than a hundred free ones is the law, and
-what imitates another leaves more. What comes from outside, as a gust, is no law of those signals,
-and is not held so.
-
-A friction that is nowhere above the filed one is, with a damping beside it, a mere curve of the
-speed (`part_of_a_curve`). Drift counts whatever remains, and that a size is hardly known where much
-does; the free model by how surely more remains than noise and the right
-physics may leave, and how much of the gap that is (`remainder`). Both go into one
-smooth number, and that into the probability.
+Tests 1 and 2 weigh more the more residual power remains (`remainder`). The result is one smooth
+number that scales the effect's probability.
 """
 
 from __future__ import annotations
@@ -47,18 +42,18 @@ from coupled.gap.thresholds import (
 )
 from coupled.record.record import Record
 
-LAW_OF_SPEED = Signature("speed", "missing")  # how a force by the speed is drawn
+LAW_OF_SPEED = Signature("speed", "missing")  # signature of a force that depends on speed
 
 
 @dataclass(frozen=True)
 class Credibility:
-    """Whether an effect is as large everywhere, and what of it a free model would not take.
+    """Results of the tests of one effect.
 
-    `remainder` is how much what remains says against it, 0 to 1 (`remainder`); `beside_flexible`
-    and `against_flexible`, what the free model leaves alone over what the effects do, are None
-    where next to nothing does. In a stage that is `exact` an effect drifts by less, and leaves
-    nothing: what a host works out of q̄ has no noise of its own. `curve` is how surely it is part of
-    a mere curve of the speed (`part_of_a_curve`).
+    `remainder` is the weight of the residual that remains, 0 to 1 (`remainder`). `beside_flexible`
+    and `against_flexible` (residual power of the nonparametric model over that with the effects)
+    are None if hardly any residual remains. `exact`: the stage is computed by the host without
+    noise, so the limit of the drift is lower and no residual may remain. `curve` is the
+    probability that the effect is part of an arbitrary curve over speed (`part_of_a_curve`).
     """
 
     effect: str
@@ -71,35 +66,33 @@ class Credibility:
 
     @property
     def drift(self) -> float:
-        """How far the sizes of any two halves surely are apart, over the size.
+        """The largest significant difference of the sizes in two halves, relative to the size.
 
-        That is beyond what chance does to any of the halves that were looked at (Bonferroni), in
-        `DRIFT_CHANCE` of all effects, where the effect leaves nothing: nearly all such are right,
-        and it takes more to doubt one. Of those that leave much few are right, and what chance
-        might do is enough.
+        The significance level is `DRIFT_CHANCE` over the number of pairs (Bonferroni) if the
+        effects leave no residual, since nearly all such effects are correct. It rises to 1 with
+        the residual that remains.
         """
         chance = (DRIFT_CHANCE / max(len(self.regimes), 1)) ** (1.0 - self.remainder)
         return max((one.apart(chance) for one in self.regimes), default=0.0)
 
     @property
     def p_value(self) -> float:
-        """The least of the halves' p-values, by as many as were looked at (Bonferroni)."""
+        """The least p-value of all pairs of halves, corrected for their number (Bonferroni)."""
         least = min((one.p_value for one in self.regimes), default=1.0)
         return min(1.0, least * len(self.regimes))
 
     @property
     def unproven(self) -> float:
-        """How far the sizes of halves may be apart, where what remains says that they might be.
+        """The standard error of the best known difference, weighted by the remaining residual.
 
-        By the halves that are known best: a size that none of them says to a quarter is not shown
-        to be the same.
+        If it is large, the records do not show that the size is the same in all regimes.
         """
         errors = (math.hypot(one.low_error, one.high_error) for one in self.regimes)
         return self.remainder * min(errors, default=0.0)
 
     @property
     def value(self) -> float:
-        """A number from 1, as large everywhere and no function of a signal, to 0; smooth."""
+        """The credibility: 1 for a stationary size that the signals do not replace, down to 0."""
         same = 1.0 / (1.0 + (self.drift / (HOST_DRIFT if self.exact else DRIFT)) ** 4)
         same *= (1.0 - self.curve) / (1.0 + (self.unproven / UNPROVEN) ** 4)
         if self.exact:
@@ -122,12 +115,12 @@ class Credibility:
 
 
 def remainder(gap: float, left: float, explained_below: float) -> float:
-    """Return how much what remains of a stage says against the effects found, 0 to 1.
+    """Return the weight of a stage's remaining residual as evidence against its effects, 0 to 1.
 
-    `gap` is that without them, `left` that with them, `explained_below` the one up to which a stage
-    is explained. How surely more is left than noise and the right physics may leave, by the power
-    beyond the floor's and one half there; and how much that is of the gap: what takes nearly all of
-    a wide one seldom imitates.
+    `gap` is the gap without effects, `left` that with them, `explained_below` the largest gap of
+    an explained stage. The weight grows with the excess of `left` over `explained_below`, and with
+    the share of the gap that remains: effects that remove nearly all of a large gap are usually
+    correct.
     """
     more, known = max(left**2 - 1.0, 0.0), explained_below**2 - 1.0
     surely = more**4 / (more**4 + known**4)
@@ -138,7 +131,7 @@ def remainder(gap: float, left: float, explained_below: float) -> float:
 def credibility(
     effect: Effect, case: Case, found: Fit, records: Sequence[Record], remains: float
 ) -> Credibility:
-    """Return an effect's credibility, beside what `remains` of its stages (`remainder`)."""
+    """Return an effect's credibility; `remains` is the weight of the residual (`remainder`)."""
     without = case.with_only(found, [other for other in found.effects if other is not effect])
     acts = []
     for output in touched(case.outputs, [effect]):
@@ -157,11 +150,11 @@ def credibility(
 
 
 def part_of_a_curve(effect: Effect, case: Case, found: Fit) -> float:
-    """Return how surely an effect is part of a mere curve of the speed, 0 to 1.
+    """Return the probability that an effect is part of an arbitrary curve over speed, 0 to 1.
 
-    A friction that fades with speed and a damping are together any curve of it, in four numbers.
-    They are a breakaway where that stands above the friction that is filed. Where friction is
-    below that at any speed, they draw what another law of the speed does.
+    Stribeck friction and damping together have four parameters and fit almost any curve. They are
+    a breakaway only if the fitted friction exceeds the filed one. A fitted friction below the
+    filed one at all speeds imitates another law.
     """
     by_speed = [one for one in found.effects if one.free and one.signature == LAW_OF_SPEED]
     if effect not in by_speed or len(by_speed) < 2:
@@ -171,7 +164,7 @@ def part_of_a_curve(effect: Effect, case: Case, found: Fit) -> float:
 
 
 def _surely_below(case: Case, found: Fit, law: Effect, breakaway: Parameter) -> float:
-    """Return how surely a law's friction is below what is filed, at rest and in motion."""
+    """Return the probability that the fitted friction is below the filed one at all speeds."""
     assert breakaway.above
     sure = 1.0
     filed = max(
@@ -187,9 +180,10 @@ def _surely_below(case: Case, found: Fit, law: Effect, breakaway: Parameter) -> 
 
 
 def _flexible(case: Case, found: Fit, one: Acts) -> tuple[float, float]:
-    """Return the share of what a free model leaves without the effect, that it takes beside it.
+    """Return `beside_flexible` and `against_flexible` of an effect in one output.
 
-    And what that model leaves, over what the effects leave without it.
+    These are the share of the nonparametric model's residual power that the effect removes, and
+    that residual power, without the effect, over the power that the effects leave.
     """
     known = signals(one.output.stage, one.record, case.control, one.output.frame_rate_Hz)
     answers = response(one.output, found.rig, one.record, case.control)

@@ -1,4 +1,4 @@
-"""A diagnosis, whole: what was found, the improved rig, and what is computed when asked for."""
+"""The result of a diagnosis, with figures that are computed on first use."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
-CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
+CIRCLED = "The search stopped because it returned to an earlier set of effects."
 
 
 @dataclass(frozen=True)
 class Diagnosis(Findings):
-    """What records say of a rig, with the rig that has the effects found (`improved`).
+    """The findings of a diagnosis, and the rig with the effects found (`improved`).
 
-    The flight again, the next test and the power are computed when they are first asked for:
-    each flies the rig, and takes as long as the diagnosis or longer.
+    `closed_loop`, `in_flight`, `next_tests` and `power` are computed on first use: each simulates
+    the rig and takes as long as the diagnosis or longer.
     """
 
     control: ControlName
@@ -43,33 +43,33 @@ class Diagnosis(Findings):
     outputs: tuple[Output, ...] = field(repr=False, compare=False)
     choice: Choice = field(repr=False, compare=False)
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
-    # Channels whose logs were filtered, and where their floors come from.
+    # Channels whose logs were filtered, and the source of their noise floors.
     filtered: Mapping[str, str] = field(default_factory=dict)
-    # What of live records is not judged, or not as it was recorded; a sentence each.
+    # What of live records is not judged, or judged with changes; a sentence each.
     left_out: tuple[str, ...] = ()
-    # What of the trim was taken from the records or their manifests, in words; empty for nothing.
+    # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
 
     @property
     def first(self) -> Record:
-        """The first of the records, by which the flight again and the next test are made."""
+        """The first record, with which flights and next tests are computed."""
         return next(iter(self.records.values()))
 
     @cached_property
     def closed_loop(self) -> tuple[ChannelAgain, ...] | None:
-        """How far both rigs, flown with the record's force, stay from it; None without effects."""
+        """RMS differences from the record of both rigs flown with its force; None if no effect."""
         if not self.choice.steps:
             return None
         return closed_loop(self.nominal, self.improved, self.control, self.first, self._again)
 
     @cached_property
     def _again(self) -> Again | None:
-        """The pilot of the first record."""
+        """The simulation with the first record's force."""
         return Again.of(self.nominal, self.control, self.first)
 
     @cached_property
     def in_flight(self) -> tuple[EffectInFlight, ...] | None:
-        """What each effect does to the flight, the largest first; None without flight or effect."""
+        """The change of the flight by each effect, largest first; None without flight or effect."""
         if not self.choice.steps or self._again is None:
             return None
         case = Case(self.nominal, self.control, self.outputs)
@@ -77,17 +77,17 @@ class Diagnosis(Findings):
 
     @property
     def improves(self) -> bool:
-        """Whether the improved rig flies no further from the record than the one as filed."""
+        """Whether the improved rig's flight is no further from the record than the filed rig's."""
         return self.closed_loop is None or nearer(self.closed_loop)
 
     @cached_property
     def next_tests(self) -> tuple[ProposedTest, ...]:
-        """The tests that would separate the first rivals, the best first; empty without rivals."""
+        """The tests that would discriminate the first alternatives, best first; empty if none."""
         return next_tests(self.nominal, self.first, self.control, self.choice)
 
     @property
     def next_test(self) -> str:
-        """What to record next, in a sentence; empty where nothing would help."""
+        """What to record next, in a sentence; empty if no record would help."""
         lacking = [
             worth_recording(self.nominal, self.control, stage.name, stage.missing)
             for stage in self.stages
@@ -97,12 +97,12 @@ class Diagnosis(Findings):
 
     @cached_property
     def power(self) -> tuple[EffectPower, ...]:
-        """The least size of each effect that the records would have shown."""
+        """The smallest size of each effect that would have been detected."""
         return power(self.choice.settled.rig, self.control, self.outputs)
 
     @cached_property
     def summary(self) -> str:
-        """What is wrong, how large, how sure, how much it explains, and what to record next."""
+        """The faults, their sizes, probabilities and shares of the gap, and what to record next."""
         flight = "" if self.in_flight is None else in_words(self.in_flight)
         filtered = filtered_words(self.filtered)
         missed = self.baseline is not None and self.baseline.missed

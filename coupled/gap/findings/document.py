@@ -1,6 +1,6 @@
 """A diagnosis read back from its JSON: the keys that other parts of the package use, checked.
 
-Other keys may stand beside them (docs/diagnosis.md).
+Other keys are ignored (docs/diagnosis.md).
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from coupled.files import check_format
 from coupled.gap.findings.result import FORMAT
 from coupled.schema import Lenient, quantity, read_as
 
-# `refused` and `failed` stand in the file of a record that could not be diagnosed.
+# `refused` and `failed` are verdicts of records that could not be diagnosed.
 AnyVerdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained", "refused", "failed"]
 
 
 class KeptParameter(Lenient):
-    """A parameter of an effect, SI; an end of its 95 % interval is None where it is open."""
+    """A parameter of an effect, SI; a bound of its 95 % interval is None if it is open."""
 
     value: float | None = None
     low: float | None = None
@@ -40,13 +40,13 @@ class KeptStage(Lenient):
 
 
 class KeptShrink(Lenient):
-    """By how much the effects found shrink the gap."""
+    """The reduction of the gap by the effects found."""
 
     closed: float | None = None
 
 
 class KeptMade(Lenient):
-    """What made the diagnosis."""
+    """The inputs of the diagnosis."""
 
     rig: str | None = None
 
@@ -67,6 +67,6 @@ class KeptDiagnosis(Lenient):
 def diagnosis_from(table: Any, file: object) -> KeptDiagnosis:
     """Return the diagnosis that a JSON file holds. Raises InputError, naming file and key."""
     if not isinstance(table, dict):
-        raise InputError(file, "", "is no diagnosis as coupled diagnose writes it")
+        raise InputError(file, "", "is not a diagnosis written by coupled diagnose")
     check_format(table.get("format"), FORMAT, file, "diagnosis")
     return read_as(KeptDiagnosis, table, file)

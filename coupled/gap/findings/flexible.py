@@ -1,9 +1,9 @@
-"""What a model that is free in form could still take of a stage's residual.
+"""Nonparametric models of a stage's residual.
 
-The effects of the library are physics, each with a number or two. Where they leave structure, ridge
-regressions say whether the stage's own signals could explain it: a function of one of them, with
-bends at its quantiles, lagged copies, and as the stage answers to it; or of all, with products of
-two. Each is fitted on every other stretch and held against those between, so noise is not taken.
+Where the effects leave a residual, ridge regressions show whether the stage's own signals predict
+it: piecewise linear functions of one signal, with knots at its quantiles, lagged copies, the same
+filtered by the stage's response, or all signals with their pairwise products. The models are
+fitted on every other stretch and compared on the stretches between.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ ALL = "all"
 def free_share(
     output: Output, left: Floats, signals: Mapping[str, Floats], response: Response | None = None
 ) -> tuple[float, str]:
-    """Return the share of a residual's power that a free model takes, 0 to 1, and of which signal.
+    """Return the share of a residual's power that the best model predicts, 0 to 1, and its signal.
 
-    `left` is the residual in floors, shape (frames,), as each signal. `response` is the digital
-    filter by which the stage answers to what acts inside it. The share is counted on held-out
-    stretches; the signal is `ALL` where it takes more than one.
+    `left` is the residual in noise floors, shape (frames,), as each signal. `response` is the
+    digital filter from a force inside the stage to its output. The share is that on held-out
+    stretches; the signal is `ALL` for a model of all signals.
     """
     plain = {name: (s - s.mean()) / s.std() for name, s in signals.items() if s.std() > 0.0}
     each = {name: _functions(signal, output.frame_rate_Hz) for name, signal in plain.items()}
@@ -45,7 +45,7 @@ def free_share(
 
 
 def _functions(signal: Floats, rate_Hz: float) -> Floats:
-    """Return the functions of a signal that a model may use, shape (frames, functions)."""
+    """Return a model's functions of one signal, shape (frames, functions)."""
     found = [signal, *(np.maximum(signal - bend, 0.0) for bend in np.quantile(signal, BENDS))]
     for lag_s in LAGS_s:
         share = -np.expm1(-1.0 / (lag_s * rate_Hz))
@@ -54,10 +54,10 @@ def _functions(signal: Floats, rate_Hz: float) -> Floats:
 
 
 def _taken(output: Output, left: Floats, columns: Floats) -> float:
-    """Return the share of the residual's power that functions take of stretches not fitted to.
+    """Return the share of the residual's power that the functions predict on held-out stretches.
 
-    How strong the ridge is, these decide: a residual remembers, and cross-validation by single
-    frames would take that for structure.
+    The held-out stretches also select the ridge parameter. The residual is autocorrelated, so
+    cross-validation by single frames would overfit.
     """
     fitted = output.rows("fitted")
     remains = np.zeros(len(RIDGES))

@@ -1,4 +1,4 @@
-"""Flying a rig with the pilot of a record, and making the record of a test not flown yet."""
+"""Simulated flights with the force of a record, or with that of a proposed test."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ LATERAL = ("roll_rate_rad_per_s", "yaw_rate_rad_per_s")
 
 @dataclass(frozen=True)
 class ChannelAgain:
-    """How far two flights with the record's pilot stay from it, rms in the channel's unit.
+    """RMS differences of two flights from the record whose force they use, in the channel's unit.
 
-    `before` with the rig as filed, `after` with the improved one; the seconds compared where one
-    of the flights ended early.
+    `before` is with the filed rig, `after` with the improved rig. The seconds compared are given
+    if one of the flights ended early.
     """
 
     channel: str
@@ -51,20 +51,20 @@ class ChannelAgain:
 
 
 def nearer(channels: Sequence[ChannelAgain]) -> bool:
-    """Tell whether the improved rig flies no further from the record, on the geometric mean."""
+    """Tell whether `after` is no larger than `before`, by the geometric mean over channels."""
     ratios = [one.after / one.before for one in channels if one.before > 0.0]
     return not ratios or float(np.mean(np.log(np.maximum(ratios, 1e-12)))) <= SAME_FLIGHT
 
 
 class Recorded(Pilot):
-    """Repeats a force, N, given at times in s."""
+    """Applies a recorded force, N, at times in s."""
 
     kind: Literal["recorded"] = "recorded"
     times: list[float]
     forces: list[float]
 
     def act(self, rig: Rig, control: ControlName, start: Start) -> Action:
-        """Return the recorded force, straight between its samples."""
+        """Return the recorded force, interpolated linearly between its samples."""
         times, forces = np.array(self.times), np.array(self.forces)
         return Action(force=lambda t: np.interp(t, times, forces))
 
@@ -78,7 +78,7 @@ def fly_force(
 ) -> Record:
     """Return the record of a rig under forces given at each frame, shape (frames,) each.
 
-    `pressure_Pa` is the q̄ of a bench, at each frame; `air_m_per_s` how fast the air rises.
+    `pressure_Pa` is the q̄ of a bench, `air_m_per_s` the vertical speed of the air, both by frame.
     """
     frames = len(next(iter(forces_N.values())))
     times = np.arange(frames) / rig.frame_rate
@@ -100,7 +100,7 @@ def fly_force(
 
 @dataclass
 class Again:
-    """The pilot of a record, who flies any rig; what was flown is remembered.
+    """Flies rigs with the force of a record, and caches their flights.
 
     `pulled` are the forces on each control, N, and `pressure` a bench's q̄, Pa, at each frame.
     """
@@ -112,7 +112,7 @@ class Again:
 
     @classmethod
     def of(cls, nominal: Rig, control: ControlName, record: Record) -> Again | None:
-        """Return the pilot; None where the record lacks the control's force, or a bench's q̄."""
+        """Return the simulation; None if the record lacks the control's force, or a bench's q̄."""
         pressure = "dynamic_pressure_Pa"
         forces = {name: channel(name, "force") for name in nominal.controls}
         pulled = {n: smoothed(record[force]) for n, force in forces.items() if force in record}
@@ -121,7 +121,7 @@ class Again:
         return cls(record, pulled, smoothed(record[pressure]) if pressure in record else None)
 
     def fly(self, rig: Rig) -> Record | None:
-        """Return a rig's flight without noise; None where it cannot be flown so."""
+        """Return a rig's flight without noise; None if it cannot be flown."""
         quiet = rig.changed({"noise": {}})
         for known, flown in self._flown:
             if known == quiet:
@@ -140,10 +140,10 @@ class Again:
 def closed_loop(
     nominal: Rig, improved: Rig, control: ControlName, record: Record, again: Again | None = None
 ) -> tuple[ChannelAgain, ...] | None:
-    """Return how far the flights of both rigs, with the record's pilot, stay from the record.
+    """Return the RMS differences from the record of both rigs, flown with its force.
 
-    `again` is that pilot, where there is one. None where the record lacks the force, or a bench's
-    q̄, or where the rig cannot be flown so.
+    `again` is the simulation, if it exists already. None if the record lacks the force or a
+    bench's q̄, or if a rig cannot be flown.
     """
     if nominal.controls[control].drive != "force":
         return None
@@ -163,20 +163,20 @@ def closed_loop(
 
 
 def _felt(force: Floats) -> Floats:
-    """Return a force without what is too small for a rig's data, which take it for a slip."""
+    """Return a force with values below the smallest that a rig file accepts set to zero."""
     return np.where(np.abs(force) < SMALLEST, 0.0, force)
 
 
 @dataclass(frozen=True)
 class _Differences:
-    """rms differences of a flight from a record by channel, and how long both last."""
+    """RMS differences of a flight from a record by channel, over the seconds that both last."""
 
     rms: Mapping[str, float]
     seconds: float
 
 
 def _differences(again: Again, rig: Rig, names: Sequence[str]) -> _Differences | None:
-    """Return how far a rig's flight stays from a record; None where it cannot be flown so."""
+    """Return the differences of a rig's flight from a record; None if it cannot be flown."""
     flown, record = again.fly(rig), again.record
     if flown is None:
         return None

@@ -1,13 +1,12 @@
-"""The machine when it was well: what of a gap was always there, and is no fault.
+"""Records of the healthy machine as a reference, which separates model error from faults.
 
-A nominal rig never describes a machine fully. Records of the machine when it was well are
-diagnosed first: with the effects found in them, the rig is what the machine was. What that leaves
-of them is the model's own error; a channel's floor is then that error beside the noise, and how far
-it scatters from record to record says what may be left of a machine that is as it was. That error
-is no noise: a stage whose floor it raises to over a tenth of what the stage does is not judged, and
-the rig is to be fitted to the healthy records first. An effect
-found then may only imitate what the model lacks, and be of another size in another record: how far
-its number scatters is its tolerance.
+A nominal rig never describes a machine fully. Records of the healthy machine are therefore
+diagnosed first, and the rig with their effects becomes the nominal rig. Its remaining residual is
+the model error. It is added to each channel's noise floor, with its scatter between records. If
+the model error raises a stage's floor above a tenth of the stage's motion, the stage is not judged
+and the rig should first be fitted to the healthy records. An effect of the healthy machine may
+imitate a model error whose size differs between records; the scatter of its parameter is therefore
+the parameter's tolerance.
 """
 
 from __future__ import annotations
@@ -33,12 +32,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModelError:
-    """What a rig leaves of a channel of the healthy machine beside noise.
+    """The model error of one channel: its residual on the healthy machine, without noise.
 
-    `rms` and `moves`, the channel's standard deviation, are in its unit, `rate` that of its change
-    from frame to frame. `by_stretch` and `by_record` are relative standard deviations of the rms:
-    of one stretch, and of one record. `misses` is by how many times its noise the rig misses a
-    record at most, and 0 where no record shows more than noise.
+    `rms` and `moves`, the channel's standard deviation, are in its unit; `rate` is the standard
+    deviation of its change per frame. `by_stretch` and `by_record` are relative standard
+    deviations of the rms between stretches and between records. `misses` is the largest gap of a
+    record; 0 if no record has a gap beyond noise.
     """
 
     rms: float
@@ -50,7 +49,7 @@ class ModelError:
 
     @classmethod
     def of(cls, outputs: Sequence[Output], rig: Rig) -> ModelError:
-        """Return the error of the outputs of one channel, one a record."""
+        """Return the model error of one channel from its outputs, one for each record."""
         lefts = [output.residual(rig) * output.floor for output in outputs]
         power = float(np.mean(np.concatenate(lefts) ** 2))
         noise = float(np.mean([output.floor**2 for output in outputs]))
@@ -59,7 +58,7 @@ class ModelError:
             [_by_stretch(o, left) for o, left in zip(outputs, lefts, strict=True)]
         )
         few = HEALTHY_ALONE / math.sqrt(len(each))
-        several = len(each) > 1 and power > 0.0  # a channel of the host's own may leave nothing
+        several = len(each) > 1 and power > 0.0  # a channel computed by the host may have none
         scatter = float(np.std(each, ddof=1) / np.mean(each)) if several else 0.0
         return cls(
             rms=math.sqrt(max(power - noise, 0.0)),
@@ -71,10 +70,10 @@ class ModelError:
         )
 
     def raised(self, output: Output) -> Output:
-        """Return an output whose floor holds the model's error too.
+        """Return an output with the model error added to its noise floor.
 
-        Of a larger or faster motion than the healthy machine's, the error is taken to be larger
-        as much.
+        The error is scaled up by how much larger or faster the motion is than in the healthy
+        records.
         """
         larger = max(1.0, float(np.std(output.measured)) / max(self.moves, 1e-300))
         larger = max(larger, _rate(output) / max(self.rate, 1e-300))
@@ -97,15 +96,15 @@ class ModelError:
 
 
 def _rate(output: Output) -> float:
-    """Return the standard deviation of a channel's change from frame to frame, noise taken off."""
+    """Return the standard deviation of a smoothed channel's change per frame."""
     return float(np.std(np.diff(smoothed(output.measured))))
 
 
 def tolerances(case: Case, found: Fit) -> dict[str, float]:
-    """Return how far the numbers of the effects found scatter, by their keys, in their units.
+    """Return the tolerances of the fitted parameters by key, in the keys' units.
 
-    From record to record; of a single record, from half to half, and no less than a share of what
-    the effect changed, since both halves are of one motion.
+    They are `HEALTHY_SIGMAS` standard deviations between records. For a single record they are
+    those between its halves, and at least a share of the effect, as both halves have one motion.
     """
     numbers = sorted({output.record for output in case.outputs})
     if len(numbers) > 1:
@@ -131,14 +130,14 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
 
 
 def _by_stretch(output: Output, left: Floats) -> Floats:
-    """Return the mean square of a residual on each stretch."""
+    """Return the mean square of a residual by stretch."""
     number = output.stretches
     return np.array([float(np.mean(left[number == n] ** 2)) for n in np.unique(number)])
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """The machine when it was well: its rig, what was found in it, and the model's errors.
+    """The healthy machine: its rig, the effects found in it, and the model errors.
 
     `files` are the records, `effects` the effects found in them, `errors` by channel.
     """
@@ -150,7 +149,7 @@ class Baseline:
 
     @classmethod
     def of(cls, files: Sequence[str], case: Case, found: Fit) -> Baseline:
-        """Return the baseline that records of the healthy machine give, by what fits them."""
+        """Return the reference from records of the healthy machine and the fit to them."""
         wide = {**found.rig.controls[case.control].tolerance, **tolerances(case, found)}
         rig = found.rig.changed({f"controls.{case.control}.tolerance": wide})
         effects = tuple(effect.name for effect in found.effects)
@@ -160,7 +159,7 @@ class Baseline:
         return cls(tuple(files), rig, effects, errors)
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
-        """Return outputs with the floors of the healthy machine, where it had the channel."""
+        """Return outputs with the model error in their noise floors, where it is known."""
         return [
             self.errors[one.channel].raised(one) if one.channel in self.errors else one
             for one in outputs
@@ -168,16 +167,16 @@ class Baseline:
 
     @property
     def missed(self) -> dict[str, ModelError]:
-        """The channels in which the rig misses the healthy records by more than noise."""
+        """The channels in which the reference misses the healthy records by more than noise."""
         return {name: one for name, one in self.errors.items() if one.misses}
 
     @property
     def words(self) -> str:
-        """What the records are held against."""
+        """What the reference is, and where it misses the healthy records."""
         count = f"{len(self.files)} records" if len(self.files) > 1 else "a record"
         found = ", ".join(name.replace("_", " ") for name in self.effects)
-        had = f", which had {found}" if found else ""
-        said = f"Held against the machine of {count} when it was well{had}."
+        had = f", with {found}" if found else ""
+        said = f"Compared with the healthy machine of {count}{had}."
         if not (missed := self.missed):
             return said
         each = ", ".join(
@@ -186,7 +185,7 @@ class Baseline:
         )
         them = "them" if len(self.files) > 1 else "it"
         return (
-            f"{said} The rig misses {them} in {each}: a smaller change does not show there."
+            f"{said} The rig misses {them} in {each}: smaller changes are not detected there."
             f" Fit the rig to {them} first (coupled fit)."
         )
 

@@ -1,9 +1,9 @@
-"""What each effect found does to the flight: the improved rig is flown with and without it.
+"""The change of the flight by each effect: the improved rig is flown with and without it.
 
-The pilot is the record's. A gap of a hundred floors in the loader may hardly move the aircraft,
-and one of two floors may. With the effects found, and without any, the two flights differ by some
-power of pitch rate, load factor and surface; each effect's share is what adding it takes off of
-that (`shapley`). With several, whoever fixes the rig fixes the largest first.
+All flights use the record's force. The size of a gap does not show its importance for the flight:
+a loader gap of 100 may hardly move the aircraft. With and without the effects, the flights differ
+in pitch rate, load factor and surface. Each effect's share of this difference is its Shapley value
+(`shapley`). The effect with the largest share should be corrected first.
 """
 
 from __future__ import annotations
@@ -35,13 +35,12 @@ RATES = {
 
 @dataclass(frozen=True)
 class EffectInFlight:
-    """What one effect does to the flight, by channel.
+    """The change of the flight by one effect, by channel.
 
-    `shares` are of the power by which the effects change the flight, and sum to 1 over all of
-    them; below 0, it works against the others. `changes` are rms differences that leaving it out
-    makes, in the channel's unit, `of_motion` the same over the rms of the channel's own motion,
-    with all effects or with none, whichever moves more.
-    `share` is over all channels, each power over that of the channel's motion.
+    `shares` are of the power of the change by all effects, and sum to 1; negative if the effect
+    counteracts the others. `changes` are the RMS differences if the effect is removed, in the
+    channel's unit. `of_motion` is the same over the RMS of the channel's motion, with all effects
+    or with none, whichever is larger. `share` is over all channels, each normalised by its motion.
     """
 
     name: str
@@ -52,7 +51,7 @@ class EffectInFlight:
 
     @property
     def shows(self) -> bool:
-        """Whether leaving it out changes any channel by what could matter."""
+        """Whether removing the effect changes any channel by at least `IN_FLIGHT_LEAST`."""
         return any(value >= IN_FLIGHT_LEAST for value in self.of_motion.values())
 
     def as_dict(self) -> dict[str, Any]:
@@ -69,9 +68,9 @@ class EffectInFlight:
 def in_flight(
     case: Case, found: Fit, control: ControlName, again: Again
 ) -> tuple[EffectInFlight, ...] | None:
-    """Return what each effect does to the flight, the largest first; None where none can be flown.
+    """Return the change of the flight by each effect, largest first; None if it cannot be flown.
 
-    A stamp that is late is in the record, not in the flight: it is taken off.
+    Time stamps of the recorder are set to zero, since they do not affect the flight.
     """
     if case.nominal.flight is None or not found.effects:
         return None
@@ -88,7 +87,7 @@ def in_flight(
     whole = np.array([flights[-1][name][:rows] for name in names])
     each = np.array([[flown[name][:rows] for name in names] for flown in flights])
     power = np.mean((each - whole) ** 2, axis=2)  # (subsets, channels)
-    # What an effect takes away whole is held against the motion that there was without it.
+    # An effect may suppress a motion, so the motion is the larger with or without effects.
     moved = np.mean((each - each[:, :, :1]) ** 2, axis=2)
     motion = np.sqrt(np.maximum(moved[0], moved[-1]))
     shares = shapley_weights(count) @ power
@@ -111,7 +110,7 @@ def in_flight(
 
 
 def _unstamped(rig: Rig, control: ControlName) -> Rig:
-    """Return a rig whose recorder stamps all channels in time."""
+    """Return a rig whose recorder stamps all channels without delay."""
     stamps = {"flight.motion_stamp_s": 0.0, f"controls.{control}.sensing.force_stamp_s": 0.0}
     late = rig.flight is not None and rig.flight.motion_stamp != 0.0
     late = late or rig.controls[control].sensing.force_stamp != 0.0
@@ -119,7 +118,7 @@ def _unstamped(rig: Rig, control: ControlName) -> Rig:
 
 
 def in_words(effects: Sequence[EffectInFlight]) -> str:
-    """Return in a sentence or two what the effects do to the flight, and which to fix first."""
+    """Return in words how the effects change the flight, and which to correct first."""
     shown = [effect for effect in effects if effect.shows]
     if not shown:
         return "In flight it hardly shows: no channel of the motion changes by 1 %."
@@ -129,7 +128,7 @@ def in_words(effects: Sequence[EffectInFlight]) -> str:
         return f"In flight it changes {_listed(parts)} of their rms."
     parts = [f"{e.name.replace('_', ' ')} {_per_cent(e.share)}" for e in effects]
     first = effects[0].name.replace("_", " ")
-    return f"Of what they do to the flight, {_listed(parts)}: fix {first} first."
+    return f"Shares of the change in flight: {_listed(parts)}. Correct {first} first."
 
 
 def _listed(parts: Sequence[str]) -> str:

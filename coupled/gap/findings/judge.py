@@ -1,4 +1,4 @@
-"""Which stages have a gap: by what is left of their outputs, and by the effects found."""
+"""Which stages are faulty, by the residuals of their outputs and by the effects found."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import MOST
 from coupled.rig.rig import Rig
 
-BY_LAWS = "the aircraft's laws move it, too; judged with the airframe"
+BY_LAWS = "control laws of the aircraft also move it; judged with the airframe"
 
 
 def _by_stage(gaps: Mapping[str, float]) -> dict[str, float]:
-    """Return the gaps of outputs by the stages that they judge, the widest of each."""
+    """Return the largest gap of each stage's outputs."""
     joined: dict[str, float] = {}
     for output, gap in gaps.items():
         name = stage_of(output)
@@ -32,8 +32,8 @@ def _by_stage(gaps: Mapping[str, float]) -> dict[str, float]:
 class Judge:
     """Judges the stages by their outputs. `last` are the outputs' gaps with the effects found.
 
-    An effect of `doubted` blames no stage that has no output of its own: it may stand for what is
-    wrong in the one where it shows.
+    A stage without an output of its own is not faulty by an effect in `doubted`, which may imitate
+    a fault of the stage in which it shows.
     """
 
     readers: Sequence[Reader]
@@ -51,8 +51,9 @@ class Judge:
     def blamed(self) -> set[str]:
         """The stages of the effects found.
 
-        One that shows in its neighbours alone is blamed where half of a gap there is closed. Where
-        it is doubted, the neighbour with the widest gap is.
+        The stage of an effect that shows only in other stages is included if the effect closes
+        half of a gap there. If the effect is in `doubted`, the stage with the largest gap is
+        included instead.
         """
         settled = stage_gaps(self.outputs, self.choice.settled.rig)
         found: set[str] = set()
@@ -66,7 +67,7 @@ class Judge:
         return found
 
     def stages(self) -> tuple[StageResult, ...]:
-        """Return the stages that the records have, in the order of the chain."""
+        """Return the stages of the rig, in the order of the chain."""
         before = _by_stage(stage_gaps(self.outputs, self.rig))
         settled = _by_stage(stage_gaps(self.outputs, self.choice.settled.rig))
         left, limits = _by_stage(self.last), _by_stage(stage_limits(self.outputs))
@@ -94,7 +95,7 @@ class Judge:
         return tuple(found)
 
     def _hidden(self, stage: str) -> Hides | None:
-        """Return what hides the least of a stage, where even that hides much; else None."""
+        """Return what hides a gap of the stage; None if one of its floors is low enough."""
         outputs = [output for output in self.outputs if output.stage == stage]
         known = [output.hides for output in outputs if output.hides is not None]
         least = min(known, key=lambda one: one.share, default=None)
@@ -112,10 +113,10 @@ class Judge:
         return shared
 
     def _sensing(self, before: Mapping[str, float]) -> StageResult:
-        """Return sensing: guilty where its effect was found, else not judged by itself.
+        """Return sensing: faulty if its effect was found, else not judged.
 
-        A wrong scale has no residual of its own: it shows in those of its neighbours at once,
-        and the widest of them is its gap.
+        A wrong sensor scale has no residual of its own, but shows in several other stages. The
+        largest of their gaps is its gap.
         """
         shown = dict.fromkeys(stage_of(o) for o in STAGE_OF["sensing"].effects_show_in)
         neighbours = tuple(name for name in shown if name in before)
@@ -126,7 +127,7 @@ class Judge:
         return StageResult("sensing", why=why, shown_in=tuple(shown))
 
     def _without_output(self, name: str) -> StageResult | None:
-        """Return a stage that no output judges, None where the rig has none of it."""
+        """Return a stage that no output judges; None if the rig does not have it."""
         flown = self.rig.flight is not None
         reader = self.readers[0]
         with_loader = reader.moved or reader.in_series
@@ -147,13 +148,13 @@ class Judge:
         return None
 
     def _with_where(self, found: StageResult) -> StageResult:
-        """Return a stage with where in it the gap lies, by the output where it is widest."""
+        """Return a faulty stage with the location of its gap, from the output with the largest."""
         stage = STAGE_OF[found.name]
         shown = stage.outputs or stage.effects_show_in
         ours = [output for output in self.outputs if output.stage in shown]
         if not found.guilty or not ours:
             return found
-        # Without what its settings explain, unless at the end of their tolerance they hide it.
+        # With fitted nuisance parameters, unless these hide the gap at their bounds.
         hidden = found.settled is not None and found.settled <= (found.limit or 0.0)
         rig = self.rig if hidden else self.choice.settled.rig
         widest = max(ours, key=lambda o: o.gap(rig))

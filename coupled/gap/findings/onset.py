@@ -1,10 +1,10 @@
-"""Since when a gap is there, by windows at the same excitation: amplitude is no onset.
+"""The onset and end of a gap, by comparison of windows with the same excitation.
 
-A gap that grows with the motion is quiet while the motion is small, and that is no onset. So a
-quiet window counts as evidence only by the loud ones that were excited no more than it, in every
-signal that drives the stage. If they are nearly all loud and it is not, something has changed in
-between. Under the hypothesis that excitation alone decides, the chance that all windows before are
-quiet is the product of (1 − q), q being the share that is loud of those excited no more.
+A gap that grows with the motion is small while the motion is small, which is no onset. So a quiet
+window is evidence only in comparison with the loud windows that were excited no more, in every
+signal that drives the stage. If nearly all of these are loud, something has changed in between.
+If excitation alone decided, all windows before would be quiet with probability Π(1 − q), where q
+is the loud share of the windows excited no more.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from coupled.gap.thresholds import ONSET_CHANCE, ONSET_LIKELY, WHERE_LOUD, WHERE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-DRIVES = 3  # signals, by which two windows are excited alike
+DRIVES = 3  # signals by which the excitation of two windows is compared
 
 
 @dataclass(frozen=True)
 class Span:
-    """A time in s from the record's start, and between which two it surely lies."""
+    """A time in s from the record's start, with its bounds."""
 
     at_s: float
     low_s: float
@@ -34,9 +34,9 @@ class Span:
 
 @dataclass(frozen=True)
 class InTime:
-    """When a residual is loud: in what share of the windows, from when on, and until when.
+    """The share of the windows in which a residual is loud, and its onset and end.
 
-    None where that is not sure: it may be as the excitation is.
+    Onset or end is None if the excitation can explain it.
     """
 
     loud: float
@@ -45,7 +45,7 @@ class InTime:
 
 
 def in_time(left: Floats, drives: Mapping[str, Floats], rate_Hz: float) -> InTime:
-    """Return when a residual in floors is loud; `drives` are the signals that excite its stage."""
+    """Return when a residual, in noise floors, is loud; `drives` are the stage's excitations."""
     frames = max(1, round(WHERE_WINDOW_s * rate_Hz))
     rms = _rms(left, frames)
     loud = rms > WHERE_LOUD
@@ -68,7 +68,7 @@ def _turned(span: Span, window_s: float) -> Span:
 
 
 def _begins(loud: Mask, excited: Floats) -> tuple[int, int, int] | None:
-    """Return the first loud window, and the windows between which it began; None if unsure."""
+    """Return the first loud window and the bounds of the onset, in windows; None if unsure."""
     first, last = int(np.argmax(loud)), len(loud) - int(np.argmax(loud[::-1]))
     chance, last_quiet = 0.0, 0
     for i in range(first):

@@ -1,9 +1,8 @@
-"""Power: how large each effect would have had to be for this record to show it.
+"""The power of the records: the smallest size of each effect that they would have shown.
 
-An effect shows where its signature, made orthogonal to those of the settings that may stand off
-by their tolerance, lifts a stage from its floor over its limit. The least such size is
-found by bisection. A setting that is off by less than its tolerance is no effect, however well
-the record shows it.
+An effect shows if its signature raises a stage from its noise floor to its limit. The signature is
+first made orthogonal to those of the nuisance parameters. The smallest size is found by bisection.
+A deviation within the tolerance of a nuisance parameter is no effect.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class EffectPower:
-    """The least size of an effect that the records would have shown.
+    """The smallest size of an effect that would have been detected.
 
-    `judged`: whether they judge its stage; `shows`: whether any size that it may have would show.
+    `judged`: its stage can be judged; `shows`: some size within its bounds would be detected.
     """
 
     name: str
@@ -57,7 +56,7 @@ def power(
     outputs: Sequence[Output],
     library: Sequence[Effect] = EFFECTS,
 ) -> tuple[EffectPower, ...]:
-    """Return for each effect the least size that the record would have shown."""
+    """Return the smallest detectable size of each effect."""
     return tuple(_power(nominal, control, touched(outputs, [one]), one) for one in library)
 
 
@@ -76,7 +75,7 @@ def _power(
 
 
 def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> dict[str, float]:
-    """Return an effect's parameters so far from neutral; a size of 1 is where a fit starts."""
+    """Return the parameters of an effect of a size; at size 1 they are the fit's first start."""
     values = {}
     for p in effect.free:
         start = p.starts[0]
@@ -94,7 +93,7 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
 
 
 def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
-    """Return what a value that replaces the nominal one starts from."""
+    """Return the value from which a parameter's size counts."""
     if p.mode != "value":
         return 0.0
     return float(value_of(nominal, control, p.above or p.key))
@@ -103,9 +102,10 @@ def _base(p: Parameter, nominal: Rig, control: ControlName) -> float:
 def _signature(
     nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect, size: float
 ) -> float:
-    """Return the largest rms signature of an effect in an output, settings profiled; 0 if none.
+    """Return the largest rms signature of an effect in an output, nuisance parameters profiled.
 
-    Of what would lift a residual of noise alone to the gap from which its stage is guilty.
+    It is relative to the signature that raises a residual of noise alone to the output's limit; 0
+    if the rig cannot have the effect.
     """
     rig = possible(nominal, control, [effect], _values(effect, size, nominal, control))
     if rig is None:
@@ -122,7 +122,7 @@ def _signature(
 
 
 def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect) -> Floats:
-    """Return the signatures of a stage's settings, a column each."""
+    """Return the signatures of the stage's nuisance parameters, a column each."""
     columns = []
     known = settings(nominal, control, [output])
     beside = [one for name, one in known.items() if name not in (effect.name, *effect.swallows)]
@@ -139,7 +139,7 @@ def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect
 def _least(
     nominal: Rig, control: ControlName, outputs: Sequence[Output], effect: Effect
 ) -> dict[str, float] | None:
-    """Return the parameters at which an effect just shows, or None where it never does."""
+    """Return the smallest parameters at which an effect is detected; None if at no size."""
 
     def shows(size: float) -> bool:
         return _signature(nominal, control, outputs, effect, size) >= 1.0

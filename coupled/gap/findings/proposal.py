@@ -1,8 +1,8 @@
-"""The next test: the record that would separate rivals, found by computation (T-optimal design).
+"""The next test: the record that would discriminate two alternatives (T-optimal design).
 
-Each candidate test is flown by the rig with one rival, noise and all, and the record so made is
-fitted by both: the rival refitted, since without the refit any test would seem to separate them.
-What counts is by how much the true one then beats the other on held-out stretches.
+Each candidate test is simulated with one alternative, with noise. Both alternatives are fitted to
+the simulated record. The criterion is the log-likelihood gain of the true one over the other on
+held-out stretches.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ProposedTest:
-    """A test that would separate two rivals, and by what log-likelihood."""
+    """A test that would discriminate two alternatives, and its log-likelihood gain."""
 
     text: str
     rivals: tuple[str, str]
@@ -48,7 +48,7 @@ class ProposedTest:
 
 @dataclass(frozen=True)
 class Push:
-    """A test that could be flown: what it is called, its force at each frame, and its q̄."""
+    """A possible test: its description, its force and q̄ at each frame, and its rig."""
 
     text: str
     force_N: Floats
@@ -59,7 +59,7 @@ class Push:
 def next_tests(
     nominal: Rig, record: Record, control: ControlName, choice: Choice
 ) -> tuple[ProposedTest, ...]:
-    """Return the tests that would separate the first rivals found, the best first."""
+    """Return the tests that would discriminate the first alternatives found, the best first."""
     step = next((step for step in choice.steps if step.rivals), None)
     if step is None or channel(control, "force") not in record:
         return ()
@@ -78,7 +78,7 @@ def next_tests(
 
 
 def _as_flown(rig: Rig, test: Rig, control: ControlName) -> Rig:
-    """Return the rig with a test's aircraft and speed, what effects change in the flight kept."""
+    """Return the rig in a test's flight condition; parameters of effects in the flight are kept."""
     if test.flight is None:
         return rig
     freed = [p.key for effect in EFFECTS for p in effect.parameters if p.key.startswith("flight.")]
@@ -98,7 +98,7 @@ def _gain(
     pair: tuple[tuple[Effect, ...], tuple[Effect, ...]],
     start: dict[str, float],
 ) -> float | None:
-    """Return by how much the first set would beat the second on a record of the first."""
+    """Return the gain of the first set over the second on a record simulated with the first."""
     try:
         record = fly_force(real, {control: test.force_N}, test.pressure_Pa, seed=5)
     except InputError:
@@ -119,7 +119,7 @@ def _gain(
 
 
 def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:
-    """Yield tests that the rig can make: pushes of the record's own size, at its q̄ and others."""
+    """Yield possible tests: forces up to the record's largest, at its q̄ and at others."""
     most = float(np.max(np.abs(record[channel(control, "force")])))
     rate = nominal.frame_rate
     time = np.arange(round(TEST_s * rate)) / rate
@@ -131,7 +131,7 @@ def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]
 
 
 def _shapes(time: Floats) -> list[tuple[str, Floats]]:
-    """Return what a hand can do, ±1, at rest at both ends."""
+    """Return forces that a hand can apply, scaled to ±1, zero at both ends."""
     quiet = np.clip(np.minimum(time, time[-1] - time) / TEST_EDGE_s, 0.0, 1.0)
     slow = np.abs(((time / 5.0 + 0.75) % 1.0) * 4.0 - 2.0) - 1.0
     chirp = np.sin(2.0 * np.pi * (0.1 + 0.07 * time) * time)
@@ -149,7 +149,7 @@ def _shapes(time: Floats) -> list[tuple[str, Floats]]:
 def _pressures(
     nominal: Rig, record: Record, control: ControlName, frames: int
 ) -> list[tuple[str, Floats, Rig]]:
-    """Return the q̄ that a test could have: as recorded, and on a bench through the whole table."""
+    """Return a test's possible q̄: as recorded, and over the bench's table or at a higher speed."""
     name = "dynamic_pressure_Pa"
     usual = float(np.median(record[name])) if name in record else 0.0
     level = np.full(frames, usual)
@@ -166,16 +166,19 @@ def _pressures(
 def in_one_line(
     tests_found: Sequence[ProposedTest], lacking: Sequence[str], wanted: Sequence[str] = ()
 ) -> str:
-    """Return what to record next, in a sentence, or nothing where nothing would help.
+    """Return what to record next, in a sentence; empty if no record would help.
 
-    `lacking` are channels, `wanted` sentences on what would lift a stage out of its floor.
+    `lacking` are channels, `wanted` sentences on how to raise a stage above its noise floor.
     """
     if tests_found:
         best = tests_found[0]
         one, other = (name.replace("_", " ") for name in best.rivals)
         if best.gain < SEPARATED_GAIN:
-            return f"No test tried would tell {one} from {other}: they act alike on this rig."
-        return f"To tell {one} from {other}, record {best.text}."
+            return (
+                f"No candidate test discriminates {one} from {other}:"
+                " this rig responds alike to both."
+            )
+        return f"To discriminate {one} from {other}, record {best.text}."
     if wanted:
         return wanted[0]
     if lacking:

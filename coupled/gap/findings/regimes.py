@@ -1,7 +1,7 @@
-"""An effect's size apart in halves of the records, by every signal that divides its action.
+"""An effect's size in halves of the records, divided by each signal of its stage.
 
-A half's size is what part of the action is there, 1 where it is as large as everywhere, with an
-error from the stretches of the record.
+The size in a half is relative to that in all records, with a standard error from the scatter
+between stretches.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Regime:
-    """An effect's size in two halves of the records, over its size in all, and their errors.
+    """An effect's size in two halves of the records, relative to its size in all, with errors.
 
-    `by` is the signal that divides them, `low` the half where it is the smaller; `freedom` are the
-    degrees of freedom of the errors.
+    `by` is the signal that divides the records, `low` the half in which it is smaller. `freedom`
+    is the number of degrees of freedom of the errors.
     """
 
     by: str
@@ -41,9 +41,9 @@ class Regime:
     freedom: float
 
     def apart(self, chance: float) -> float:
-        """Return by how much the sizes differ beyond what chance does once in 1 / `chance`.
+        """Return the difference of the sizes beyond that which has the probability `chance`.
 
-        That is taken off in squares.
+        The difference expected by chance is subtracted in squares.
         """
         error = math.hypot(self.low_error, self.high_error)
         errors = float(stdtrit(self.freedom, 1.0 - min(chance, 1.0) / 2.0))
@@ -51,7 +51,7 @@ class Regime:
 
     @property
     def p_value(self) -> float:
-        """How often chance would part equal sizes so far."""
+        """The p-value of the difference if the sizes are equal (two-sided t test)."""
         error = math.hypot(self.low_error, self.high_error)
         if error == 0.0:
             return 1.0
@@ -67,7 +67,7 @@ class Regime:
 
 @dataclass(frozen=True)
 class Acts:
-    """An effect's action in one output, and what all the effects leave there, in floors."""
+    """An effect's contribution to one output and the residual with all effects, in floors."""
 
     output: Output
     record: Record
@@ -76,21 +76,21 @@ class Acts:
 
 
 def regimes(case: Case, acts: Sequence[Acts]) -> tuple[Regime, ...]:
-    """Return the sizes in the halves by every signal that divides the effect's action."""
+    """Return the sizes in halves by every signal that divides the effect's contribution."""
     by: dict[str, list[tuple[Acts, Floats]]] = {}
     for one in acts:
         for name, signal in _dividing(case, one).items():
             by.setdefault(name, []).append((one, signal))
     if len({one.output.record for one in acts}) > 1:
         by["record"] = [(one, np.full(len(one.left), float(one.output.record))) for one in acts]
-    # A floor that is a model's own error is of one sign where the model is off.
+    # If the floor is a model error, it may have one sign throughout a half.
     lasting = 1.0 if case.only_wide else 0.0
     found = (_regime(name, parts, lasting) for name, parts in by.items())
     return tuple(one for one in found if one is not None)
 
 
 def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
-    """Return the signals by which an output's frames are divided in halves."""
+    """Return the signals by which an output's frames are divided into halves."""
     rate_Hz, found = one.output.frame_rate_Hz, dict[str, Floats]()
     for name, signal in signals(one.output.stage, one.record, case.control, rate_Hz).items():
         if name.endswith("sign"):
@@ -98,7 +98,7 @@ def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
                 found[name] = signal
         elif name == "time_s" or "pressure" in name:
             found[name] = signal
-            if "rate" in name:  # a hysteresis moves as much at any rate, and a lag does not
+            if "rate" in name:  # separates hysteresis, independent of the rate, from a lag
                 found[f"size of {name}"] = np.abs(signal)
         elif "cubed" not in name:
             found[f"size of {name}"] = np.abs(signal - float(np.median(signal)))
@@ -109,9 +109,9 @@ def _dividing(case: Case, one: Acts) -> dict[str, Floats]:
 
 
 def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Regime | None:
-    """Return the sizes in two halves that hold as much of the action each, where they can.
+    """Return the sizes in two halves with equal power of the contribution; None if impossible.
 
-    `lasting` is what of a floor, rms, may be alike in all of a half.
+    `lasting` is the rms of an error that may be constant in a half, in floors.
     """
     signal = np.concatenate([signal for _, signal in parts])
     action = np.concatenate([one.action for one, _ in parts])
@@ -141,12 +141,11 @@ def _regime(by: str, parts: Sequence[tuple[Acts, Floats]], lasting: float) -> Re
 def _size(
     action: Floats, left: Floats, number: NDArray[np.intp], lasting: float = 0.0
 ) -> tuple[float, float, float]:
-    """Return how much more of an action a residual holds, its error, and how many hold the action.
+    """Return the relative error of an action in a residual, its standard error and sample size.
 
-    The error is from the stretches, each held against the size that the others have (a jackknife:
-    what is fitted to one stretch leaves nothing there), and of a `lasting` part of the residual,
-    rms, as large as its share. A limit that is reached in two stretches is in no more than two,
-    however long the record: as many as would hold the action alike (Kish).
+    The standard error is from a jackknife over stretches, plus a `lasting` error of the residual,
+    rms, in proportion to the action. The sample size is the effective number of stretches with
+    the action (Kish): two, if a limit is reached in two stretches only.
     """
     power = float(action @ action)
     more = float(left @ action) / power

@@ -1,6 +1,6 @@
-"""What a diagnosis found, as data; each result makes its own part of the JSON by `as_dict`.
+"""The results of a diagnosis as data; `as_dict` of each returns its part of the JSON.
 
-Keys are those of the contract. SI units; a gap is a residual's rms over its noise floor.
+The keys are those of the contract. SI units; a gap is a residual's RMS over its noise floor.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from coupled.gap.search.course import Course
 from coupled.gap.signals.output import Hides, explained_below
 from coupled.gap.thresholds import GUILTY_FROM
 
-# Of the JSON that is written. Where it is read back, one without a format is read, as one written
-# before formats had numbers, and a newer one is refused by name (`files.check_format`).
+# Of the JSON. A file without a format is read as one from before formats were numbered; a newer
+# format is refused (`files.check_format`).
 FORMAT = 2
 Verdict = Literal["no_gap", "effect", "mostly", "ambiguous", "unexplained"]
 
 
 @dataclass(frozen=True)
 class StageResult:
-    """One stage. `gap` None: it was not judged, for the channels `missing` or the reason `why`.
+    """One stage. `gap` is None if it was not judged, for lack of `missing` or for the reason `why`.
 
-    `settled` is the gap with the settings within their tolerance, `left` that with the effects
-    found; `limit` the gap up to which noise may be all there is. `shown_in` names the stages in
-    whose gaps a fault of this one would show, where it has no residual of its own. `hidden`: it
-    stays within a floor that would hide a gap, and is not judged for that.
+    `settled` is the gap with fitted nuisance parameters, `left` that with the effects found,
+    `limit` the largest gap of noise alone. `shown_in` are the stages in which a fault of this one
+    shows, if it has no residual of its own. `hidden`: it is not judged, since its noise floor
+    could hide a gap.
     """
 
     name: str
@@ -60,19 +60,19 @@ class StageResult:
 
     @property
     def unexplained(self) -> bool:
-        """Whether it still holds structure that the effects found do not explain."""
+        """Whether the gap that remains exceeds that of an explained stage."""
         return self.left is not None and self.left > self.explained_below
 
     @property
     def remainder(self) -> float:
-        """How much what is left says against the effects found, 0 to 1 (`credibility`)."""
+        """The weight of the remaining residual as evidence against the effects (`credibility`)."""
         if self.left is None or self.settled is None:
             return 0.0
         return remainder(self.settled, self.left, self.explained_below)
 
     @property
     def within_settings(self) -> bool:
-        """Whether only settings within their tolerance widen it beyond its limit."""
+        """Whether the gap exceeds its limit only by nuisance parameters within their tolerance."""
         if self.gap is None or self.settled is None or self.limit is None or self.guilty:
             return False
         return self.settled <= self.limit < self.gap
@@ -96,13 +96,13 @@ class StageResult:
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A parameter with its 95 % interval; an end is None where nothing determines it.
+    """A parameter with its 95 % interval; a bound is None if the records do not determine it.
 
-    `key` is the rig file's, in `unit`; it is `filed` there, and `found` is what it should be. The
-    parameter's own value is that number, a factor on it, or what is added to it. `filed` is None
-    where the rig has none of it; `found_low` and `found_high` are the interval's ends; `host` is
-    what the host calls the number that it assumes for it, where it has one. The change of a
-    `relative` one is given as a share of what is filed.
+    `key` is that of the rig file, in `unit`; `filed` is its value there, or None if the rig has
+    none. `found` is the estimate of that number, with the interval `found_low` to `found_high`.
+    `value`, with `low` and `high`, is the effect's own parameter: that number, a factor on it, or
+    an addition to it. `host` is the host's name of the number, if it has one. `relative`: the
+    change is given as a share of the filed value.
     """
 
     name: str
@@ -120,7 +120,7 @@ class ParameterEstimate:
 
     @property
     def at_least(self) -> bool:
-        """Whether a larger one does as well: a play that swallows all of a motion."""
+        """Whether the estimate is a lower bound, as of backlash that exceeds the motion."""
         return self.found_low is not None and self.found_high is None
 
     def interval(self, written: Callable[[float], str]) -> str:
@@ -139,7 +139,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class EffectResult:
-    """An effect found, with the probability that it is the one."""
+    """An effect found, with the probability that it is the cause."""
 
     name: str
     stage: str
@@ -150,7 +150,7 @@ class EffectResult:
 
     @property
     def value(self) -> float | None:
-        """The value of its first parameter; None of an effect without a number."""
+        """The value of its first parameter; None if it has none (a discrete effect)."""
         return self.parameters[0].value if self.parameters else None
 
     def as_dict(self) -> dict[str, Any]:
@@ -169,9 +169,10 @@ class EffectResult:
 
 @dataclass(frozen=True)
 class SettingResult:
-    """What a setting of the nominal rig was found to be, over its nominal value.
+    """A fitted nuisance parameter, as a factor on its nominal value.
 
-    Of filed friction, by how much it `yields` before it slips, m or rad, where the file says none.
+    For filed friction without a filed stiffness, `yields` is its presliding displacement instead,
+    m or rad.
     """
 
     name: str
@@ -181,12 +182,12 @@ class SettingResult:
 
     @property
     def moved(self) -> bool:
-        """Whether it is off by what its words show."""
+        """Whether the deviation is large enough to show in `words`."""
         return self.yields is not None or abs(self.factor - 1.0) >= 5e-4
 
     @property
     def words(self) -> str:
-        """What it is, in words."""
+        """The deviation in words."""
         if self.yields is None:
             return f"{self.name.replace('_', ' ')} {100 * (self.factor - 1):+.1f} %"
         unit = "mrad" if self.name.endswith("rad") else "mm"
@@ -195,10 +196,10 @@ class SettingResult:
 
 @dataclass(frozen=True)
 class Findings:
-    """What records say of a rig: where it departs from them, by which effects, and how far.
+    """The results of a diagnosis: verdict, stages, effects and budget.
 
-    `stages` are in the order of the chain, `effects` the largest first; `rivals` are groups of
-    effects that the records do not distinguish.
+    `stages` are in the order of the chain, `effects` with the largest first; `rivals` are groups
+    of effects that the records do not distinguish.
     """
 
     control: str
@@ -211,7 +212,7 @@ class Findings:
 
     @public
     def stage(self, name: str) -> StageResult:
-        """Return a stage by its name; KeyError where the records have none of it."""
+        """Return a stage by its name; KeyError if the results do not have it."""
         for stage in self.stages:
             if stage.name == name:
                 return stage
@@ -219,5 +220,5 @@ class Findings:
 
     @property
     def guilty(self) -> tuple[str, ...]:
-        """The names of the guilty stages."""
+        """The names of the faulty stages."""
         return tuple(stage.name for stage in self.stages if stage.guilty)

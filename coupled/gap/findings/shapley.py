@@ -1,7 +1,7 @@
-"""Shapley's shares: what each of several takes off a power that all of them make (Shapley 1953).
+"""Shapley values: the share of each contribution in a power that all of them reduce (Shapley 1953).
 
-Each one's share is what adding it takes off, on the mean over all orders in which they could be
-added. The shares sum to the power that all of them take off together.
+The share of a contribution is the reduction by adding it, averaged over all orders of adding them.
+The shares sum to the reduction by all of them together.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 def shapley_weights(players: int) -> Floats:
     """Return the weight of each subset's power in each player's share, (players, 2^players).
 
-    Bit i of a subset's number says that player i is in it.
+    Bit i of a subset's number is set if player i belongs to it.
     """
     weights = np.zeros((players, 2**players))
     for i in range(players):

@@ -1,4 +1,4 @@
-"""How far the gap shrinks: on stretches used neither to fit nor to choose, and in closed loop."""
+"""The reduction of the gap by the effects, on held-out stretches."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from coupled.rig.rig import Rig
 
 @dataclass(frozen=True)
 class ChannelShrink:
-    """One channel's rms residual on held-out stretches, in its own unit, and its noise floor.
+    """One channel's RMS residual on held-out stretches, in its own unit, and its noise floor.
 
-    `closed` is (before − after)/(before − floor) with its 95 % interval; None where no effect
-    was found, or where there was no gap to close. `reliable`: from enough stretches.
+    `closed` is (before − after)/(before − floor) with its 95 % interval; None if no effect was
+    found or there was no gap. `reliable`: computed from at least `FEW_STRETCHES` stretches.
     """
 
     channel: str
@@ -36,7 +36,7 @@ class ChannelShrink:
     reliable: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the JSON; what there is not is left out."""
+        """Return the JSON, without the keys that are None."""
         known = {
             "channel": self.channel,
             "before": self.before,
@@ -53,7 +53,7 @@ class ChannelShrink:
 
 @dataclass(frozen=True)
 class Shrink:
-    """How far the gap shrinks: the channel where it is widest, and every one that is touched."""
+    """The reduction of the gap in each channel that the effects change, and in the widest one."""
 
     widest: ChannelShrink
     channels: tuple[ChannelShrink, ...]
@@ -72,14 +72,14 @@ Floors = Mapping[tuple[int, str], float]
 
 
 def floors_of(case: Case, choice: Choice) -> dict[tuple[int, str], float]:
-    """Return the floors of the improved rig by record and channel: noise's part depends on it."""
+    """Return the noise floors with the improved rig by record and channel."""
     if not choice.fit.effects or case.refloored is None:
         return {}
     return {(o.record, o.channel): o.floor for o in case.refloored(choice.fit.rig)}
 
 
 def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:
-    """Return how far the widest gap shrinks, fitted on every other stretch, held out between."""
+    """Return the reduction of the gap on held-out stretches, for a fit to the other stretches."""
     rig, outputs, effects, found = case.nominal, case.outputs, fitted.effects, fitted.rig
     pool = touched(outputs, effects) if effects else list(outputs)
     widest = max(pool, key=lambda output: output.gap(rig))
@@ -92,9 +92,9 @@ def shrink(case: Case, fitted: Fit, floors: Floors) -> Shrink:
 
 
 def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> ChannelShrink:
-    """Return one channel's rms residual before and after, and its floor, in its own unit.
+    """Return one channel's RMS residual before and after, and its floor, in its own unit.
 
-    `floor` is that of the improved rig, over the output's own.
+    `floor` is that of the improved rig, relative to the output's own.
     """
     number = output.stretches[output.rows("held")]
     held = np.unique(number)
@@ -124,6 +124,6 @@ def _of(output: Output, rig: Rig, found: Rig, floor: float, improved: bool) -> C
 
 
 def _rms(sums: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return roots of mean squares, from blocks' sums of two squares and their counts."""
+    """Return the roots of two mean squares, from sums of squares and counts by stretch."""
     total = sums.sum(axis=0)
     return np.asarray(np.sqrt(total[:2] / total[2]))

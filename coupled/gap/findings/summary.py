@@ -1,4 +1,4 @@
-"""A diagnosis in the few sentences that an engineer can repeat."""
+"""The summary of a diagnosis, in a few sentences."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OF_SIGNAL = {
 
 
 def in_figures(name: str, value: float) -> str:
-    """Return a parameter's value in figures; of a factor as many as distinguish it from 1."""
+    """Return a parameter's value as text; a factor with enough digits to differ from 1."""
     off = abs(value - 1.0)
     if name != "factor" or off >= 0.1 or off < 1e-12:
         return f"{value:.4g}"
@@ -44,7 +44,7 @@ def plain(name: str) -> str:
 
 
 def filtered_words(filtered: Mapping[str, str]) -> str:
-    """Return which logs were filtered, and where their floors come from."""
+    """Return which logs were filtered, and the source of their noise floors."""
     said = []
     for source in dict.fromkeys(filtered.values()):
         names = " and ".join(name for name, one in filtered.items() if one == source)
@@ -56,7 +56,7 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
 
 
 NOISE = "noise"
-MISFIT = "no more than the healthy machine left"
+MISFIT = "no more than the model error of the healthy machine"
 
 
 def summary(
@@ -67,10 +67,10 @@ def summary(
     next_test: str,
     floor: str = NOISE,
 ) -> str:
-    """Return what is wrong, how large, how sure, how much it explains, and what to record next.
+    """Return the faults, their sizes, probabilities and shares, and what to record next.
 
-    `in_flight` says what it does to the flight, `filtered` which logs were filtered, `floor` what
-    a stage without a gap leaves: `NOISE`, or `MISFIT`.
+    `in_flight` are the words on the flight, `filtered` on filtered logs, `floor` on the residual
+    of a stage without a gap: `NOISE` or `MISFIT`.
     """
     said = [_what(found, floor), _set(found), _settings(found)]
     if found.verdict == "no_gap":
@@ -88,7 +88,7 @@ def summary(
 
 
 def _not_judged(found: Findings) -> str:
-    """Return the stages that were not judged, nor by the residuals of their neighbours."""
+    """Return the stages that were judged neither directly nor by other stages' residuals."""
     judged = {stage.name for stage in found.stages if stage.judged}
     names = [s.name for s in found.stages if not s.judged and not judged & set(s.shown_in)]
     return f"Not judged: {', '.join(names)}." if names else ""
@@ -101,7 +101,7 @@ def _what(found: Findings, floor: str) -> str:
     hidden = [stage for stage in found.stages if stage.hidden is not None]
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
-        return f"Whether the {found.control} has a gap cannot be said: {why}."
+        return f"Whether the {found.control} has a gap cannot be decided: {why}."
     budgets = {one.stage: one for one in found.budget}
     if found.verdict == "unexplained":
         named = "; ".join(_effect(effect) for effect in found.effects)
@@ -118,7 +118,7 @@ def _what(found: Findings, floor: str) -> str:
 
 
 def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> list[EffectResult]:
-    """Return the effects of a stage, and those of others that hold a share of its gap."""
+    """Return the effects of a stage, and others that explain a share of its gap."""
     beside = (effect for effect in found.effects if effect.stage != stage.name)
     shown = [] if budget is None else [e for e in beside if budget.of(e.name) >= FREE_LEAST / 100]
     return [*(effect for effect in found.effects if effect.stage == stage.name), *shown]
@@ -127,7 +127,7 @@ def _acting(found: Findings, stage: StageResult, budget: StageBudget | None) -> 
 def _explained(
     acting: Sequence[EffectResult], stage: StageResult, budget: StageBudget | None, floor: str
 ) -> str:
-    """Return which effects explain how much of a stage's gap, and what remains of it."""
+    """Return the share of a stage's gap that each effect explains, and what remains."""
     if budget is None:
         return f"The gap lies in the {stage.name}."
     if not acting:
@@ -148,7 +148,7 @@ def _explained(
 
 
 def _per_cent(share: float) -> str:
-    """Return a share in per cent; with a decimal where it is nearly nothing or nearly all."""
+    """Return a share in per cent, with a decimal close to 0 or 100 %."""
     nearly = share < 0.01 or 0.99 < share < 0.9995
     return f"{100 * share:.1f} %" if nearly else f"{100 * share:.0f} %"
 
@@ -158,7 +158,7 @@ def _capital(text: str) -> str:
 
 
 def _set(found: Findings) -> str:
-    """Return what to set, so that host and rig file have what was found."""
+    """Return which values to set in host and rig file."""
     if found.verdict not in ("effect", "mostly"):
         return ""
     numbers = [p for effect in found.effects for p in effect.parameters if not _is_none(p)]
@@ -174,7 +174,7 @@ def _set(found: Findings) -> str:
 
 
 def _settings(found: Findings) -> str:
-    """Return what widens a stage that nothing else does: a number off within its setting."""
+    """Return the stages whose gap is due to parameters within their tolerance."""
     said = []
     for stage in found.stages:
         if not stage.within_settings:
@@ -182,20 +182,20 @@ def _settings(found: Findings) -> str:
         off = [one.words for one in found.settings if one.stage == stage.name and one.moved]
         if off:
             said.append(
-                f"The {stage.name} stands at {stage.gap:.3g} floors because of {_joined(off)},"
-                " within the tolerance of each, and has no gap."
+                f"The {stage.name} is at {stage.gap:.3g} floors because of {_joined(off)},"
+                " each within its tolerance, and is not faulty."
             )
     return " ".join(said)
 
 
 def _joined(words: Sequence[str]) -> str:
-    """Return some words as one writes them: a, b and c."""
+    """Return words as a list in prose: a, b and c."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def _since(found: Findings) -> str:
-    """Return since when, and for what is not explained, what it follows."""
+    """Return onset and end of the gaps, tones, and descriptions of unexplained residuals."""
     said = []
     for stage in found.stages:
         if stage.where is None:
@@ -210,7 +210,7 @@ def _since(found: Findings) -> str:
 
 
 def _between(stage: str, where: Where) -> list[str]:
-    """Return from when to when a stage's gap is there, where it is not there all the time."""
+    """Return onset and end of a stage's gap, if it is not there all the time."""
     begins, ends = (f"{span.at_s:.1f} s" if span else "" for span in (where.begins, where.ends))
     if begins and ends:
         return [f"The gap in the {stage} is there from {begins} to {ends}."]
@@ -220,7 +220,7 @@ def _between(stage: str, where: Where) -> list[str]:
 
 
 def in_time(effect: EffectResult) -> str:
-    """Return since when an effect is there and how fast it grows; nothing where it always is."""
+    """Return onset and growth of an effect; empty if it is constant."""
     course = effect.course
     if course is None or course.kind == "constant":
         return ""
@@ -243,31 +243,33 @@ def in_time(effect: EffectResult) -> str:
 
 
 def _line(channel: str, line: SeenLine) -> str:
-    """Return the line of a tone in a channel: where it stands, how high, and what it is."""
+    """Return the amplitude and frequency of a spectral line, and its tone if it is aliased."""
     unit = unit_in(channel)
-    said = f"A line of {figure(line.amplitude)} {unit} stands at {line.seen_Hz:.4g} Hz in {channel}"
+    size = f"{figure(line.amplitude)} {unit}"
+    said = f"A spectral line of {size} is at {line.seen_Hz:.4g} Hz in {channel}"
     if line.folded:
         return f"{said}: aliased, from a tone of {line.tone_Hz:.4g} Hz."
     return f"{said}."
 
 
 def _remains(stage: str, left: Remains) -> str:
-    """Return what an unexplained stage's residual looks like, effects found taken off."""
+    """Return a description of the residual that remains with the effects found."""
     follows = ""
     if left.follows:
         most = left.follows[0]
-        follows = f"{100 * most.share:.0f} % follows {_signal(most.signal)}, and "
+        follows = f"{100 * most.share:.0f} % correlates with {_signal(most.signal)}, and "
     share = round(100 * left.free_share)
     of = "the stage's own signals" if left.free_in == "all" else _signal(left.free_in)
     takes = f"{share} % could be some function of {of}"
     if share < FREE_LEAST:
-        takes = "no function of the stage's signals takes any on stretches held out"
-    return f"What remains in the {stage} is {left.gap:.3g} floors: {follows}{takes}."
+        takes = "no function of the stage's signals predicts held-out stretches"
+    size = f"{left.gap:.3g} floors"
+    return f"The residual of the {stage} with these effects is {size}: {follows}{takes}."
 
 
 def _signal(name: str) -> str:
     if name == "constant":
-        return "nothing: it is constant"
+        return "no signal: it is constant"
     base = next((known for known in OF_SIGNAL if name.startswith(known)), name)
     rest = name[len(base) :]
     kind = "the sign of " if rest.endswith("sign") else ""
@@ -286,7 +288,7 @@ def _sure(found: Findings) -> str:
 
 
 def closes(shrink: Shrink) -> str:
-    """Return how much of the widest gap closes on held-out data, with its interval."""
+    """Return the share of the widest gap closed on held-out data, with its interval."""
     most = shrink.widest
     if most.closed is None or most.low is None or most.high is None:
         return ""
@@ -304,13 +306,13 @@ def _effect(effect: EffectResult) -> str:
 
 
 def labels(effect: EffectResult) -> list[str]:
-    """Return what to call each number of an effect: nothing where its unit says which it is."""
+    """Return a label of each parameter of an effect; empty if its unit identifies it."""
     units = [p.unit for p in effect.parameters]
     return [p.name.partition("_")[0] if units.count(p.unit) > 1 else "" for p in effect.parameters]
 
 
 def _is_none(p: ParameterEstimate) -> bool:
-    """Tell whether a number is of a limit that is not filed, and that no record meets."""
+    """Tell whether a parameter is a limit that is neither filed nor reached in the records."""
     return p.filed is None and p.found_low is None and p.found_high is None
 
 

@@ -1,8 +1,8 @@
-"""Where inside a stage the gap lies: what it follows, at which frequency, since when.
+"""A description of a stage's residual: correlated signals, frequency, onset.
 
-The residual of the nominal rig is held against the stage's own signals, each alone: the share of
-its variance that a straight line on that signal takes, and its slope. Its beginning and its end are
-sought by windows at the same excitation (`onset`).
+The residual is regressed on each of the stage's own signals: the share of its variance that a
+straight line explains, and the slope. Onset and end are found by windows of the same excitation
+(`onset`).
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Follows:
-    """A signal that a residual follows: its share of the power, 0 to 1, and the slope.
+    """A signal correlated with a residual: its share of the power, 0 to 1, and the slope.
 
-    `per_unit` is in the channel's unit per the signal's.
+    `per_unit` is in the channel's unit over the signal's.
     """
 
     signal: str
@@ -54,7 +54,7 @@ class Follows:
 
 @dataclass(frozen=True)
 class PressureBand:
-    """The gap where q̄ lies between two pressures, Pa."""
+    """The gap while q̄ is between two pressures, Pa."""
 
     from_Pa: float
     to_Pa: float
@@ -67,11 +67,11 @@ class PressureBand:
 
 @dataclass(frozen=True)
 class Where:
-    """Where in a stage its gap lies, by the channel where it is widest.
+    """A description of a stage's gap, from the channel in which it is largest.
 
-    `loud` is the share of time that shows it; `begins` and `ends` None where it may be there all
-    the time, as the excitation lets it; `by_pressure` is empty where q̄ stays; `line` None where no
-    tone stands out of the spectrum.
+    `loud` is the share of time with the gap. `begins` and `ends` are None if the excitation can
+    explain them; `by_pressure` is empty if q̄ is constant; `line` is None if the spectrum has no
+    line.
     """
 
     channel: str
@@ -84,7 +84,7 @@ class Where:
     line: SeenLine | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the JSON; what is not known is left out."""
+        """Return the JSON, without unknown values."""
         found: dict[str, Any] = {"channel": self.channel}
         found["follows"] = [item.as_dict() for item in self.follows]
         found |= {"peak_Hz": self.peak_Hz, "loud": self.loud}
@@ -100,7 +100,7 @@ class Where:
 
 @dataclass(frozen=True)
 class Reversals:
-    """A residual that sits about the reversals of motion: its share within so long of one, s."""
+    """A residual concentrated at reversals of motion: its share within a time of one, s."""
 
     within_s: float
     share: float
@@ -112,10 +112,10 @@ class Reversals:
 
 @dataclass(frozen=True)
 class Remains:
-    """What the effects found leave of a stage that they do not explain.
+    """A description of the residual of a stage that the effects do not explain.
 
-    `free_share` is what a model free in form takes of it on held-out stretches, 0 to 1, as a
-    function of the signal `free_in`, or of `all`.
+    `free_share` is the share that a nonparametric model predicts on held-out stretches, 0 to 1,
+    as a function of the signal `free_in`, or of all signals (`all`).
     """
 
     gap: float
@@ -138,7 +138,7 @@ class Remains:
 
 
 def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Where:
-    """Return where the gap of an output lies, by the residual that this rig leaves."""
+    """Return a description of an output's gap, from its residual with this rig."""
     left, rate_Hz = output.residual(rig), output.frame_rate_Hz
     known = signals(output.stage, record, control, rate_Hz)
     drives = {name: x for name, x in known.items() if not name.endswith(("sign", "3", "time_s"))}
@@ -158,7 +158,7 @@ def where(output: Output, rig: Rig, record: Record, control: ControlName) -> Whe
 
 
 def remains(output: Output, improved: Rig, record: Record, control: ControlName) -> Remains:
-    """Return what the effects found leave of an output."""
+    """Return a description of an output's residual with the effects found."""
     left, answers = output.residual(improved), response(output, improved, record, control)
     known = signals(output.stage, record, control, output.frame_rate_Hz)
     share, signal = free_share(output, left, known, answers)
@@ -173,7 +173,7 @@ def remains(output: Output, improved: Rig, record: Record, control: ControlName)
 
 
 def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Reversals | None:
-    """Return within how long of the reversals most of a residual lies, None where it does not."""
+    """Return the time from reversals within which most of a residual lies; None if none."""
     side = next((s for name, s in known.items() if name.endswith("rate_sign")), None)
     if side is None:
         return None
@@ -198,7 +198,7 @@ def _reversals(left: Floats, known: dict[str, Floats], rate_Hz: float) -> Revers
 def response(
     output: Output, rig: Rig, record: Record, control: ControlName
 ) -> tuple[Floats, Floats] | None:
-    """Return the digital filter by which a loader answers to a force, at its mean gradient."""
+    """Return the digital filter from force to deflection of a loader, at its mean gradient."""
     name = channel(control, "gradient")
     if output.stage != "loader" or name not in record:
         return None
@@ -208,7 +208,7 @@ def response(
 
 
 def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) -> dict[str, Floats]:
-    """Return the signals that a stage's gap may follow, by name with unit, as far as recorded."""
+    """Return the signals compared with a stage's residual, by name with unit, if recorded."""
     d = unit_of(control)
     names = {
         "loader": (("force", "N"), ("computed", d)),
@@ -248,14 +248,14 @@ def signals(stage: str, record: Record, control: ControlName, rate_Hz: float) ->
 
 
 def _sign(signal: Floats) -> Floats:
-    """Return the sign of a signal, nothing where it is too small to have one."""
+    """Return the sign of a signal; 0 where the signal is too small."""
     return np.where(np.abs(signal) > NO_SIGN * np.sqrt(np.mean(signal**2)), np.sign(signal), 0.0)
 
 
 def _follows(
     output: Output, left: Floats, record: Record, control: ControlName
 ) -> tuple[Follows, ...]:
-    """Return what the residual follows, the largest share first; `constant` is its mean."""
+    """Return the signals correlated with a residual, largest share first; `constant`: its mean."""
     power = float(np.mean(left**2))
     if power == 0.0:
         return ()
@@ -275,13 +275,13 @@ def _follows(
 
 
 def _peak(left: Floats, rate_Hz: float) -> float:
-    """Return the frequency, Hz, at which a residual is loudest: of pieces that overlap by half."""
+    """Return the frequency, Hz, of the largest power (Welch, segments with half overlap)."""
     many = min(len(left), round(SPECTRUM_s * rate_Hz))
     pieces = np.lib.stride_tricks.sliding_window_view(left, many)[:: many - many // 2]
     level = pieces - np.mean(pieces, axis=1, keepdims=True)
     taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(many) / many)
     power = np.mean(np.abs(np.fft.rfft(level * taper, axis=1)) ** 2, axis=0)
-    power[-1] *= 0.5 if many % 2 == 0 else 1.0  # it has no other side
+    power[-1] *= 0.5 if many % 2 == 0 else 1.0  # the Nyquist frequency is not doubled
     return float(np.fft.rfftfreq(many, 1.0 / rate_Hz)[1:][np.argmax(power[1:])])
 
 

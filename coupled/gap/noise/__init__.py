@@ -1,1 +1,1 @@
-"""What of a channel is noise: its level, its colour, its lines."""
+"""The noise of a channel: its level, its colour and its spectral lines."""

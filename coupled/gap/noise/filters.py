@@ -1,6 +1,6 @@
-"""Recursive filters of a record's length, each solved as a banded system.
+"""Recursive filters over a whole record, each solved as a banded system.
 
-They are all that a diagnosis would need `scipy.signal` for, which is slow to start and large.
+They replace `scipy.signal`, which is slow to import.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Coefficients = Sequence[float] | Floats
 def filtered(above: Coefficients, below: Coefficients, signal: Floats) -> Floats:
     """Return Σ above[i]·x[k−i] = Σ below[i]·y[k−i] solved for y, from rest; shape of x.
 
-    The filter's coefficients, of z⁰, z⁻¹ and so on; of several columns each by itself.
+    The coefficients are those of z⁰, z⁻¹ and so on. Columns are filtered separately.
     """
     driven = above[0] * signal
     for lag, share in enumerate(above[1:], 1):

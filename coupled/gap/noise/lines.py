@@ -1,12 +1,11 @@
-"""Lines in a spectrum: tones, as of the mains, that stand out of a channel's noise.
+"""Lines in a spectrum: tones, such as mains hum, above a channel's noise.
 
-A line is a bin of the tapered spectrum far above what is about it, which a sine of one frequency
-takes away whole: what is broad (a resonance, a sweep) is none. Looked for where a channel holds
-noise alone, above four tenths of the highest frequency (`noise`).
+A line is a bin of the tapered spectrum far above its surroundings which one sine removes almost
+completely; a resonance or a sweep is broader. Lines are searched above 0.4 of the Nyquist
+frequency, where a channel contains noise alone (`noise`).
 
-Sampling folds: a tone of f stands at |f − n·rate|, so that 60 Hz logged at 100 Hz is seen at 40.
-The mains are near 50 or 60 Hz, on aircraft 400: a line where one of these is folded to is said to
-be it.
+By aliasing a tone of f appears at |f − n·rate|: 60 Hz logged at 100 Hz appears at 40 Hz. Mains have
+50 or 60 Hz, on aircraft 400 Hz. A line at an alias of one of these is attributed to it.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from coupled.gap.thresholds import (
 )
 
 Floats = NDArray[np.float64]
-TAPER_BINS = 3  # to either side of a bin that a tone fills
-ROUNDS = 6  # of Newton's steps to the frequency
+TAPER_BINS = 3  # bins to either side that a tone fills
+ROUNDS = 6  # Newton iterations for the frequency
 
 
 @dataclass(frozen=True)
@@ -44,15 +43,15 @@ class Line:
     phase: float
 
     def over(self, frames: int) -> Floats:
-        """Return it over so many frames."""
+        """Return the sine over so many frames."""
         return np.asarray(self.amplitude * np.sin(self.turn * np.arange(frames) + self.phase))
 
 
 @dataclass(frozen=True)
 class SeenLine:
-    """A line as a record shows it: its frequency there, and that of the tone which makes it.
+    """A line in a record: its apparent frequency, and that of its tone.
 
-    `folded`: the tone lies above half of the frame rate, and sampling folds it to where it is seen.
+    `folded`: the tone is above the Nyquist frequency and appears at an alias.
     """
 
     seen_Hz: float
@@ -61,7 +60,7 @@ class SeenLine:
 
     @property
     def folded(self) -> bool:
-        """Whether sampling has folded it."""
+        """Whether the line is an alias."""
         return abs(self.tone_Hz - self.seen_Hz) > 1e-9 * self.tone_Hz
 
     def as_dict(self) -> dict[str, Any]:
@@ -75,7 +74,7 @@ class SeenLine:
 
 
 def lines_in(signal: Floats) -> list[Line]:
-    """Return the lines of a signal, the highest over its noise first; shape (frames,)."""
+    """Return the lines of a signal, the most significant first; shape (frames,)."""
     found: list[Line] = []
     left = signal
     while len(signal) >= WHITE_FRAMES and len(found) < MOST_LINES:
@@ -92,15 +91,15 @@ def lines_in(signal: Floats) -> list[Line]:
 
 
 def seen_as(line: Line, rate_Hz: float) -> SeenLine:
-    """Return a line of a signal that is sampled at `rate_Hz`, with the tone which makes it."""
+    """Return a line of a signal sampled at `rate_Hz`, with its tone."""
     seen = line.turn * rate_Hz / (2.0 * math.pi)
     return SeenLine(seen, tone_of(seen, rate_Hz), line.amplitude)
 
 
 def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
-    """Return the tone that holds most of a residual, if it holds enough to be worth saying.
+    """Return the tone with the largest amplitude in a residual, if it is a notable share of it.
 
-    The residual is in floors, `floor` in the signal's unit.
+    The residual is in noise floors, `floor` in the signal's unit.
     """
     lines = sorted(lines_in(left), key=lambda line: -line.amplitude)
     if not lines or 0.5 * lines[0].amplitude ** 2 < WHERE_SHARE * float(np.mean(left**2)):
@@ -110,7 +109,7 @@ def widest_line(left: Floats, floor: float, rate_Hz: float) -> SeenLine | None:
 
 
 def other_side(tone_Hz: float, rate_Hz: float) -> float | None:
-    """Return the tone of the same mains that sampling shows at the same place, if there is one."""
+    """Return another tone of the same mains with the same alias, if there is one."""
     other = math.ceil(2.0 * tone_Hz / rate_Hz) * rate_Hz - tone_Hz
     below = math.floor(2.0 * tone_Hz / rate_Hz) * rate_Hz - tone_Hz
     for mains in MAINS_Hz:
@@ -121,7 +120,7 @@ def other_side(tone_Hz: float, rate_Hz: float) -> float | None:
 
 
 def tone_of(seen_Hz: float, rate_Hz: float) -> float:
-    """Return the frequency of the mains that is folded to a line's, else the line's own."""
+    """Return the mains frequency with this alias, else the line's own frequency."""
     for mains in (seen_Hz, *MAINS_Hz):
         for tone in (seen_Hz, *_unfolded(seen_Hz, mains, rate_Hz)):
             if any(abs(tone - known) <= MAINS_OFF * known for known in MAINS_Hz):
@@ -130,13 +129,13 @@ def tone_of(seen_Hz: float, rate_Hz: float) -> float:
 
 
 def _unfolded(seen_Hz: float, near_Hz: float, rate_Hz: float) -> tuple[float, float]:
-    """Return the two tones nearest to a frequency that are seen where this line is."""
+    """Return the two tones nearest to a frequency that have this alias."""
     around = round((near_Hz - seen_Hz) / rate_Hz), round((near_Hz + seen_Hz) / rate_Hz)
     return abs(around[0] * rate_Hz + seen_Hz), abs(around[1] * rate_Hz - seen_Hz)
 
 
 def projected(signal: Floats, turn: float) -> Line:
-    """Return the sine of a frequency, rad a frame, that takes most of a signal."""
+    """Return the least squares fit of a sine of a given frequency, rad a frame, to a signal."""
     at = turn * np.arange(len(signal))
     waves = np.column_stack((np.sin(at), np.cos(at)))
     taper = np.hanning(len(signal))
@@ -145,7 +144,7 @@ def projected(signal: Floats, turn: float) -> Line:
 
 
 def _highest(signal: Floats) -> float | None:
-    """Return the frequency of the bin that is highest over its surroundings, None if none is."""
+    """Return the frequency of the bin highest above its surroundings; None if none is a line."""
     rough = np.diff(signal, 4)
     power = np.abs(np.fft.rfft(rough * np.hanning(len(rough)))) ** 2
     omega = np.linspace(0.0, math.pi, len(power))
@@ -162,9 +161,9 @@ def _highest(signal: Floats) -> float | None:
 
 
 def _sharpened(signal: Floats, turn: float) -> Line:
-    """Return the sine near a bin's frequency that takes most: its phase, half against half."""
+    """Return the sine near a bin's frequency, refined by its phase in both halves of the signal."""
     half = len(signal) // 2
-    rough = np.diff(signal, 4)  # what a rig does is not to lean on the phase
+    rough = np.diff(signal, 4)  # removes the slow motion of the rig
     for _ in range(ROUNDS):
         early, late = projected(rough[:half], turn), projected(rough[half:], turn)
         slip = late.phase - early.phase - turn * half
@@ -176,7 +175,7 @@ def _sharpened(signal: Floats, turn: float) -> Line:
 
 
 def _power_at(signal: Floats, turn: float) -> float:
-    """Return the power of a signal's roughness within a tapered bin of a frequency."""
+    """Return the power of a signal's fourth differences within a tapered bin of a frequency."""
     rough = np.diff(signal, 4) * np.hanning(len(signal) - 4)
     power = np.abs(np.fft.rfft(rough)) ** 2
     at = round(turn / math.pi * (len(power) - 1))

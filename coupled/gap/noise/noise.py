@@ -1,11 +1,10 @@
-"""The noise of a channel, by the part of its spectrum where a signal has died away.
+"""The noise of a channel, from the part of its spectrum above the signal.
 
-Above four tenths of the highest frequency that a record holds, what a rig does is long below the
-noise of its sensors. There the noise is either white, or that of a first-order lag, whose power
-falls as 1/(1 + a² − 2a·cos ω); a is the correlation from frame to frame. What is below follows from
-that. Bands are judged by their quieter nine tenths, so that a line (the mains' hum) is not taken
-for noise. A log that was filtered or resampled has next to nothing there: how large its noise
-was cannot be seen.
+Above 0.4 of the Nyquist frequency the motion of a rig is far below sensor noise. There the noise is
+white, or that of a first-order lag, whose power falls as 1/(1 + a² − 2a·cos ω), a being the
+correlation from frame to frame. This model extrapolates to lower frequencies. Of each band only the
+lowest nine tenths of the spectrum count, so that a line (mains hum) is not taken for noise. A log
+that was filtered or resampled has almost no power there, and its noise cannot be estimated.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ Floats = NDArray[np.float64]
 class Noise:
     """Noise of a level, rms in the channel's unit; `memory` is its correlation by frames, 0 to 1.
 
-    `filtered`: the spectrum falls on to its end, so that this is the most that is left of it.
-    `unsure` is by how much more of its power at low frequencies there may be, as a share of that.
+    `filtered`: the spectrum falls up to the Nyquist frequency, so `rms` is an upper bound of what
+    remains of the noise. `unsure` is the possible additional power at low frequencies, relative.
     """
 
     rms: float
@@ -47,7 +46,7 @@ class Noise:
     unsure: float = 0.0
 
     def sample(self, frames: int, rng: np.random.Generator) -> Floats:
-        """Return a sample of it, shape (frames,)."""
+        """Return a sample, shape (frames,)."""
         white = rng.normal(0.0, self.rms, frames)
         if self.memory == 0.0 or not frames:
             return white
@@ -57,10 +56,10 @@ class Noise:
 
 
 def noise_of(signal: Floats) -> Noise:
-    """Return the noise of a smooth signal; of a short one, its fourth differences' rms by √70."""
+    """Return the noise of a smooth signal; if short, from the rms of fourth differences by √70."""
     rough = np.diff(signal, 4)
     plain = Noise(float(np.sqrt(np.mean(rough**2) / 70.0)) if len(rough) else 0.0)
-    if len(rough) < WHITE_FRAMES or jumps(signal):  # where it jumps, colour is not to be seen
+    if len(rough) < WHITE_FRAMES or jumps(signal):  # jumps hide the colour
         return plain
     at, levels = _bands(rough)
     high = at >= NOISE_FROM * math.pi
@@ -69,7 +68,7 @@ def noise_of(signal: Floats) -> Noise:
     sure, variance = levels[high], _log_variance(rough)
     least = float(np.median(sure[-3:]))
     if least < FILTERED * float(np.median(sure[:3])):
-        return Noise(math.sqrt(least), filtered=True)  # no more than that is left of it
+        return Noise(math.sqrt(least), filtered=True)
     memory = _memory(at, levels, int(np.argmax(high)), variance)
     logs = np.log(sure / _shape(at[high], memory))
     white = float(np.exp(np.mean(logs) + 0.5 * variance))
@@ -77,7 +76,7 @@ def noise_of(signal: Floats) -> Noise:
 
 
 def jumps(signal: Floats) -> bool:
-    """Tell whether most of what is rough in a signal lies in a few frames: it jumps there."""
+    """Tell whether a signal jumps: its fourth differences are concentrated in few frames."""
     rough = np.diff(signal, 4)
     if not len(rough):
         return False
@@ -86,7 +85,7 @@ def jumps(signal: Floats) -> bool:
 
 
 def between_jumps(signal: Floats) -> Noise:
-    """Return the noise of a signal that may jump, by the median of its fourth differences."""
+    """Return the noise of a signal that may jump, from the median of its fourth differences."""
     known, rough = noise_of(signal), np.abs(np.diff(signal, 4))
     usual = float(np.median(rough)) / 0.6745 / math.sqrt(70.0) if len(rough) else 0.0
     return known if known.rms <= usual / JUMPS else Noise(usual)
@@ -95,8 +94,8 @@ def between_jumps(signal: Floats) -> Noise:
 def _bands(rough: Floats) -> tuple[Floats, Floats]:
     """Return the middle frequencies of bands, rad a frame, and the noise's variance in each.
 
-    `rough` are fourth differences, which a white noise passes by |2 sin(ω/2)|⁸. Each band's mean
-    is that of its quieter part, made good for an exponential distribution.
+    `rough` are fourth differences, with the gain |2 sin(ω/2)|⁸ of power. The mean of each band is
+    that of its lower part, corrected for the bias with an exponential distribution.
     """
     taper = np.hanning(len(rough))
     power = np.abs(np.fft.rfft(rough * taper)) ** 2 / float(taper @ taper)
@@ -114,24 +113,25 @@ def _bands(rough: Floats) -> tuple[Floats, Floats]:
 
 
 def _log_variance(rough: Floats) -> float:
-    """Return the variance of the logarithm of a band's mean, which lowers the mean of logarithms.
+    """Return the variance of the logarithm of a band's mean.
 
-    A taper lets about two of three bins count.
+    With the taper about two of three bins are independent.
     """
     bins = len(rough) / 2.0 / NOISE_BANDS
     return 1.5 / bins
 
 
 def _shape(at: Floats, memory: float) -> Floats:
-    """Return the power of a first-order lag's noise over that of what drives it."""
+    """Return the power of a first-order lag's noise over that of its white input."""
     return 1.0 / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
 
 
 def _memory(at: Floats, levels: Floats, first: int, variance: float) -> float:
-    """Return the correlation of the noise by frames, 0 where white noise explains it as well.
+    """Return the correlation of the noise by frames; 0 if white noise explains it as well.
 
-    The bands from `first` on are noise. Those below are taken in as long as they follow on: where
-    a signal begins, it stands out at once, being far steeper than a first-order lag.
+    The bands from `first` on are noise. Lower bands are added as long as they agree with the
+    extrapolation. A signal's spectrum is much steeper than a first-order lag, so it departs at
+    once.
     """
     memory, logs = 0.0, np.log(np.maximum(levels, 1e-300))
     while True:
@@ -146,7 +146,7 @@ def _memory(at: Floats, levels: Floats, first: int, variance: float) -> float:
 
 
 def _fitted(at: Floats, logs: Floats, variance: float) -> float:
-    """Return the correlation that explains some bands, 0 where it does not by more than white."""
+    """Return the correlation that fits some bands; 0 if white noise fits about as well."""
     tries = np.array([logs - np.log(_shape(at, a)) for a in COLOURS])
     misfit = np.sum((tries - tries.mean(axis=1, keepdims=True)) ** 2, axis=1) / variance
     best = int(np.argmin(misfit))

@@ -1,15 +1,15 @@
-"""The noise of a residual, by its quieter stretches of half a second.
+"""The noise of a residual, from its quieter pieces of half a second.
 
-What a signal does hides its noise: where a control sticks, slips or meets its play, its spectrum
-falls as slowly as that of coloured noise. A stage's residual has no more of that than the gap
-leaves. Its spectrum is taken in short pieces, and of each frequency the third quietest counts,
-so that what happens now and then is left out; a line of the mains falls out among the others.
-The noise is white, or that of a first-order lag, as in `noise`.
+The spectrum of a control that sticks, slips or closes its backlash falls as slowly as that of
+coloured noise, and hides the noise. A stage's residual contains that only as far as the stage has a
+gap. The spectrum is taken in short pieces, and at each frequency the 30 % quantile of the pieces
+counts, so that rare events are left out; lines of the mains are rejected as outliers. The noise is
+white, or that of a first-order lag, as in `noise`.
 
-A force drives its stage, and no residual is of it alone. There the signal's own spectrum, which
-falls by some power of the frequency, is fitted beside the noise. Of what fits about as well, the
-noise with the least power at low frequencies is taken: the rest may be the signal. But it may be
-the noise that fits best, too: how much more that has there is `unsure`.
+The noise of a force cannot be taken from a residual, since the force is an input. There the
+signal's own spectrum, which falls with some power of frequency, is fitted together with the noise.
+Among the models that fit about as well, the noise with the least power at low frequencies is
+taken. `unsure` is how much more the best fit has there.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from coupled.gap.thresholds import (
 
 Floats = NDArray[np.float64]
 _SHAPES = np.array(COLOURS)[:, None]
-# Power of a signal halfway up its spectrum, over that of the noise at the end.
+# Power of a signal at half the Nyquist frequency, over that of the noise at its end.
 SIGNALS = np.concatenate(([0.0], np.exp(np.arange(-4.0, 8.0, 0.25))))
 
 
 def quiet_noise(residual: Floats) -> Noise | None:
-    """Return the noise of a residual, shape (frames,); None where it is short or without any."""
+    """Return the noise of a residual, shape (frames,); None if it is short or has no noise."""
     if len(residual) < WHITE_FRAMES:
         return None
     omega, logs, variance = _levels(residual, 1)
@@ -67,8 +67,8 @@ def _coloured_from_below(
 ) -> tuple[float, float] | None:
     """Return the colour and level that explain more frequencies than those from `first` on.
 
-    Far above its corner coloured noise may pass for white, beside which the rest stands out. None
-    where no colour explains them to the end as chance would have it.
+    Far above its corner frequency coloured noise looks white, and its part below like a signal.
+    None if no colour fits up to the Nyquist frequency by χ².
     """
     for begin in range(first):
         memory, level, misfit = _fitted(omega[begin:], logs[begin:], variance)
@@ -79,7 +79,7 @@ def _coloured_from_below(
 
 
 def noise_of_input(signal: Floats) -> Noise | None:
-    """Return the noise of a smooth signal, shape (frames,); None where it is short or without."""
+    """Return the noise of a smooth signal, shape (frames,); None if it is short or has no noise."""
     if len(signal) < WHITE_FRAMES:
         return None
     omega, logs, variance = _levels(signal, 4)
@@ -99,7 +99,7 @@ def noise_of_input(signal: Floats) -> Noise | None:
     misfits = np.array(each)
 
     def level(colour: int) -> float:
-        """Return the power of what drives noise of a colour, with the signal that fits best."""
+        """Return the power of the white input of noise of a colour, with the best signal."""
         best = int(misfits[:, colour].argmin())
         steep, size = np.unravel_index(best, misfits[:, colour].shape)
         power = (0.5 * math.pi / omega) ** STEEPNESSES[steep]
@@ -120,7 +120,7 @@ def noise_of_input(signal: Floats) -> Noise | None:
 def _levels(signal: Floats, differences: int) -> tuple[Floats, Floats, float]:
     """Return frequencies, rad a frame, the logarithm of the noise's power there, and its variance.
 
-    The signal is differenced, which keeps its slow parts from leaking.
+    The signal is differenced to avoid leakage from low frequencies.
     """
     taper = np.hanning(PIECE)
     rough = np.diff(signal, differences)
@@ -128,22 +128,22 @@ def _levels(signal: Floats, differences: int) -> tuple[Floats, Floats, float]:
     power = np.abs(np.fft.rfft(pieces * taper, axis=1)) ** 2 / float(taper @ taper)
     omega = np.linspace(0.0, math.pi, power.shape[1])[1:-1]
     power = power[:, 1:-1] / (2.0 * np.sin(0.5 * omega)) ** (2 * differences)
-    # Of exponentially distributed values the share q lies under −ln(1 − q) of the mean.
+    # The quantile q of exponentially distributed values is −ln(1 − q) times the mean.
     middle = -math.log(1.0 - QUIET_SHARE)
     with np.errstate(divide="ignore"):
         logs = np.log(np.quantile(power, QUIET_SHARE, axis=0) / middle)
-    # Pieces overlap by half and neighbours in frequency by the taper: so many count.
+    # Pieces overlap by half, and the taper correlates neighbouring frequencies.
     counted = 0.5 * len(power)
     return omega, logs, QUIET_SHARE / ((1.0 - QUIET_SHARE) * middle**2) / counted
 
 
 def _shape(omega: Floats | float, memory: Floats) -> Floats:
-    """Return the logarithm of a first-order lag's noise over that of what drives it."""
+    """Return the logarithm of the power of a first-order lag's noise over its white input's."""
     return np.asarray(-np.log(1.0 + memory**2 - 2.0 * memory * np.cos(omega)))
 
 
 def _fitted(omega: Floats, logs: Floats, variance: float) -> tuple[float, float, float]:
-    """Return the correlation by frames, 0 where white noise explains it as well, level and χ²."""
+    """Return the correlation by frames (0 if white noise fits about as well), level and χ²."""
     left = logs - _shape(omega, _SHAPES)
     middle = np.median(left, axis=1, keepdims=True)
     near = np.abs(left - middle) < OUTLYING * math.sqrt(variance)

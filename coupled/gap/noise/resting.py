@@ -1,10 +1,9 @@
-"""Where a signal rests: there it is its mean, and what trembles about that is noise.
+"""Where a signal rests: there it is constant, and its variation is noise.
 
-A smoother passes the noise that a channel has at low frequencies. A stage that remembers what drove
-it is walked by that: dry friction whose contact yields, a grip within its play. The real one stands
-still under a hand that rests, or that has let go. So a stretch that shows no more than noise about
-one level is held at that level. Its windows scatter as noise does, their halves have one mean, and
-so have all its parts, by χ².
+A smoother passes noise at low frequencies. A stage with memory (presliding friction, backlash)
+creeps under that noise, while the real hardware stands still as long as the hand rests. A stretch
+that shows only noise about one level is therefore held at that level. Its windows have the scatter
+of noise and halves with equal means, and the means of all its parts agree by χ².
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rest:
-    """Where a signal rests, 1 in `share`, and at which level, in its unit; shapes (frames,).
+    """The rests of a signal: `share` is 1 at rest, `level` the value there; shapes (frames,).
 
     `ends` are the first frame of each rest and the one after its last, `errors` the standard errors
-    of their levels, in its unit.
+    of the levels, in the signal's unit.
     """
 
     share: Floats
@@ -43,15 +42,15 @@ class Rest:
     errors: tuple[float, ...] = ()
 
     def held(self, smooth: Floats) -> Floats:
-        """Return a smoothed signal, held where it rests; same shape."""
+        """Return a smoothed signal, constant at rest; same shape."""
         return self.share * self.level + (1.0 - self.share) * smooth
 
     def beside(self, error: Floats) -> Floats:
-        """Return the error of a smoothed signal without that where it rests; same shape."""
+        """Return the error of a smoothed signal, zero at rest; same shape."""
         return (1.0 - self.share) * error
 
     def with_error(self, error: Floats, rng: np.random.Generator) -> Floats:
-        """Return the error of a smoothed signal, and of its level where it rests; same shape."""
+        """Return the error of a smoothed signal, at rest that of its level; same shape."""
         whole = self.beside(error)
         for (start, end), size in zip(self.ends, self.errors, strict=True):
             whole[start:end] += self.share[start:end] * rng.normal(0.0, size)
@@ -59,9 +58,9 @@ class Rest:
 
 
 def rest_of(signal: Floats, noise: Noise) -> Rest:
-    """Return where a signal with noise rests; nowhere, where it has none or is short.
+    """Return the rests of a signal; none if it has no noise or is short.
 
-    Nor where the noise is a large part of it: that may be the signal itself, which then moves.
+    None either if the noise is a large part of the signal, since that may be motion.
     """
     share, level = np.zeros(len(signal)), np.zeros(len(signal))
     ends, errors = list[tuple[int, int]](), list[float]()
@@ -79,7 +78,7 @@ def rest_of(signal: Floats, noise: Noise) -> Rest:
 
 
 def _quiet(signal: Floats, noise: Noise) -> NDArray[np.bool_]:
-    """Return the frames that lie in a window which shows no more than noise about one mean."""
+    """Return the frames in a window that shows only noise about one mean."""
     window, half = REST_FRAMES, REST_FRAMES // 2
     windows = np.lib.stride_tricks.sliding_window_view(signal, window)
     first, second = windows[:, :half].mean(axis=1), windows[:, half:].mean(axis=1)
@@ -87,12 +86,12 @@ def _quiet(signal: Floats, noise: Noise) -> NDArray[np.bool_]:
     apart = REST_CHANCE * noise.rms * math.sqrt(2.0 * _longer(noise) / half)
     still = (windows.std(axis=1) <= spread) & (np.abs(second - first) <= apart)
     begun = np.concatenate((still.astype(int), np.zeros(window, dtype=int)))
-    begun[window:] -= still  # each still window is open for so many frames
+    begun[window:] -= still  # each still window covers so many frames
     return np.asarray(np.cumsum(begun[: len(signal)]) > 0)
 
 
 def _stretches(quiet: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first frame of each quiet stretch and the one after its last, without its ends."""
+    """Return the bounds of the quiet stretches, shortened at both ends."""
     turns = np.flatnonzero(np.diff(quiet.astype(int), prepend=0, append=0)).tolist()
     pairs = zip(turns[::2], turns[1::2], strict=True)
     inner = [(start + REST_FADES // 2, end - REST_FADES // 2) for start, end in pairs]
@@ -100,7 +99,7 @@ def _stretches(quiet: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _is_level(stretch: Floats, mean: float, noise: Noise) -> bool:
-    """Tell whether the parts of a stretch scatter about its mean as noise does."""
+    """Tell whether the means of a stretch's parts scatter as noise does (χ² test)."""
     parts = np.array_split(stretch, max(3, len(stretch) // REST_PART))
     off = np.array([np.mean(part) - mean for part in parts])
     frames = np.array([len(part) for part in parts])
@@ -110,5 +109,5 @@ def _is_level(stretch: Floats, mean: float, noise: Noise) -> bool:
 
 
 def _longer(noise: Noise) -> float:
-    """Return by how much the variance of a mean is that of white noise."""
+    """Return the variance of a mean relative to that with white noise."""
     return (1.0 + noise.memory) / (1.0 - noise.memory)

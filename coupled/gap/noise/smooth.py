@@ -1,16 +1,15 @@
-"""Taking the noise off a smooth input, without a choice to make.
+"""Smoothing of inputs, with parameters from cross-validation.
 
-A stage driven by a noisy input answers to noise that the rig never felt, and a fit then
-mistakes the missing answer for more inertia, or a lag (errors in variables). The inputs are
-smooth on the scale of a frame, so the Whittaker smoother with n-th differences, n up to 3,
+A stage driven by a noisy input responds to noise that the rig never had, and a fit then mistakes
+the missing response for more inertia or a lag (errors in variables). The inputs are smooth on the
+scale of a frame, so the Whittaker smoother with n-th differences, n up to 3,
 
     H(ω) = 1/(1 + λ·(2·sin(ω/2))²ⁿ),
 
-takes the noise off; λ and n are chosen by generalised cross-validation (Craven and Wahba, 1979),
-which leaves sharp inputs sharp. It takes neighbours' noise for independent, and would keep what
-coloured noise has more of at low frequencies: so the spectra are first divided by the noise's, and
-λ rises with it. A line (`lines`), as the mains' hum, is no noise: it is taken off before, and put
-back.
+removes the noise. λ and n are from generalised cross-validation (Craven and Wahba, 1979), which
+preserves sharp inputs. It assumes white noise, so the spectra are first divided by that of the
+noise's colour, and λ is scaled likewise. A line (`lines`), such as mains hum, is not noise: it is
+subtracted before and added again.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from coupled.gap.noise.quiet import noise_of_input
 from coupled.gap.thresholds import BROAD
 
 Floats = NDArray[np.float64]
-_REMEMBERED = 64  # signals whose smoother is known: those of one record, noise and all
+_REMEMBERED = 64  # size of the cache of smoothers: the signals of one record, noise included
 
 
 def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
@@ -40,27 +39,27 @@ def rate_of(signal: Floats, frame_rate_Hz: float) -> Floats:
 
 @dataclass(frozen=True)
 class Smoother:
-    """A Whittaker smoother, its order and strength found by cross-validation on one signal."""
+    """A Whittaker smoother, with order and strength from cross-validation on one signal."""
 
-    gain: Floats  # H at each frequency of the lengthened signal
-    reach: int  # frames by which a signal is lengthened at either end
+    gain: Floats  # H at each frequency of the extended signal
+    reach: int  # frames by which a signal is extended at either end
     lines: tuple[Line, ...] = ()
 
     @classmethod
     def of(
         cls, signal: Floats, orders: Sequence[int] = (3, 2, 1), noise: Noise | None = None
     ) -> Smoother:
-        """Return the one that suits a signal best, with differences of one of these orders.
+        """Return the best smoother of a signal, with differences of one of these orders.
 
-        `noise` has the colour of what is taken off; without it that is heard from the signal.
+        `noise` gives the colour of the noise; by default it is estimated from the signal.
         """
         whole = np.ascontiguousarray(signal, dtype=np.float64).tobytes()
         return _known(whole, tuple(orders), noise)
 
     def smooth(self, signal: Floats) -> Floats:
-        """Return a signal of the same length without its noise; zero phase.
+        """Return a signal without its noise, same length, zero phase.
 
-        It is the one whose smoother this is, or one with the same lines.
+        The signal is that of the smoother, or one with the same lines.
         """
         lines = sum(line.over(len(signal)) for line in self.lines)
         long = _lengthened(signal - lines, self.reach)
@@ -71,7 +70,7 @@ class Smoother:
     def wiener_error(self, level: Noise, frames: int, rng: np.random.Generator) -> Floats:
         """Return a sample of the smoothing error, PSD H·Sₙ: noise passed and signal lost.
 
-        For a signal of which this smoother is the Wiener filter; `level` is its noise.
+        It holds for a signal whose Wiener filter is this smoother; `level` is its noise.
         """
         noise = level.sample(frames + 2 * self.reach, rng)
         out = np.fft.irfft(np.fft.rfft(noise) * np.sqrt(self.gain), len(noise))
@@ -80,7 +79,7 @@ class Smoother:
 
 @lru_cache(maxsize=_REMEMBERED)
 def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoother:
-    """Return the smoother of a signal; a diagnosis smooths each of them several times."""
+    """Return the smoother of a signal, cached."""
     plain = np.frombuffer(signal)
     lines = tuple(lines_in(plain))
     reach = min(len(plain) - 1, 200)
@@ -91,10 +90,10 @@ def _known(signal: bytes, orders: tuple[int, ...], noise: Noise | None) -> Smoot
 
 
 def _colour(signal: Floats, noise: Noise | None) -> float:
-    """Return how the noise to take off correlates from frame to frame, as given or as heard.
+    """Return the noise's correlation from frame to frame, as given or as estimated.
 
-    None in a log that was filtered, nor where it is a large part of the signal: its colour may then
-    be the signal's own.
+    Zero for a filtered log, and for noise that is a large part of the signal, since its colour may
+    then be the signal's.
     """
     if noise is None and not noise_of(signal).filtered:
         noise = noise_of_input(signal)
@@ -103,12 +102,12 @@ def _colour(signal: Floats, noise: Noise | None) -> float:
 
 
 def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:
-    """Return the gain by which a lengthened signal is best foretold from its own neighbours.
+    """Return the gain with the least generalised cross-validation score for an extended signal.
 
-    Its noise correlates from frame to frame by `memory`.
+    The noise correlates from frame to frame by `memory`.
     """
     rate = 2.0 * np.sin(np.pi * np.fft.rfftfreq(len(long)))
-    colour = (1.0 + memory) ** 2 / ((1.0 - memory) ** 2 + memory * rate**2)  # 1 at the end
+    colour = (1.0 + memory) ** 2 / ((1.0 - memory) ** 2 + memory * rate**2)  # 1 at Nyquist
     power = np.abs(np.fft.rfft(long - np.linspace(long[0], long[-1], len(long)))) ** 2 / colour
     best, found, stopped = np.inf, (orders[0], 0.0), np.empty_like(power)
     for order in orders:
@@ -125,12 +124,12 @@ def _gain(long: Floats, orders: Sequence[int], memory: float) -> Floats:
 
 
 def smoothed(signal: Floats, noise: Noise | None = None) -> Floats:
-    """Return the signal without its noise, of a colour as given or heard; same shape, no lag."""
+    """Return the signal without noise of a given or estimated colour; same shape, no lag."""
     return Smoother.of(signal, noise=noise).smooth(signal)
 
 
 def _lengthened(signal: Floats, reach: int) -> Floats:
-    """Return the signal reflected about its ends, where the transform then sees no jump or kink."""
+    """Return the signal extended by point reflection at its ends, without jump or kink."""
     before = 2.0 * signal[0] - signal[reach:0:-1]
     after = 2.0 * signal[-1] - signal[-2 : -reach - 2 : -1]
     return np.concatenate((before, signal, after))

@@ -1,1 +1,1 @@
-"""What a record holds of each stage: its inputs and outputs, and their floors."""
+"""The inputs and outputs of each stage in a record, and their noise floors."""

@@ -1,13 +1,14 @@
-"""How the air moves, by kinematics alone, without any aerodynamics.
+"""The vertical motion of the air, from kinematics alone, without aerodynamics.
 
     w = ḣ − V·sin(θ − α),
 
-with ḣ from the load factor, held to the altitude. The model is then flown through that air: a
-gust is accepted where the *pitch rate* follows it, which had no part in finding it.
+with ḣ integrated from the load factor and corrected by the altitude. The model is then flown
+through that air. Gusts are accepted as an effect if the *pitch rate* follows them, which is not
+used in the estimate.
 
-The noise in w is white, that of turbulence falls as 1/ω²: the smoother is Whittaker's with first
-differences, which is Wiener's for such a signal, H = S_w/(S_w + S_n). What is wrong with its
-outcome, noise passed and air lost, has the spectrum H·S_n then, and is known without the air.
+The noise in w is white, and the spectrum of turbulence falls as 1/ω². The Whittaker smoother with
+first differences is the Wiener filter of such a signal, H = S_w/(S_w + S_n). The error of its
+output (noise passed and air lost) has the spectrum H·S_n, which does not depend on the air.
 """
 
 from __future__ import annotations
@@ -34,20 +35,20 @@ GRAVITY_m_per_s2 = 9.80665
 
 @dataclass(frozen=True)
 class Air:
-    """The air's vertical speed over a record, m/s, shape (frames,), and what is wrong with it."""
+    """The vertical speed of the air over a record, m/s, shape (frames,), with its error."""
 
     speed: Floats
-    rms: float  # of the true air: the rough one's less its noise
+    rms: float  # of the air: that of the unsmoothed estimate, without its noise
     error: Floats  # a sample of the error, m/s
 
 
 def can_tell_air(records: Sequence[Record]) -> bool:
-    """Tell whether the records have what the kinematics of the air need."""
+    """Tell whether the records have the channels that the kinematics need."""
     return all(name in record for record in records for name in NEEDS)
 
 
 def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
-    """Return how fast the air rises at each frame, or None where channels lack."""
+    """Return the vertical speed of the air at each frame; None if channels are missing."""
     if not can_tell_air([record]):
         return None
     alpha, pitch, speed, _ = (record[name] for name in NEEDS)
@@ -58,7 +59,7 @@ def vertical_air(record: Record, frame_s: float, seed: int = 43) -> Air | None:
     smoother = Smoother.of(rough, (1,))
     smooth = smoother.smooth(rough)
     error = smoother.wiener_error(level, len(rough), rng) + climb_error
-    # The smoother takes some of a faint gust with the noise, which its own rms would miss.
+    # The smoother removes a part of weak gusts with the noise, so two estimates are compared.
     true = max(float(np.var(rough)) - level.rms**2, float(np.var(smooth)))
     return Air(smooth, math.sqrt(true), error)
 
@@ -71,10 +72,10 @@ def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Fl
         noisy = climb + rng.normal(0.0, white(height), len(height))
         return climb, smoothed(noisy) - climb
     load = record[LOAD]
-    # JSBSim tells the acceleration that led to a frame: the next one holds that of this frame.
+    # JSBSim's load factor is that of the frame before: row k + 1 has that of row k.
     normal = np.append(load[1:], load[-1]) * GRAVITY_m_per_s2
     attack = smoothed(alpha)
-    # What the aircraft feels along its path is of its thrust and drag, and of a part of its lift.
+    # The acceleration along the path is from thrust, drag and a component of the lift.
     path = rate_of(smoothed(speed), 1.0 / frame_s)
     path += GRAVITY_m_per_s2 * np.sin(smoothed(pitch - alpha))
     ahead = (path + normal * np.sin(attack)) / np.cos(attack)
@@ -85,22 +86,22 @@ def _climb(record: Record, frame_s: float, rng: np.random.Generator) -> tuple[Fl
 
 
 def _held(upward: Floats, height: Floats, frame_s: float, sigma: tuple[float, float]) -> Floats:
-    """Return the integral of an acceleration, m/s, held to a height, each by its noise `sigma`.
+    """Return the integral of an acceleration, m/s, corrected by a height; `sigma` are their noises.
 
-    Least squares in both: what the twice integrated acceleration d lacks of the height solves
+    Least squares in both: the error d of the twice integrated acceleration solves
     (I + λ·D₂ᵀD₂)·d = h − ∬a with λ = (σ_h/(σ_a·Δt²))².
     """
     climbs = _summed(upward, frame_s)
     lacks = height - _summed(climbs, frame_s)
     frames = np.arange(len(height))
-    slow = Polynomial.fit(frames, lacks, 6)(frames)  # what would cost the equations digits
+    slow = Polynomial.fit(frames, lacks, 6)(frames)  # removed for numerical precision
     weight = min((sigma[1] / max(sigma[0] * frame_s**2, 1e-12)) ** 2, STIFFEST_AIR)
     drift = slow + _whittaker(lacks - slow, weight)
     return np.asarray(climbs + np.gradient(drift, frame_s))
 
 
 def _summed(rate: Floats, frame_s: float) -> Floats:
-    """Return the integral of a rate from the first frame on, by trapezia, same shape."""
+    """Return the integral of a rate from the first frame on, by trapezoidal rule, same shape."""
     return np.asarray((np.cumsum(rate) - 0.5 * (rate + rate[0])) * frame_s)
 
 
@@ -116,7 +117,7 @@ def _whittaker(signal: Floats, weight: float) -> Floats:
 
 
 def spread_of_air(record: Record, frame_s: float) -> float:
-    """Return the relative standard error of the gusts' rms, from how few of them a record meets.
+    """Return the relative sampling error of the gusts' rms in a record.
 
     The variance of a Gaussian process has N/(Σρ²) independent samples (Bartlett).
     """

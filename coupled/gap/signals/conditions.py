@@ -1,7 +1,8 @@
-"""The wind, gusts and events of a record's flight, as the manifest beside it holds them.
+"""The wind, gusts and events of a record's flight, from its manifest.
 
-What a simulated flight met is known to the last digit: it is flown again, and is no effect to be
-found. Of another record, or of a part of one that does not begin with the flight, nothing is known.
+The conditions of a simulated flight are known exactly: they act on the model too, and are not
+reported as effects. They are unknown for other records, and for a part of a record that does not
+begin with the flight.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ FILE = "the manifest"
 
 
 def conditions_of(record: Record) -> Conditions:
-    """Return the conditions in which a record was flown; none where they are not known."""
+    """Return the conditions of a record's flight; empty if they are not known."""
     given = record.manifest.get("conditions")
     begins = len(record) > 0 and record.time_s[0] == 0.0
     if not isinstance(given, Mapping) or not begins:
@@ -37,23 +38,23 @@ def conditions_of(record: Record) -> Conditions:
 
 
 def reach_of(record: Record, control: ControlName) -> float:
-    """Return where the cab stopped the grip in a record's flight, d; 0 where nothing did."""
+    """Return the grip's reach in the cab of a record's flight, d; 0 if unlimited."""
     given = record.manifest.get("reach")
     reach = given.get(control) if isinstance(given, Mapping) else None
     return reach if isinstance(reach, float) and reach > 0.0 else 0.0
 
 
 def wrappers_of(record: Record, frame_s: float) -> list[Wrapper]:
-    """Return the conditions of a record as what is put around an aircraft."""
+    """Return the conditions of a record as wrappers of an aircraft."""
     seed = record.manifest.get("seed")
     drawn = seed if isinstance(seed, int) else 0
     return condition_wrappers(conditions_of(record), FILE, frame_s, drawn)
 
 
 def trim_shift(record: Record, control: ControlName, frame_s: float) -> Floats:
-    """Return by how much events have moved a control's trim over each frame, of the whole command.
+    """Return the shift of a control's trim by events over each frame, as share of full command.
 
-    As a command of the surface: positive as JSBSim has it.
+    Sign as of the surface command in JSBSim.
     """
     times = np.arange(len(record), dtype=np.float64) * frame_s
     return trim_moved(conditions_of(record).event, control, times)

@@ -1,4 +1,4 @@
-"""Channels that count: an encoder's zero is known no better than to one of its counts."""
+"""Quantised channels: the zero of an encoder is known to one count only."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ ZEROS = {"deflection": "sensing.deflection_zero_{d}", "force": "sensing.force_ze
 
 
 def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
-    """Return the rig with zeros that may be off by a count of their channels, where these count.
+    """Return the rig with a tolerance of one count on the zeros of quantised channels.
 
-    A channel counts where its rounding is half of its noise or more. What the file says stays.
+    A channel is quantised if its rounding is at least half of its noise. A tolerance in the rig
+    file takes precedence.
     """
     known = rig.controls[control].tolerance
     found = dict(known)
@@ -30,7 +31,7 @@ def as_counted(rig: Rig, records: Collection[Record], control: ControlName) -> R
 
 
 def _count(record: Record, name: str) -> float:
-    """Return the size of a channel's count in its unit, 0 where that is little of its noise."""
+    """Return the size of a channel's count in its unit, 0 if it is small against the noise."""
     signal = record[name]
     error = rounding(signal, math.inf)
     return error * math.sqrt(12.0) if error > COUNTS * heard(signal).rms else 0.0

@@ -1,4 +1,4 @@
-"""A measured signal as it drives a stage: smoothed, held where it rests, and what noise does."""
+"""A measured signal as the input of a stage: smoothed, constant at rest, with its error."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Drive:
-    """A signal that drives a stage, as recorded and as it drives it, its noise and its rest."""
+    """A signal that drives a stage: as recorded, as used for input, its noise and its rests."""
 
     recorded: Floats
     smooth: Floats
@@ -27,10 +27,10 @@ class Drive:
 
     @classmethod
     def of(cls, signal: Floats, noise: Noise) -> Drive:
-        """Return a signal smoothed, and held where it rests; one without noise as it is.
+        """Return a signal smoothed, and held constant at rest; unchanged if it has no noise.
 
-        So is one of which the smoother would take far more than its noise: that is signal, as of a
-        hand that moves in steps.
+        It is also unchanged if the smoother would remove far more than its noise, since that is
+        signal, for example of a hand that moves in steps.
         """
         rest = rest_of(signal, noise)
         smooth = rest.held(smoothed(signal, noise)) if noise.rms else signal
@@ -39,18 +39,18 @@ class Drive:
         return made.unsmoothed(noise) if taken > LOUDER * noise.rms else made
 
     def unsmoothed(self, noise: Noise) -> Drive:
-        """Return it as recorded: what is rough in it is no noise."""
+        """Return the signal as recorded, without smoothing."""
         none = np.zeros(len(self.recorded))
         return replace(self, smooth=self.recorded, noise=noise, rest=Rest(none, none))
 
     def with_error(self, k: int) -> Floats:
-        """Return it with a sample of its error, number k; shape (frames,)."""
+        """Return the signal with a sample of its error, number k; shape (frames,)."""
         if self.smooth is self.recorded:
             return unsmoothed(self.smooth, k, self.noise)
         error = with_error(self.smooth, k, self.noise) - self.smooth
         return self.smooth + self.rest.with_error(error, np.random.default_rng([43, k]))
 
     def passed(self, rng: np.random.Generator) -> Floats:
-        """Return a sample of what its smoother passes of its noise, shape (frames,)."""
+        """Return a sample of the noise that passes the smoother, shape (frames,)."""
         sample = self.noise.sample(len(self.recorded), rng)
         return self.rest.beside(Smoother.of(self.recorded, noise=self.noise).smooth(sample))

@@ -1,14 +1,14 @@
-"""What drives a machine, where its records show it without doubt.
+"""The input of a machine (force, set points or imposed motion), if its records show it clearly.
 
-A digital servo is given set points. In a record of them that is faster than they come, each stands
-for several frames, and they differ by more than one step of a converter: a motion that was measured
-repeats itself so only by its rounding. Where they come as fast as the record's frames, it is their
-noise that tells: a number that a computer made has none beside what the grip's transducer reads.
+A digital servo receives set points. In a record faster than the set points each one is held for
+several frames, and they differ by more than one step of a converter; a measured motion repeats
+values only by rounding. In a record as fast as the set points their noise decides: a computed
+number has none in comparison with the transducer at the grip.
 
-A record may have the grip's motion and force and no δc. Where a spring holds the loader, its answer
-to the force is predicted, and the linkage moves the grip in series with it (`stages.series`). A
-loader without a spring would drift in such a prediction: its motion is taken as imposed, and the
-force as its answer (`stages.imposed`).
+A record may have motion and force of the grip and no δc. If a spring holds the loader, its response
+to the force is predicted, with the linkage in series (`stages.series`). Without a spring this
+prediction would drift, so the motion is taken as imposed and the force as output
+(`stages.imposed`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from coupled.rig.rig import Rig
 
 
 def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Rig:
-    """Return the rig with what drives it, where all records show what its file does not say."""
+    """Return the rig with its kind of input, if all records show one that the file does not set."""
     name, grip, force = (channel(control, q) for q in ("computed", "deflection", "force"))
     if rig.controls[control].drive != "force":
         return rig
@@ -49,16 +49,16 @@ def as_driven(rig: Rig, records: Collection[Record], control: ControlName) -> Ri
 
 
 def drifts(rig: Rig, control: ControlName, gradient: float) -> bool:
-    """Tell whether a loader has no spring to speak of: a prediction from its force would drift.
+    """Tell whether a prediction from the force would drift, for lack of a spring.
 
-    That is a period longer than `SLOW_LOADER_s` at a gradient in N/d.
+    True if the loader's own period exceeds `SLOW_LOADER_s` at a gradient in N/d.
     """
     mass = rig.controls[control].loader.mass
     return max(gradient, 0.0) * SLOW_LOADER_s**2 < 4.0 * np.pi**2 * mass
 
 
 def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
-    """Return the least gradient of a record, N/d: recorded, by its q̄, or the least of the table."""
+    """Return a record's least gradient, N/d: as recorded, from its q̄, or the table's least."""
     gradient, pressure = channel(control, "gradient"), "dynamic_pressure_Pa"
     schedule = rig.controls[control].schedule
     if gradient in record:
@@ -69,10 +69,10 @@ def softest_gradient(rig: Rig, control: ControlName, record: Record) -> float:
 
 
 def _made(record: Record, control: ControlName) -> bool:
-    """Tell whether δc is a number that was made, not a motion that was measured.
+    """Tell whether δc is a computed number, not a measured motion.
 
-    Only where nothing else of a loader or its host is recorded: a simulation without noise has δc
-    without noise, too.
+    Only for records without other channels of loader or host, since in a simulation without noise
+    δc has no noise either.
     """
     others = (channel(control, q) for q in ("gradient", "modifying_force", "estimate"))
     given, grip = channel(control, "computed"), channel(control, "deflection")
@@ -82,10 +82,11 @@ def _made(record: Record, control: ControlName) -> bool:
 
 
 def _finest(signal: Floats) -> float:
-    """Return the noise of the quietest stretches in which a signal moves; infinite without any.
+    """Return the noise of the quietest stretches in which a signal moves; infinite if none.
 
-    By fourth differences, over stretches of so many frames that a motion is none in the quietest.
-    Moving is by two steps of a converter a frame or more: a slower one repeats its own.
+    By fourth differences, over stretches short enough that the motion does not contribute in the
+    quietest. A motion of less than two converter steps a frame is left out, since its values
+    repeat by rounding.
     """
     steps = np.abs(np.diff(signal))
     if not np.any(steps) or len(steps) < HELD_WINDOW + 4:
@@ -101,7 +102,7 @@ def _finest(signal: Floats) -> float:
 def in_set_points(signal: Floats) -> bool:
     """Tell whether a signal comes in set points, each held over two frames or more.
 
-    Two changes in a row would be a motion; a pause longer than some frames says nothing.
+    Changes in consecutive frames show a motion; pauses longer than `HELD_AT_MOST` are ignored.
     """
     changes = np.flatnonzero(np.diff(signal))
     if len(changes) < HELD_JUMPS:

@@ -1,4 +1,4 @@
-"""What is taken for a channel's noise: by its spectrum, or where that does not say, the file."""
+"""The noise of a channel: from its spectrum, or from the rig file if the log was filtered."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
-    """Return the noise of a channel; of one that was filtered, no less than `given_noise`."""
+    """Return the noise of a channel; at least `given_noise` if its log was filtered."""
     found = heard(signal)
     if not found.filtered:
         return found
@@ -27,14 +27,14 @@ def noise_in(rig: Rig, channel: str, signal: Floats) -> Noise:
 
 
 def given_noise(rig: Rig, channel: str, signal: Floats) -> Noise:
-    """Return what the rig file says of a channel's noise; else the least that a sensor has."""
+    """Return the noise of a channel in the rig file; by default the least that a sensor has."""
     known = rig.noise.get(channel, 0.0)
     least = LEAST_NOISE * float(np.sqrt(np.mean(signal**2)))
     return Noise(known or max(least, rounding(signal, np.inf)))
 
 
 def input_noise(heard_: Noise, signal: Floats) -> Noise:
-    """Return the noise of a channel that drives its stage; no less than its rounding."""
+    """Return the noise of a stage's input; at least its rounding."""
     found = None if heard_.filtered else noise_of_input(signal)
     return heard_ if found is None else _no_less(found, signal)
 
@@ -42,12 +42,12 @@ def input_noise(heard_: Noise, signal: Floats) -> Noise:
 def left_noise(
     heard_: Noise, signal: Floats, left: Floats, judged: NDArray[np.bool_] | None = None
 ) -> Noise:
-    """Return a channel's noise by what its stage leaves of it; no less than its rounding.
+    """Return a channel's noise from the residual of its stage; at least its rounding.
 
-    `heard_` is what the signal alone says: it stays for a filtered log, and for a short one, and
-    where the rest is far louder: a signal that jumps elsewhere than predicted is a gap.
-    Frames that are not `judged` have nothing left, and would be heard as silence: the noise is that
-    of the others, and its rms that over all frames. Where none is judged, `heard_` stays.
+    `heard_` is the noise estimated from the signal alone. It is kept for a filtered log, for a
+    short record, and if the residual is far larger: a signal that jumps elsewhere than predicted is
+    a gap, not noise. Frames that are not `judged` have no residual. The noise is estimated from the
+    others, and its rms taken over all frames; if no frame is judged, `heard_` is kept.
     """
     rows = np.ones(len(left), dtype=bool) if judged is None else judged
     found = None if heard_.filtered else quiet_noise(left[rows])
@@ -58,37 +58,37 @@ def left_noise(
 
 
 def without_echo(left: Floats, echo: Floats | None) -> Floats:
-    """Return what a stage leaves without what repeats another channel's noise, same shape.
+    """Return a residual without the part that repeats another channel's noise, same shape.
 
-    A product that a host makes of δc as read repeats the noise of that reading: that says how it is
-    made, and to take it for the channel's own noise would hide it.
+    A host's product of δc as read contains the noise of that reading. It shows how the product is
+    computed and must not count as the product's own noise.
     """
     power = 0.0 if echo is None else float(echo @ echo)
     return left if echo is None or power == 0.0 else left - float(left @ echo) / power * echo
 
 
 def _no_less(found: Noise, signal: Floats) -> Noise:
-    """Return a noise that is no less than a signal's rounding."""
+    """Return a noise that is at least a signal's rounding."""
     rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
     return replace(found, rms=max(found.rms, rounding(signal, rough)))
 
 
 def with_error(signal: Floats, k: int, level: Noise) -> Floats:
-    """Return a smoothed signal with a sample of its error: noise passed, and signal lost."""
+    """Return a smoothed signal with a sample of its error: noise passed and signal lost."""
     rng = np.random.default_rng([41, k])
     raw = signal + level.sample(len(signal), rng)
     return signal + Smoother.of(raw, noise=level).wiener_error(level, len(signal), rng)
 
 
 def unsmoothed(signal: Floats, k: int, level: Noise) -> Floats:
-    """Return a signal that is taken as recorded, with as much noise again."""
+    """Return a signal that is used as recorded, with as much noise again."""
     return signal + level.sample(len(signal), np.random.default_rng([41, k]))
 
 
 def floor_from(rig: Rig, channel: str, signal: Floats) -> str:
-    """Return where the floor of a channel comes from whose log was filtered."""
+    """Return the source of a channel's noise floor if its log was filtered, in words."""
     if heard(signal).rms > given_noise(rig, channel, signal).rms:
-        return "what is left at its highest frequencies"
+        return "the level at its highest frequencies"
     if rig.noise.get(channel, 0.0) > 0.0:
         return "the rig file"
-    return f"1/{1.0 / LEAST_NOISE:g} of the signal, since the rig file says nothing of it"
+    return f"1/{1.0 / LEAST_NOISE:g} of the signal's RMS, since the rig file does not give it"

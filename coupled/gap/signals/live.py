@@ -1,15 +1,14 @@
-"""What of a live record can be judged: by its rows' validity, the loader's clock, and what changed.
+"""The parts of a live record that can be judged: by validity, the loader's clock and switches.
 
-A host flies on when a sample of the loader does not come, so a row may repeat an older sample; it
-was taken at a time of the loader's own clock, which is not that of the frame. What the loader
-measured is brought to equal steps of the loader's clock. A sample that is missing is bridged where
-the gap is short, and its rows are left out where it is long. So are rows whose forces faded, and
-rows flown with hardware other than at the start. Where rows are left out a replay starts again from
-the state as measured.
+A host continues if a sample of the loader does not arrive, so a row may repeat an older sample.
+Samples are taken at times of the loader's own clock, which differ from the frames. The measured
+signals are therefore resampled to equal steps of that clock. Short gaps are interpolated; rows in
+long gaps are left out. Rows with faded forces, and rows with other hardware than at the start, are
+left out too. After a gap a replay restarts from the measured state.
 
-K̂ and the corrections may change in flight, by a switch or as K̂ follows K in service. The manifest
-lists when (`live.switched`, `live.adapted`), so the host's arithmetic is replayed with what it used
-at each moment.
+K̂ and the corrections may change in flight, by a switch or by adaptation in service. The manifest
+lists the changes (`live.switched`, `live.adapted`), and the host's equations are replayed with the
+values in use at each row.
 """
 
 from __future__ import annotations
@@ -43,32 +42,31 @@ from coupled.record.record import Record
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-HARDWARE = ("bend", "friction", "breakout")  # what a switch changes of a simulated loader
-HOSTED = ("assumed_bend", "deflection", "gradient")  # and of the host's own arithmetic
+HARDWARE = ("bend", "friction", "breakout")  # switches of a simulated loader
+HOSTED = ("assumed_bend", "deflection", "gradient")  # switches of the host's compensation
 MEASURED = ("force", "computed", "deflection")
 
-# With a gap of three frames at 120 Hz the samples still hold what is below 15 Hz; a hand moves a
+# Samples with a gap of three frames at 120 Hz still represent signals below 15 Hz; a hand moves a
 # control below 5 Hz.
 BRIDGED_s = 0.025
-# After a replay has started from a measured state, what was wrong with that state fades: the
-# slowest of the shipped loaders has a time constant of 0.11 s, and the start is already measured to
-# within its noise.
+# After a restart from a measured state, errors of that state decay: the slowest of the shipped
+# loaders has a time constant of 0.11 s, and the state is measured to within its noise.
 SETTLE_s = 0.2
-LEAD_s = 0.05  # samples before a start, from which its rate is estimated
+LEAD_s = 0.05  # samples before a restart, from which the initial rate is estimated
 LEAST_s = 0.5  # a shorter stretch is not judged
 SHORTEST_s = 2.5  # of all stretches together: half of the shortest record
-# A clock whose rate differs by more than this from the host's is none: crystals keep 1e-4.
+# A clock whose rate differs more from the host's is not used; crystals differ by 1e-4.
 CLOCK_RATE = 0.01
-CLOCK_WINDOW_s = 1.0  # over which the median of host's and loader's clocks is taken
+CLOCK_WINDOW_s = 1.0  # of the running median of the clocks' difference
 LEAST_STEP = 1e-3  # frames; samples nearer together are one
-CLOCK_STEP = 0.5  # frames; a host that misses a deadline is later by whole frames from there on
+CLOCK_STEP = 0.5  # frames; a missed deadline delays all later frames by whole frames
 
 
 @dataclass(frozen=True)
 class Assumed:
-    """How far the K̂ that a host used differs from its first one, d/N, shape (frames,).
+    """The difference of the K̂ in use from the first K̂ of the flight, d/N, shape (frames,).
 
-    `estimate` is that of δ̂, `gradient` that of ΔG; a correction that is off has K̂ = 0.
+    `estimate` is that of δ̂, `gradient` that of ΔG; K̂ = 0 if a correction is off.
     """
 
     estimate: Floats
@@ -77,14 +75,14 @@ class Assumed:
 
 @dataclass(frozen=True)
 class Live:
-    """What of a live record can be judged; masks have shape (frames,).
+    """The parts of a live record that can be judged; masks have shape (frames,).
 
-    judged    rows at which stages of the loader are judged
-    starts    rows at which their replays start from the state as measured
-    quiet     the longest stretch of samples, by which noise is estimated
-    signals   the channels that the loader measured, at equal steps of its clock
-    assumed   K̂ as the host used it, by the control; of those alone for which it changed
-    left_out  what is not judged, or not as it was recorded, and why; a sentence each
+    judged    rows in which stages of the loader are judged
+    starts    rows at which their replays restart from the measured state
+    quiet     the longest stretch of samples, from which noise is estimated
+    signals   the channels measured by the loader, at equal steps of its clock
+    assumed   K̂ in use, by control; only for controls whose K̂ changed
+    left_out  what is not judged, or judged with changes, and why; a sentence each
     """
 
     judged: Mask
@@ -96,9 +94,9 @@ class Live:
 
 
 def live_of(record: Record) -> Live | None:
-    """Return what of a live record can be judged; None of another record.
+    """Return the parts of a live record that can be judged; None for other records.
 
-    Raises InputError where its manifest is damaged.
+    Raises InputError if the manifest is damaged.
     """
     live = record.manifest.get("live")
     live = live if isinstance(live, Mapping) else {}
@@ -113,7 +111,7 @@ def live_of(record: Record) -> Live | None:
     bridged = _short_runs(~sampled, max(1, round(BRIDGED_s / frame_s)))
     clock = _Clock(record, sampled, frame_s)
     other = settings.other_hardware()
-    if not settings.known:  # something was switched, and nothing says what
+    if not settings.known:  # a switch of unknown kind
         other |= validity == SWITCHED
     heard = sampled | bridged
     judged, starts = _stretches(heard & (validity != FADED) & ~other, clock.jumps, frame_s)
@@ -128,9 +126,9 @@ def live_of(record: Record) -> Live | None:
 
 
 def judged_part(record: Record, file: object) -> Record:
-    """Return a record up to the last row at which its loader can be judged.
+    """Return a record up to the last row in which its loader can be judged.
 
-    Raises InputError where too little can be.
+    Raises InputError if too little can be judged.
     """
     live = live_of(record)
     if live is None or live.judged.all():
@@ -151,7 +149,7 @@ def judged_part(record: Record, file: object) -> Record:
 
 
 def _validity(record: Record, live: Mapping[str, Any]) -> Floats | None:
-    """Return each row's validity; of a record without that channel by when no answer came."""
+    """Return each row's validity; without that channel, from the spells without an answer."""
     if VALIDITY in record:
         return record[VALIDITY]
     spells = live.get("spells") or []
@@ -174,7 +172,7 @@ def _damaged(key: str) -> InputError:
 
 
 def _runs(mask: Mask, cuts: Mask | None = None) -> list[slice]:
-    """Return the stretches of a mask; at `cuts` a new one begins."""
+    """Return the stretches of a mask, divided at `cuts`."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
     found = []
     for first, last in edges.reshape(-1, 2):
@@ -184,7 +182,7 @@ def _runs(mask: Mask, cuts: Mask | None = None) -> list[slice]:
 
 
 def _short_runs(mask: Mask, most: int) -> Mask:
-    """Return a mask's stretches of so many rows at most that lie between others."""
+    """Return a mask's inner stretches of at most so many rows."""
     found = np.zeros(len(mask), dtype=bool)
     for run in _runs(mask):
         inner = run.start > 0 and run.stop < len(mask)
@@ -193,7 +191,7 @@ def _short_runs(mask: Mask, most: int) -> Mask:
 
 
 def _stretches(usable: Mask, jumps: Mask, frame_s: float) -> tuple[Mask, Mask]:
-    """Return the rows that are judged, and those at which a replay starts as measured."""
+    """Return the rows that are judged, and those at which a replay restarts."""
     judged, starts = np.zeros(len(usable), dtype=bool), np.zeros(len(usable), dtype=bool)
     lead, settle = round(LEAD_s / frame_s), round(SETTLE_s / frame_s)
     for run in _runs(usable, jumps):
@@ -207,10 +205,10 @@ def _stretches(usable: Mask, jumps: Mask, frame_s: float) -> tuple[Mask, Mask]:
 
 
 class _Clock:
-    """When the samples of a record were taken, in frames along equal steps of the loader's clock.
+    """The times of a record's samples, in frames along equal steps of the loader's clock.
 
-    `at` is that of each row, `jumps` are the rows at which the steps start anew, and `problem` says
-    why the loader's clock is not used.
+    `at` is the time of each row, `jumps` are the rows at which a new series of equal steps begins.
+    `problem` is the reason if the loader's clock is not used.
     """
 
     def __init__(self, record: Record, sampled: Mask, frame_s: float) -> None:
@@ -233,7 +231,7 @@ class _Clock:
             near = np.abs(away[part] - usual[part]) < CLOCK_STEP
             if not near.any():
                 continue
-            # The two clocks drift apart along a line; a short stretch does not show its slope.
+            # The clocks drift apart linearly; a short stretch does not determine the slope.
             degree = 1 if np.sum(near) > window else 0
             drift = Polynomial.fit(rows[part][near], away[part][near], degree)
             self.at[rows[part]] += away[part] - drift(rows[part])
@@ -241,7 +239,7 @@ class _Clock:
     def resampled(self, signal: Floats, sampled: Mask, heard: Mask) -> Floats:
         """Return a signal at equal steps of the clock.
 
-        Rows that are not `heard` lie on a straight line between those that are.
+        Rows that are not `heard` are interpolated linearly.
         """
         rows = np.flatnonzero(sampled)
         if len(rows) < 4:
@@ -259,9 +257,9 @@ class _Clock:
 
 
 class _Settings:
-    """What the host and a simulated loader were set to, row by row, by the record's manifest.
+    """The settings of host and simulated loader at each row, from the manifest.
 
-    It is `known` where the manifest lists what was changed.
+    `known`: the manifest lists changes.
     """
 
     def __init__(self, record: Record, live: Mapping[str, Any], frame_s: float) -> None:
@@ -272,7 +270,7 @@ class _Settings:
         self.known = bool(events)
 
     def _rows(self, control: str, what: str) -> Floats | None:
-        """Return a setting's value at each row; None where its first one is not known."""
+        """Return a setting's value at each row; None if its first value is not known."""
         first = self._first.get(control, {}).get(what)
         times, changes = self._changes(control, what)
         if first is None:
@@ -281,24 +279,24 @@ class _Settings:
         return np.asarray(values[np.searchsorted(times, self._time, side="right")])
 
     def _changes(self, control: str, what: str) -> tuple[list[float], list[float]]:
-        """Return when a setting was changed, s, and to which values."""
+        """Return the times of a setting's changes, s, and the new values."""
         own = [(at, value) for at, of, key, value in self._events if (of, key) == (control, what)]
         return [at for at, _ in own], [value for _, value in own]
 
     def other_hardware(self) -> Mask:
-        """Return the rows flown with other hardware than the first, or with unknown settings."""
+        """Return the rows with other hardware than at the start, or with unknown settings."""
         found = np.zeros(len(self._time), dtype=bool)
         for control in CONTROL_NAMES:
             for what in (*HARDWARE, *HOSTED):
                 rows = self._rows(control, what)
-                if rows is None:  # the first one is not known
+                if rows is None:  # first value not known
                     found |= self._time >= min(self._changes(control, what)[0])
                 elif what in HARDWARE:
                     found |= rows != rows[0]
         return found
 
     def assumed(self) -> dict[str, Assumed]:
-        """Return K̂ as the host used it, of each control for which it changed."""
+        """Return K̂ in use, for each control whose K̂ changed."""
         found: dict[str, Assumed] = {}
         for control in CONTROL_NAMES:
             bend, estimate, gradient = (self._rows(control, what) for what in HOSTED)
@@ -311,7 +309,7 @@ class _Settings:
 
 
 def _in_words(one: tuple[str, Assumed]) -> str:
-    """Return by how much a control's K̂ changed in flight."""
+    """Return the change of a control's K̂ in flight, in words."""
     control, used = one
     least = min(float(used.estimate.min()), float(used.gradient.min()))
     most = max(float(used.estimate.max()), float(used.gradient.max()))
@@ -320,9 +318,9 @@ def _in_words(one: tuple[str, Assumed]) -> str:
 
 
 def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, str, str, float]]:
-    """Yield what was changed: when it acts from, s, of which control, what, and to which value.
+    """Yield the changes: time from which it acts, s, control, setting and new value.
 
-    A switch is set before its frame, K̂ of an adaptation after it.
+    A switch acts from its frame on, an adaptation of K̂ from the next one.
     """
     for change in live.get("switched") or []:
         try:
@@ -339,7 +337,7 @@ def _events(live: Mapping[str, Any], frame_s: float) -> Iterator[tuple[float, st
 
 
 def _first_settings(record: Record) -> dict[str, dict[str, float]]:
-    """Return the settings that the flight began with, by control, as its manifest has them."""
+    """Return the settings at the start of the flight by control, from the manifest."""
     found: dict[str, dict[str, float]] = {}
     for control in CONTROL_NAMES:
         bend = f"bend_{unit_of(control)}_per_N"
@@ -360,7 +358,7 @@ def _first_settings(record: Record) -> dict[str, dict[str, float]]:
 def _words(
     frame_s: float, sampled: Mask, bridged: Mask, validity: Floats, other: Mask, clock: _Clock
 ) -> Iterator[str]:
-    """Yield what of a record is not judged, or not as it was recorded."""
+    """Yield what is not judged in a record, or judged with changes, a sentence each."""
 
     def seconds(mask: Mask) -> str:
         first, last = np.flatnonzero(mask)[[0, -1]] * frame_s
@@ -368,11 +366,11 @@ def _words(
 
     if bridged.any():
         share = 100.0 * float(np.mean(bridged))
-        yield f"{share:.2g} % of the loader's samples did not come: they are interpolated."
+        yield f"{share:.2g} % of the loader's samples are missing: they are interpolated."
     if (silent := ~sampled & ~bridged).any():
         yield f"Left out: {seconds(silent)} in which the loader sent no new sample."
     if (faded := validity == FADED).any():
-        yield f"Left out: {seconds(faded)} in which forces faded or a limit held them."
+        yield f"Left out: {seconds(faded)} in which forces were faded or limited."
     if other.any():
         yield f"Left out: {seconds(other)} flown with other settings, as switched in flight."
     if clock.jumps.any():

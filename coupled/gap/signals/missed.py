@@ -1,12 +1,12 @@
-"""Frames that the host missed, as a record shows them: all that it puts out repeats.
+"""Frames that the host missed: all of its outputs repeat.
 
-A host that misses a frame holds δ̂ and G_T. They repeat by chance as well, as coarsely as they are
-written; so a repeat counts where G_T never repeats otherwise, or where δ̂ is not what the host's own
-arithmetic, δc + ΣK̂·F fitted to the frames that do not repeat, would have made of the frame.
+A host that misses a frame holds δ̂ and G_T. Rounded values also repeat by chance. A repeat
+therefore counts only if G_T never repeats otherwise, or if δ̂ differs from the host's equation,
+δc + ΣK̂·F, fitted to the other frames.
 
-Which frames a host misses is chance. In a replay each frame has its number in 0 to 1, and is
-missed where that is under the rig's share, as in a flight (`rig/compensation`): numbers that give
-the record's own missed frames at the record's own share.
+The host misses frames at random. For replays each frame has a number from 0 to 1, and is missed if
+that is below the rig's share, as in a flight (`rig/compensation`). The numbers are assigned so that
+the record's share gives the record's missed frames.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Missed:
-    """Which frames of a record its host missed, shape (frames,), and what would be missed."""
+    """The missed frames of a record, shape (frames,), and those of a rig with another share."""
 
     seen: Mask
 
     @property
     def share(self) -> float:
-        """The share of the frames that was missed."""
+        """The share of missed frames."""
         return float(np.mean(self.seen))
 
     def under(self, rig: Rig, control: ControlName) -> Mask | None:
-        """Return the frames that a rig's host misses; None where it misses none."""
+        """Return the frames that a rig's host would miss; None if it misses none."""
         share = rig.controls[control].compensation.missed_share
         return None if share == 0.0 else self._chances() < share
 
     def _chances(self) -> Floats:
-        """Return each frame's number: the record's missed ones have the lowest, evenly spread."""
+        """Return each frame's number: the record's missed frames have the lowest ones."""
         rng, frames = np.random.default_rng(17), len(self.seen)
         missed = rng.permutation(np.flatnonzero(self.seen))
         others = rng.permutation(np.flatnonzero(~self.seen[1:]) + 1)
@@ -54,7 +54,7 @@ class Missed:
 
 
 def missed_in(record: Record) -> Missed:
-    """Return the frames that a record's host missed, by all of its controls."""
+    """Return the frames that a record's host missed, from all of its controls."""
     estimates = _channels(record, "estimate")
     gradients = _channels(record, "gradient")
     frames = len(record)
@@ -74,21 +74,21 @@ def missed_in(record: Record) -> Missed:
 def shares_missed(
     outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
-    """Return the share of frames missed in the records of these outputs, where any was."""
+    """Return the share of missed frames in the records of these outputs; empty if zero."""
     by_record = {output.record: output.missed for output in outputs if output.missed is not None}
     seen = np.concatenate([*by_record.values(), np.zeros(0, dtype=bool)])
     return [{"share": float(np.mean(seen))}] if seen.any() else []
 
 
 def times_missed(record: Record) -> Floats:
-    """Return when the frames were missed, in s from the record's start."""
+    """Return the times of the missed frames, in s from the record's start."""
     return np.asarray((record.time_s - record.time_s[0])[missed_in(record).seen])
 
 
 def spread_of_missed(record: Record, frame_s: float) -> float:
-    """Return the relative standard error of the share, from how few frames were missed.
+    """Return the relative sampling error of the share of missed frames.
 
-    Of n frames missed at chance, √((1 − share)/n).
+    For n frames missed at random it is √((1 − share)/n).
     """
     missed = missed_in(record)
     count = int(np.sum(missed.seen))
@@ -101,12 +101,12 @@ def _channels(record: Record, quantity: str) -> list[str]:
 
 
 def _repeats(signal: Floats) -> Mask:
-    """Return which frames repeat the one before."""
+    """Return which frames repeat the previous one."""
     return np.concatenate(([False], np.diff(signal) == 0.0))
 
 
 def _lively(gradient: Floats, both: Mask) -> bool:
-    """Tell whether a gradient repeats in missed frames alone, moving by far more than its step."""
+    """Tell whether a gradient repeats only in missed frames, and its steps exceed its rounding."""
     moves = np.abs(np.diff(gradient))
     moves = moves[moves > 0.0]
     if not moves.size or moves.min() > CHANCE_STEP * np.median(moves):
@@ -115,7 +115,7 @@ def _lively(gradient: Floats, both: Mask) -> bool:
 
 
 def _off_arithmetic(record: Record, both: Mask) -> Mask:
-    """Return where a control's δ̂ is not what the host's arithmetic makes of the frame."""
+    """Return the frames in which a control's δ̂ differs from the host's equation."""
     off = np.zeros(len(record), dtype=bool)
     forces = [record[name] for name in _channels(record, "force")]
     for control in CONTROL_NAMES:

@@ -1,4 +1,4 @@
-"""One measured output of a stage, against what a rig makes of the stage's measured input."""
+"""One measured output of a stage, and its prediction from the stage's measured input."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from coupled.rig.rig import Rig
 Floats = NDArray[np.float64]
 Predict = Callable[[Rig], Floats]
 Part = Literal["all", "fitted", "held"]
-_KEPT = 8  # predictions remembered: threads fit different effects at once
+_KEPT = 8  # size of the cache of residuals; threads fit different effects at once
 
 
 @dataclass(frozen=True)
 class Hides:
-    """What a floor hides of an output: its share of what the channel does, rms over rms.
+    """A noise floor that may hide a gap: `share` is the floor over the channel's motion, both rms.
 
-    `noisiest` is the channel whose noise makes most of the floor, `channel` the output's. `misses`
-    is not 0 where the floor is the misfit of a healthy record: by so many times the noise.
+    `noisiest` is the channel whose noise dominates the floor, `channel` that of the output.
+    `misses` is the gap of the healthy records, if the floor includes a model error; else 0.
     """
 
     share: float
@@ -49,54 +49,55 @@ class Hides:
 
     @property
     def much(self) -> bool:
-        """Whether a gap that is a large share of the signal would not show."""
+        """Whether the floor could hide a gap that is a large share of the signal."""
         return self.share > FLOOR_SHARE
 
     @property
     def still(self) -> bool:
-        """Whether the channel shows little but its own noise: breakout and friction held it."""
+        """Whether the channel hardly moves: breakout and friction held it."""
         return not self.misses and self.noisiest == self.channel and self.share > NOISE_ALONE
 
     @property
     def words(self) -> str:
-        """What hides how much."""
+        """The reason in words."""
         if self.still:
             return f"{self.channel} shows little but noise"
         share = f"{100 * self.share:.0f} %"
         if self.misses:
             missed = f"the rig misses the healthy record there by {self.misses:.3g} times the noise"
-            return f"{missed}, {share} of what the stage does"
-        return f"noise of {self.noisiest} is {share} of what {self.channel} does"
+            return f"{missed}, {share} of the stage's motion"
+        return f"noise of {self.noisiest} is {share} of the motion of {self.channel}"
 
     @property
     def wanted(self) -> str:
-        """What to do about it, in a sentence."""
+        """How to lower the floor, in a sentence."""
         if self.misses:
             return "Fit the rig to the healthy record first (coupled fit), then diagnose again."
         if self.still:
-            return f"Record a push that moves {self.channel}, or {self.noisiest} with less noise."
+            return f"Record a force that moves {self.channel}, or {self.noisiest} with less noise."
         times = math.ceil(self.share / FLOOR_SHARE)
         return f"Record a motion {times} times as large, or {self.noisiest} with less noise."
 
 
 @dataclass(frozen=True)
 class Output:
-    """One measured output of a stage, and how a rig predicts it from the measured input.
+    """One measured output of a stage, and its prediction by a rig from the measured input.
 
-    `floor` is the rms that noise alone leaves, in the channel's unit, `spread` that rms's relative
-    standard deviation from record to record, `smoothed` the share of it that a smoothed input has,
-    `hides` what it hides, where that is known.
-    `record` numbers the record that it is of; `held` are the frames held out from fits, without
-    which they are those of every other stretch; `missed` are those that the host missed (`missed`).
-    One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
-    that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
-    `rough` predicts nearly as well with fewer replays, where slopes are asked for. `noises` are the
-    rms noises of what drives the stage, by the control's quantity. `unsure` is the part of the
-    floor by which it may be too low, the colour of what drives the stage being what it may be.
-    `shots` predicts by short replays, each begun as measured: what went before misleads none.
-    One is `in_series` that is predicted by the loader and the linkage behind it, from the force.
-    `handed_on` is the part of what was measured that the stage hands on from its input: what the
-    stage does is the rest.
+    floor      rms of noise alone in the residual, in the channel's unit
+    record     number of the record
+    spread     relative standard deviation of the floor between records
+    smoothed   share of the floor from the noise of the smoothed input
+    hides      what the floor may hide, if known
+    held       frames held out from fits; default: every other stretch
+    missed     frames that the host missed (`missed`)
+    stepped    the prediction runs at the loader's own steps, which wider steps approximate well
+    mismatch   gap beyond 1 that errors of the nuisance parameters' laws may cause
+    rough      an approximate prediction with fewer replays, for derivatives
+    noises     rms noises of the stage's inputs, by the control's quantity
+    unsure     relative amount by which the floor may be too low, from the colour of input noise
+    in_series  predicted from the force by loader and linkage in series
+    shots      prediction by multiple shooting: short replays, restarted as measured
+    handed_on  part of the measurement that comes from the input; the rest is the stage's own motion
     """
 
     stage: str
@@ -122,9 +123,9 @@ class Output:
     _known: list[tuple[Any, Floats]] = field(default_factory=list, repr=False, compare=False)
 
     def widely(self, rig: Rig) -> bool:
-        """Tell whether wide steps of the loader change the prediction by little, against the floor.
+        """Tell whether wide steps of the loader change the prediction little against the floor.
 
-        They do under a force up to half of the frame rate, and where the floor is near zero.
+        They do not for forces up to half of the frame rate, and for floors near zero.
         """
         stepped = replace(self, stepped=True)
         change = stepped.residual(rig, wide=True) - stepped.residual(rig)
@@ -133,9 +134,9 @@ class Output:
     def residual(
         self, rig: Rig, part: Part = "all", wide: bool = False, rough: bool = False
     ) -> Floats:
-        """Return measured less predicted, in floors, shape (frames,), of a part's stretches.
+        """Return measured minus predicted, in floors, shape (frames,), of a part's stretches.
 
-        A `wide` one is by wide steps of the loader (`steps`), a `rough` one to take slopes by.
+        `wide`: with wide steps of the loader (`steps`). `rough`: approximate, for derivatives.
         """
         rig = widely_stepped(rig) if wide and self.stepped else rig
         predict = self.rough if rough and self.rough is not None else self.predict
@@ -147,44 +148,44 @@ class Output:
         return left if part == "all" else left[self.rows(part)]
 
     def under(self, noise: Noise) -> Output:
-        """Return the output of what is driven by a signal with this noise, which may be more."""
+        """Return the output with `unsure` set for the noise of the signal that drives it."""
         more = noise.unsure * self.smoothed**2
         return replace(self, unsure=math.sqrt(1.0 + more) - 1.0, _known=[])
 
     def by_shots(self) -> Output:
-        """Return the output predicted by short replays, where it has them."""
+        """Return the output predicted by multiple shooting, if it can be."""
         if self.shots is None:
             return self
         return replace(self, predict=self.shots, rough=None, _known=[])
 
     @property
     def carried(self) -> float:
-        """The part of the floor that is its input's noise, carried through."""
+        """The part of the floor that is the input's noise, propagated."""
         return self.floor * self.smoothed
 
     @property
     def own(self) -> float:
-        """The part of the floor that is the channel's own noise, not its input's."""
+        """The part of the floor that is the channel's own noise."""
         return self.floor * math.sqrt(1.0 - self.smoothed**2)
 
     @property
     def stretches(self) -> NDArray[np.intp]:
-        """The number of the stretch that each frame lies in."""
+        """The number of each frame's stretch."""
         frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
         return np.arange(len(self.measured)) // frames
 
     def rows(self, part: Part) -> NDArray[np.bool_]:
-        """Return which frames are of a part: every other stretch is fitted, those between held."""
+        """Return the frames of a part: every other stretch is fitted, the others are held out."""
         if part == "all":
             return np.ones(len(self.measured), dtype=bool)
         held = self.stretches % 2 == 1 if self.held is None else self.held
         return np.asarray(held if part == "held" else ~held)
 
     def halved(self, rig: Rig) -> Output:
-        """Return the output with halves that both hold of what this rig leaves.
+        """Return the output with halves of about equal power of this rig's residual.
 
-        What happens seldom, as a limit that is met once, would else be in one of them alone: a
-        stretch that holds much of the residual's power is cut where it has had its share.
+        A rare event, such as a limit reached once, would otherwise be in one half only: a stretch
+        with much of the residual's power is divided.
         """
         frames = max(1, round(STRETCH_s * self.frame_rate_Hz))
         least = max(1, round(SHORTEST_STRETCH_s * self.frame_rate_Hz))
@@ -201,13 +202,13 @@ class Output:
 
     @property
     def limit(self) -> float:
-        """The gap up to which noise may be all there is."""
+        """The largest gap of noise alone."""
         noise = 1.0 + NOISE_SIGMAS * self.spread + SMOOTHING_LOST * self.smoothed
         return max(GUILTY_FROM, noise * (1.0 + self.unsure), 1.0 + self.mismatch)
 
     @property
     def does(self) -> float:
-        """What the stage does in this record: the rms about the mean, in the channel's unit."""
+        """The standard deviation of the stage's own motion, in the channel's unit."""
         return float(
             np.std(self.measured if self.handed_on is None else self.measured - self.handed_on)
         )
@@ -225,7 +226,7 @@ def white(signal: Floats) -> float:
 def heard(signal: Floats) -> Noise:
     """Return the noise in a smooth signal (`noise`).
 
-    No less than its rounding, which is not white where the signal is slow.
+    It is at least the rounding, which is not white in a slow signal.
     """
     noise = noise_of(signal)
     rough = float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / 70.0))
@@ -233,10 +234,10 @@ def heard(signal: Floats) -> Noise:
 
 
 def rounding(signal: Floats, noise: float) -> float:
-    """Return the rms error of a signal's rounding, by the least step between its values.
+    """Return the rms error of a signal's rounding, from the least step between its values.
 
-    None where it would be thrice `noise`: an even ramp has even steps, a test's few levels have
-    wide ones, and neither was rounded.
+    Zero if that would be `ROUNDED` times `noise`: the even steps of a ramp, and the few levels of
+    a test, are not rounding.
     """
     steps = np.diff(np.unique(signal))
     error = float(steps.min()) / math.sqrt(12.0) if steps.size else 0.0
@@ -246,16 +247,17 @@ def rounding(signal: Floats, noise: float) -> float:
 def spread(
     carried: Sequence[Floats], own: float, memory: float = 0.0, rate_Hz: float = 120.0
 ) -> float:
-    """Return the relative standard deviation of noise's rms: `carried` of some tries, and its own.
+    """Return the relative standard deviation of the rms of noise.
 
-    The own noise is white, or correlates by `memory` from frame to frame. Where a stage lets noise
-    pass in a part of the record alone, as where nothing else moves, only that part counts.
+    `carried` are samples of propagated input noise. The own noise is white, or correlates by
+    `memory` from frame to frame. If a stage passes noise in a part of the record only, for example
+    while nothing else moves, only that part counts.
 
-    The mean square of N values of Gaussian noise varies by √(2·Σρ²/N) of itself (Bartlett), its
-    root by half of that. The less noise a stage and its smoother let pass, the fewer values count.
+    The mean square of N values of Gaussian noise has the relative standard deviation √(2·Σρ²/N)
+    (Bartlett), its root half of that.
     """
     power = np.mean([np.abs(np.fft.rfft(x)) ** 2 for x in carried], axis=0) / len(carried[0])
-    crowded = 1.0 + 1.0 / len(carried)  # of the square of a periodogram, by how few are averaged
+    crowded = 1.0 + 1.0 / len(carried)  # bias of a squared periodogram averaged over few samples
     at = np.linspace(0.0, np.pi, len(power))
     alone = own**2 * (1.0 - memory**2) / (1.0 + memory**2 - 2.0 * memory * np.cos(at))
     total = float(np.mean(power + alone))
@@ -281,15 +283,15 @@ def memory(residual: Floats) -> float:
 
 
 def explained_below(before: float, limit: float) -> float:
-    """Return the gap up to which a stage is explained, by its gap without any effect.
+    """Return the largest gap of an explained stage, from its gap without effects.
 
-    `limit` is the gap up to which noise may be all there is.
+    `limit` is the largest gap of noise alone.
     """
     return max(limit, 1.0 + MISMATCH * (before - 1.0))
 
 
 def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
-    """Return the gap of each stage up to which noise may be all there is."""
+    """Return the largest gap of noise alone of each stage."""
     found: dict[str, float] = {}
     for output in outputs:
         found[output.stage] = max(found.get(output.stage, GUILTY_FROM), output.limit)
@@ -297,7 +299,7 @@ def stage_limits(outputs: Sequence[Output]) -> dict[str, float]:
 
 
 def stage_gaps(outputs: Sequence[Output], rig: Rig) -> dict[str, float]:
-    """Return each stage's gap: the largest of its outputs', over all records."""
+    """Return each stage's gap: the largest of its outputs in all records."""
     found: dict[str, float] = {}
     for output in outputs:
         found[output.stage] = max(found.get(output.stage, 0.0), output.gap(rig))

@@ -1,4 +1,4 @@
-"""What a record holds of a control, and what each stage would need of it."""
+"""The channels of a control in a record, and the channels that each stage needs."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ PRESSURE, LOAD = "dynamic_pressure_Pa", "load_factor"
 
 @dataclass(frozen=True)
 class Reading:
-    """A record of one control of a rig: its channels, and those that lack."""
+    """A record of one control of a rig: its channels, and the missing ones."""
 
     rig: Rig
     record: Record
     control: ControlName
-    # The map of a control's commands to its surface's positions; None where others move it, too.
+    # The map from a control's commands to surface positions; None if the aircraft moves it too.
     surface_points: Callable[[Rig, ControlName], tuple[Floats, Floats] | None]
     number: int = 0  # of the record, where there are several
 
@@ -47,16 +47,16 @@ class Reading:
 
     @cached_property
     def live(self) -> Live | None:
-        """What of a live record can be judged; None of another record."""
+        """The parts of a live record that can be judged; None for other records."""
         return live_of(self.record)
 
     @property
     def judged(self) -> Mask | None:
-        """The rows at which stages of the loader are judged; None for all."""
+        """The rows in which stages of the loader are judged; None for all."""
         return None if self.live is None or self.live.judged.all() else self.live.judged
 
     def assumed(self) -> Assumed | None:
-        """Return K̂ as the host used it, where it changed in flight."""
+        """Return K̂ in use, if it changed in flight."""
         return None if self.live is None else self.live.assumed.get(self.control)
 
     @property
@@ -65,7 +65,7 @@ class Reading:
         return f"{SURFACES[self.control]}_rad"
 
     def signal(self, quantity: str) -> Floats:
-        """Return a control's channel; what a live loader measured at equal steps of its clock."""
+        """Return a control's channel; of a live loader, at equal steps of its clock."""
         return self._measured(channel(self.control, quantity))
 
     def as_read(self, quantity: str) -> Floats:
@@ -77,19 +77,19 @@ class Reading:
         return signals[name] if name in signals else self.record[name]
 
     def _quiet(self, name: str) -> Floats:
-        """Return a channel over the rows by which its noise is estimated."""
+        """Return a channel in the rows from which its noise is estimated."""
         signal = self._measured(name)
         return signal if self.live is None else signal[self.live.quiet]
 
     def partner(self) -> list[Floats]:
-        """Return the force in N on the control whose force leaks into this one, if recorded."""
+        """Return the force in N on the control with crosstalk into this one, if recorded."""
         names = [channel(name, "force") for name in leaking(self.control)]
         return [self._measured(name) for name in names if name in self.record][:1]
 
     def load(self) -> Callable[[Rig], Floats | None]:
-        """Return by the rig what load factor pulls at the bob weight; none where not recorded.
+        """Return the load factor at the bob weight as a function of the rig; none if not recorded.
 
-        The machine feels it in time: a motion that is stamped late is moved back.
+        The load factor acts without the delay of its time stamp, which is removed.
         """
         if LOAD not in self.record:
             return lambda rig: None
@@ -101,13 +101,13 @@ class Reading:
         return felt
 
     def sensed(self, rig: Rig) -> Sensed:
-        """Return what a rig's channels have to do with what they measure."""
+        """Return the conversion of a rig's readings of this control to the measured quantities."""
         return Sensed(rig, self.control, self.number)
 
     def others(self, as_read: bool = False) -> dict[str, Floats]:
-        """Return the forces in N on other controls of a common structure, where recorded.
+        """Return the forces in N on other controls of a common structure, if recorded.
 
-        As the host read them, or those of a live loader at equal steps of its clock.
+        As the host read them, or of a live loader at equal steps of its clock.
         """
         if self.rig.structure.stands_apart:
             return {}
@@ -116,7 +116,7 @@ class Reading:
         return {name: taken(force) for name, force in held.items() if force in self.record}
 
     def missing(self) -> dict[str, list[str]]:
-        """Return the channels that each stage would need and the record lacks."""
+        """Return the channels that each stage needs and the record does not have."""
         needs = {
             "schedule": [PRESSURE, self.name_of("gradient")],
             "loader": [self.name_of(q) for q in ("force", "computed")] + self._gradient_from(),
@@ -136,31 +136,31 @@ class Reading:
             needs["loader"] = [self.name_of(q) for q in ("force", "deflection")]
             needs["loader"] += self._gradient_from()
             lacking = {s: [n for n in names if n not in self.record] for s, names in needs.items()}
-        if self.set_points:  # a bend is not to be seen without the force, but all else
+        if self.set_points:  # without the force only a bend cannot be identified
             needless = self.name_of("force")
             lacking["linkage"] = [name for name in lacking["linkage"] if name != needless]
         return {stage: names for stage, names in lacking.items() if names}
 
     @property
     def set_points(self) -> bool:
-        """Whether δc is a number that is commanded, so that there is no loader to judge."""
+        """Whether δc is a command, so that there is no loader to judge."""
         return self.rig.controls[self.control].drive == "setpoint"
 
     @property
     def moved(self) -> bool:
-        """Whether the motion is imposed, and the force is judged as its answer."""
+        """Whether the motion is imposed, and the force is the judged output."""
         return self.by_hand and not self.in_series
 
     @property
     def by_hand(self) -> bool:
-        """Whether what moves the grip is outside of the rig: a bench that imposes the motion."""
+        """Whether a bench imposes the motion of the grip."""
         return self.rig.controls[self.control].drive == "displacement"
 
     @property
     def in_series(self) -> bool:
         """Whether the record has F and δ without δc: loader and linkage are judged in series.
 
-        Of a bench that imposes the motion, only where a spring holds the loader.
+        With imposed motion, only if a spring holds the loader.
         """
         if self.set_points or self.name_of("computed") in self.record:
             return False
@@ -172,18 +172,18 @@ class Reading:
 
     @property
     def imposed(self) -> str:
-        """The quantity that is imposed: the grip's motion where the record has it, else δc."""
+        """The imposed quantity: the grip's motion if recorded, else δc."""
         return "deflection" if self.name_of("deflection") in self.record else "computed"
 
     def commanded(self) -> Drive:
-        """Return δc as it drives the linkage: a set point has no noise."""
+        """Return δc as the input of the linkage; a set point has no noise."""
         computed = self.signal("computed")
         if self.set_points:
             return Drive.of(computed, Noise(0.0))
         return Drive.of(computed, self.driving("computed"))
 
     def pulled(self) -> Drive:
-        """Return F as it drives the loader and the linkage; none where the record lacks it."""
+        """Return F as the input of loader and linkage; zero if not recorded."""
         if self.name_of("force") not in self.record:
             return Drive.of(np.zeros(len(self.record)), Noise(0.0))
         return Drive.of(self.signal("force"), self.driving("force"))
@@ -193,9 +193,9 @@ class Reading:
         return channel(self.control, quantity)
 
     def _gradient_from(self) -> list[str]:
-        """Return the channel that G_T is taken from: its own, or q̄ where the record lacks it.
+        """Return the channel from which G_T is taken: its own, else q̄.
 
-        None where the record has neither, and the rig has one gradient at any q̄.
+        Empty if the record has neither and the rig has one gradient at any q̄.
         """
         own = self.name_of("gradient")
         if own in self.record:
@@ -205,7 +205,7 @@ class Reading:
         return [] if one_gradient(self.rig, self.control) else [own]
 
     def gradient(self) -> Floats:
-        """Return G_T in N/d: as recorded, else what the nominal schedule makes of q̄."""
+        """Return G_T in N/d: as recorded, else of the nominal schedule at q̄."""
         source = self._gradient_from()
         if source == [PRESSURE]:
             pressure = smoothed(self.record[PRESSURE])
@@ -216,7 +216,7 @@ class Reading:
         return np.full(len(self.record), table[0]) * left(self)
 
     def second(self) -> Floats | None:
-        """Return G_T beyond the break, which no record holds: what the schedule makes of q̄."""
+        """Return G_T beyond the break, of the nominal schedule at q̄; it is never recorded."""
         two = self.rig.controls[self.control].schedule.second_gradient is not None
         if not two or PRESSURE not in self.record:
             return None
@@ -229,11 +229,11 @@ class Reading:
         return noise_in(self.rig, name, self._quiet(name))
 
     def driving(self, quantity: str) -> Noise:
-        """Return the noise of a control's channel that drives a stage, and may be a signal's."""
+        """Return the noise of a control's channel as an input, without a broadband signal."""
         return input_noise(self.heard(quantity), self._quiet(self.name_of(quantity)))
 
     def filtered(self) -> dict[str, str]:
-        """Return {a channel of the control whose log was filtered: where its floor comes from}."""
+        """Return {filtered channel of the control: source of its noise floor}."""
         names = [self.name_of(quantity) for quantity in ("force", "computed", "deflection")]
         return {
             name: floor_from(self.rig, name, self._quiet(name))
@@ -243,7 +243,7 @@ class Reading:
 
 
 def one_gradient(rig: Rig, control: ControlName) -> bool:
-    """Return whether a control's gradient is the same at any q̄; it is 0 without a spring."""
+    """Return whether a control's gradient is the same at any q̄ (0 without a spring)."""
     schedule = rig.controls[control].schedule
     first, *rest = schedule.total_gradient
     return schedule.second_gradient is None and all(g == first for g in rest)
@@ -252,10 +252,10 @@ def one_gradient(rig: Rig, control: ControlName) -> bool:
 def worth_recording(
     rig: Rig, control: ControlName, stage: str, channels: Sequence[str]
 ) -> set[str]:
-    """Return those of a stage's lacking channels that belong to what the machine has.
+    """Return the missing channels of a stage that belong to hardware of the rig.
 
     A bench without a host has no estimate, a slide without a spring no schedule, a rig file
-    without bend and play no second transducer, a rig without an aircraft no surface.
+    without bend and backlash no second transducer, a rig without an aircraft no surface.
     """
     data = rig.controls[control]
     host = rig.flight is not None or data.compensation.deflection or data.compensation.gradient

@@ -1,8 +1,8 @@
-"""What a rig's sensing and recording made of a signal, undone: the signal as it was.
+"""The inverse of a rig's sensing and recording: from the recorded to the measured signal.
 
-The stages are driven by what was, and a record holds what was read: by a scale that is off or
-drifts, with the mains' hum, with a zero, stamped late. The phase of a hum is a record's own, where
-there are several: a rig has that of the first.
+Stages are driven by physical quantities, and a record contains readings: with a scale error, its
+drift, mains hum, a zero offset, and late time stamps. The phase of the hum differs between
+records; a rig has that of the first.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from coupled.rig.rig import Rig
 
 @dataclass(frozen=True)
 class Sensed:
-    """What a rig's channels of one control have to do with what they measure."""
+    """The conversion from a rig's readings of one control to the measured quantities."""
 
     rig: Rig
     control: ControlName
@@ -35,11 +35,11 @@ class Sensed:
 
     @property
     def zero(self) -> float:
-        """What the transducer at the grip reads at neutral, d."""
+        """The reading of the transducer at the grip at neutral, d."""
         return self._of.deflection_zero
 
     def hum(self, read: Floats) -> Floats | float:
-        """Return the mains' hum at each frame in δc as read, d."""
+        """Return the mains hum at each frame in δc as read, d."""
         of = self._of
         if of.hum == 0.0:
             return 0.0
@@ -47,19 +47,19 @@ class Sensed:
         at = turn * np.arange(len(read))
         if self.number == 0:
             return np.asarray(of.hum * np.sin(at + of.hum_phase))
-        phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # four differences lead by 2
+        phase = projected(np.diff(read, 4), turn).phase - 2.0 * turn  # phase of four differences
         return np.asarray(of.hum * np.sin(at + phase))
 
     def hum_on_nodes(self, read: Floats) -> Floats | float:
-        """Return the same on the loader's nodes, along the spline that a record is taken along."""
+        """Return the hum on the loader's nodes, along the spline used for a record."""
         return on_nodes(self.rig, hum) if isinstance(hum := self.hum(read), np.ndarray) else hum
 
     def scale(self, frames: int) -> Floats | float:
-        """Return δc as read over what it is, at each frame."""
+        """Return the ratio of δc as read to δc, at each frame."""
         return self._scale(frames, self.rig.frame_rate)
 
     def scale_on_nodes(self, nodes: int) -> Floats | float:
-        """Return the same at each of the loader's nodes."""
+        """Return the ratio of δc as read to δc, at each of the loader's nodes."""
         return self._scale(nodes, self.rig.frame_rate * self.rig.substeps)
 
     def _scale(self, samples: int, rate_Hz: float) -> Floats | float:
@@ -70,25 +70,25 @@ class Sensed:
         return np.asarray(of.read_scale * (1.0 + of.scale_drift * times_s))
 
     def force(self, recorded: Floats) -> Floats:
-        """Return F in N at each frame from what the record holds of it."""
+        """Return F in N at each frame from the recorded F."""
         return self._unread(self.as_the_host_had_it(recorded))
 
     def force_on_nodes(self, nodes: Floats, recorded: Floats) -> Floats:
-        """Return F in N at each of the loader's nodes; `nodes` are those of the record's F."""
+        """Return F in N at each of the loader's nodes; `nodes` are those of the recorded F."""
         if self._of.force_stamp != 0.0:
             nodes = on_nodes(self.rig, self.as_the_host_had_it(recorded))
         return self._unread(nodes)
 
     def both(self, computed: Floats, recorded: Floats, read: Floats) -> tuple[Floats, Floats]:
-        """Return δc on the nodes and F at the frames from what was read of them there.
+        """Return δc on the nodes and F at the frames from their readings.
 
-        `read` is δc as recorded, by which a hum goes.
+        `read` is δc as recorded, which gives the phase of the hum.
         """
         still = computed - self.hum_on_nodes(read)
         return still / self.scale_on_nodes(len(computed)), self.force(recorded)
 
     def as_the_host_had_it(self, recorded: Floats) -> Floats:
-        """Return F as the host read it, N: without the recorder's late stamps."""
+        """Return F as the host read it, N: without the delay of the recorder's time stamps."""
         return stamped(recorded, -self._of.force_stamp * self.rig.frame_rate)
 
     def _unread(self, read: Floats) -> Floats:

@@ -1,8 +1,7 @@
-"""What a record holds of a control's services, as the replays of its stages take it.
+"""The services of a control in a record, as inputs of the replays.
 
-A trim, an autopilot or a pusher that the record tells of is no effect to be found: it goes into the
-replay as it was recorded, in the same stages that flew it. Records without those channels are
-replayed as before.
+A recorded trim, autopilot or stick pusher is not an effect: it acts in the replay as recorded, in
+the stages on which it acted in flight.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class Reading(Protocol):
-    """A control of a record."""
+    """One control in a record."""
 
     @property
     def record(self) -> Record:
@@ -32,23 +31,23 @@ class Reading(Protocol):
 
 
 def services(reading: Reading) -> ServiceRows | None:
-    """Return the rows of the services, None where the record has none."""
+    """Return the rows of the services; None if the record has none."""
     return service_rows(reading.record, reading.control)
 
 
 def left(reading: Reading) -> Floats | float:
-    """Return the share of G_T that the artificial feel has left."""
+    """Return the share of G_T that remains after a failure of the artificial feel."""
     rows = services(reading)
     return 1.0 if rows is None else 1.0 - rows.feel_lost
 
 
 def neutral(reading: Reading) -> Floats | float:
-    """Return the place about which F_mod acts, d."""
+    """Return the deflection about which F_mod acts, d."""
     rows = services(reading)
     return 0.0 if rows is None else rows.neutral
 
 
 def asked(reading: Reading) -> Floats:
-    """Return what was asked of the surface, d: δ̂, or what a jam or the other side made of it."""
+    """Return the command of the surface, d: δ̂, or as changed by a jam or the other side."""
     rows = services(reading)
     return reading.record[channel(reading.control, "estimate")] if rows is None else rows.asked

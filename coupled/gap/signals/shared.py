@@ -1,4 +1,4 @@
-"""What one channel has of another's noise, or of its roughness: by fourth differences of both."""
+"""Common noise of two channels, by regression of their fourth differences."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Floats = NDArray[np.float64]
 
 
 def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
-    """Return how much of a signal's white noise is that of what it was made from, and the rest.
+    """Return the share of a signal's white noise that comes from its source, and the rest.
 
-    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal as it should
-    be, with the noise of its source: where that comes late or filtered, it echoes over frames.
+    The share is of the noise's power, 0 to 1, the rest an rms. `made` is the signal computed with
+    the noise of its source; delays and filters of the source over some frames are allowed for.
     """
     noise, source = np.diff(signal, 4)[ECHO_FRAMES:], np.diff(made, 4)
     echo = np.column_stack([source[ECHO_FRAMES - k : len(source) - k] for k in range(ECHO_FRAMES)])
@@ -27,11 +27,10 @@ def echoed(signal: Floats, made: Floats) -> tuple[float, float]:
 
 
 def felt(force: Floats, answer: Floats) -> float:
-    """Return how much of a force's roughness its answer shows, 0 to 1, as a share of the power.
+    """Return the share of a force's high-frequency power that its response shows, 0 to 1.
 
-    What is rough in a force, and no noise, is in what answers to it: fourth differences of the
-    force are regressed on those of the answer about the same frame, without a model of what lies
-    between.
+    A response shows what is signal in the force, not noise. Fourth differences of the force are
+    regressed on those of the response about the same frame, without a model between them.
     """
     rough, shown = np.diff(force, 4)[FELT_FRAMES:-FELT_FRAMES], np.diff(answer, 4)
     last = len(shown) - 2 * FELT_FRAMES

@@ -1,1 +1,1 @@
-"""Each stage's residual: what is measured, less what the stage makes of its measured input."""
+"""The residual of each stage: the measured output minus the prediction from the measured input."""

@@ -1,13 +1,13 @@
 """The airframe's residuals: the JSBSim model, driven from trim by the measured surfaces.
 
-How far the surfaces moved from their trim is added to the model's own trim, and the model flown
-so, open loop (`openloop`). The rates, angle of attack, sideslip and load factor are compared: they
-hold up, since what they owe to the surfaces fades within seconds; attitude, speed and height
-integrate every small error and are left to the kinematics. Where the elevator stands in trim is
-compared besides (`trim`). How the air moved is found by `air`.
+The measured surface deflections from trim are added to the model's own trim, and the model is
+flown open loop (`openloop`). Rates, angle of attack, sideslip and load factor are compared, since
+errors in them decay within seconds. Attitude, speed and height are not, since they integrate every
+small error. The elevator position in trim is compared too (`trim`). `air` estimates the motion of
+the air.
 
-A surface that the aircraft's own laws move is no input: the host's command is flown through the
-laws, as JSBSim has them, and the surface is compared with the motion.
+If the aircraft's control laws move a surface, the host's command is the input: it is flown through
+JSBSim's laws, and the surface is an output.
 """
 
 from __future__ import annotations
@@ -47,21 +47,18 @@ COMPARED = (
     "yaw_rate_rad_per_s",
     "sideslip_rad",
 )
-TRIM = "elevator_trim_rad"  # where the elevator stands in trim
-_KEPT = 12  # flights remembered
+TRIM = "elevator_trim_rad"  # elevator position in trim
+_KEPT = 12  # size of the cache of flights
 
 
 class Flights:
-    """The last flights of a record, by the aircraft, what its surfaces did, and how the air moved.
-
-    A rig that flies as another did need not be flown again.
-    """
+    """A cache of a record's last flights, by aircraft, surface motion and motion of the air."""
 
     def __init__(self) -> None:
         self._known: list[tuple[tuple[Any, ...], Flown | None]] = []
 
     def of(self, asked: tuple[Any, ...], fly: Callable[[], Flown]) -> Flown | None:
-        """Return what was asked for, as it is known or flown; None where the aircraft has none."""
+        """Return a flight from the cache or a new one; None if the aircraft cannot be trimmed."""
         for known, flown in self._known:
             if known == asked:
                 return flown
@@ -76,7 +73,7 @@ class Flights:
 
 @dataclass
 class Model:
-    """The aircraft of one record, flown by its surfaces; remembers its last flights."""
+    """The aircraft of one record, driven by its surfaces."""
 
     rig: Rig
     record: Record
@@ -86,16 +83,16 @@ class Model:
     flights: Flights = field(default_factory=Flights)
 
     def flown(self, rig: Rig) -> Flown | None:
-        """Return the compared channels and the trim as `rig` has them; None where it has none."""
+        """Return the compared channels and the trim of `rig`; None if it cannot be trimmed."""
         assert rig.flight is not None
         flight = changed(rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
-        # The air is known by the motion as recorded, and as late.
+        # The air is estimated from the recorded motion, so it has the same late time stamps.
         late = rig.flight.motion_stamp * self.rig.frame_rate if flight.gust_rms > 0.0 else 0.0
         asked = (flight, self.compared, _digest(self.moved), late)
         return self.flights.of(asked, lambda: self.fly(flight, self.moved, late=late))
 
     def carried(self, wrong: Sequence[Moved], plain: Flown) -> Floats:
-        """Return by how much errors of the surfaces' motion and of the air change the flight."""
+        """Return the change of the flight by errors of the surfaces' motion and of the air."""
         assert self.rig.flight is not None
         flight = changed(self.rig.flight, {"motion_stamp_s": 0.0}, self.rig.name, "flight")
         asked = (flight, self.compared, _digest(wrong), "with error")
@@ -106,9 +103,9 @@ class Model:
     def fly(
         self, flight: Flight, moved: Sequence[Moved], with_error: bool = False, late: float = 0.0
     ) -> Flown:
-        """Return the flight that the surfaces make.
+        """Return the flight with the given surface motion.
 
-        `with_error` adds to the air a sample of its error; so many frames `late` is it known.
+        `with_error` adds a sample of its error to the air, whose estimate is `late` frames late.
         """
         air = None
         if flight.gust_rms > 0.0 and self.air is not None and self.air.rms > 0.0:
@@ -121,7 +118,7 @@ class Model:
 
 
 def _digest(moved: Sequence[Moved]) -> bytes:
-    """Return what tells one motion of the surfaces from another."""
+    """Return a hash of the surfaces' motion."""
     found = sha256()
     for one in moved:
         found.update(repr((one.channel, one.trim, one.filed)).encode())
@@ -131,9 +128,9 @@ def _digest(moved: Sequence[Moved]) -> bytes:
 
 
 def needs(rig: Rig, record: Record) -> tuple[str, ...]:
-    """Return the channels without which the airframe cannot be judged by this record.
+    """Return the channels that are necessary to judge the airframe by this record.
 
-    Among them the command of a control that was moved, where no surface position gives it.
+    They include the command of a control that was moved and has no surface position.
     """
     own = (surface_channel("column"),) if "column" in rig.controls else ()
     found: tuple[str, ...] = (RATE, *own)
@@ -152,9 +149,9 @@ def _was_moved(record: Record, control: ControlName) -> bool:
 def airframe_outputs(
     rig: Rig, record: Record, number: int = 0, flights: Flights | None = None
 ) -> list[Output]:
-    """Return the airframe's outputs; none for a bench or where its channels lack.
+    """Return the airframe's outputs; empty for a bench, or if channels are missing.
 
-    `flights` are those of the same record that are known.
+    `flights` is a cache of flights of the same record.
     """
     if rig.flight is None or any(name not in record for name in needs(rig, record)):
         return []
@@ -169,7 +166,7 @@ def airframe_outputs(
     air = vertical_air(record, 1.0 / rig.frame_rate)
     model = Model(rig, record, right, compared, air, Flights() if flights is None else flights)
     flown = model.flown(rig)
-    assert flown is not None  # as the rig is filed, it trims
+    assert flown is not None  # the filed rig can be trimmed
     carried = model.carried(wrong, flown)
     outputs = []
     for i, name in enumerate(compared):
@@ -195,9 +192,9 @@ def airframe_outputs(
 
 
 def _trim_output(model: Model, record: Record, trim: Trim, number: int) -> Output:
-    """Return the elevator's place in trim as an output, with the noise of its channel.
+    """Return the elevator position in trim as an output, with the noise of its channel.
 
-    It is known by less than all of the rows: the floor is higher than the noise by as much.
+    The trim is measured over a part of the rows, so the noise floor is higher than the noise.
     """
     position, at = record[surface_channel("column")], list(model.rig.controls).index("column")
     noise = position - smoothed(position)

@@ -1,4 +1,4 @@
-"""The compensation's output: δ̂, by the host's own arithmetic on the δc and F that it read."""
+"""The output of the compensation: δ̂ by the host's equations, from δc and F as read."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Floats = NDArray[np.float64]
 
 
 def compensated(reading: Reading) -> tuple[str, Floats, Predict, float]:
-    """Return the channel's name, δ̂ as recorded, how a rig predicts it, and its floor, d.
+    """Return the channel's name, δ̂ as recorded, its prediction by a rig, and its floor, d.
 
-    The floor is δc's noise, though both hold the same: F may be stamped a little late. Where the
-    rig has it late, the record may hold another noise of F than the host had.
+    The floor is the noise of δc, although the host reads the same noise, because F may be stamped
+    slightly late. If the rig's F is late, the record's noise of F may differ from the host's.
     """
     computed, recorded = reading.as_read("computed"), reading.as_read("force")
     control, others = reading.control, reading.others(as_read=True)

@@ -1,8 +1,8 @@
-"""A control whose motion is imposed, as on a test bench for dampers: the force is its answer.
+"""A control with imposed motion, as on a damper test bench: the force is the output.
 
-The grip's motion is imposed where the record has it, else δc; the measured force is compared with
-the force by which the loader answers (`rig.imposed`). Between the grip and the loader lie the
-structure, which bends under the measured force, the servo, and play.
+The imposed motion is that of the grip if recorded, else δc. The measured force is compared with
+the loader's reaction (`rig.imposed`). Structure (which bends under the measured force), servo and
+backlash lie between grip and loader.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
 
-OF_PLAY = "loader.play"  # its key in a rig file without the unit
+OF_PLAY = "loader.play"  # key in the rig file, without the unit
 
 
 class Imposed:
-    """The force of a control under an imposed motion: as measured, and as a rig predicts it."""
+    """The force under an imposed motion: as measured, and as predicted by a rig."""
 
     def __init__(self, reading: Reading) -> None:
         self._reading = reading
@@ -43,9 +43,9 @@ class Imposed:
         self._others = {name: smoothed(other) for name, other in reading.others().items()}
 
     def predict(self, motion: Floats | None = None, force: Floats | None = None) -> Predict:
-        """Return the prediction for a motion in d at each frame, as read; the record's own.
+        """Return the prediction for a motion as read, d at each frame; default: the record's.
 
-        `force` in N bends the structure behind the grip; the record's own.
+        `force`, N, bends the structure behind the grip; default: the record's.
         """
         reading = self._reading
         moved = self._motion if motion is None else motion
@@ -71,26 +71,26 @@ class Imposed:
         return predicted
 
     def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
-        """Return a prediction that leaves nearly open when, within a frame, a play was taken up.
+        """Return a prediction with a small weight where the force jumps within a frame.
 
-        A sample there may hold any force between those before and after; what it holds is counted
-        as a small share, by which a fit finds its way.
+        A backlash that closes within a frame gives a sample between the forces before and after.
+        Only the share `JUMP_COUNTED` of the difference counts, which still guides a fit.
         """
         around = np.stack((np.roll(predicted, 1), np.roll(predicted, -1)))
         held = np.clip(self._reading.signal("force"), around.min(axis=0), around.max(axis=0))
         return np.where(jumps, held + JUMP_COUNTED * (predicted - held), predicted)
 
     def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the prediction with a sample of what is wrong with the smoothed motion."""
+        """Return the prediction with a sample of the error of the smoothed motion."""
         moved = with_error(self._motion, k, self._level)
         return self.predict(moved, self._force.with_error(k + NOISE_TRIES))(rig)
 
 
 def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
-    """Return a library for imposed motions: the linkage's effects show in the force.
+    """Return a library for imposed motions: the effects of the linkage show in the force.
 
-    Only play does where δc is `imposed`, and none that is a limit of the servo: the motion of the
-    grip is given, whatever the servo can do.
+    If δc is `imposed`, backlash is the only effect of the linkage. Limits of the servo are left
+    out, since the motion of the grip is given.
     """
     found = []
     for effect in library:
@@ -110,9 +110,9 @@ def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
 def _plays(
     number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
-    """Return the play that leaves least of the force, where a fit starts: by two scans.
+    """Return the backlash with the least residual of the force, by two scans, as a fit's start.
 
-    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
+    The cost has local minima, since the jumps of a backlash move from sample to sample.
     """
     ours = [output for output in outputs if output.stage == "loader"]
     key = dotted(number.key_on(control), control)

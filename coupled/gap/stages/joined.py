@@ -1,4 +1,4 @@
-"""Where no output judges the linkage alone: which effects show in the loader's output instead."""
+"""The outputs in which effects show in records without an output of the linkage."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def as_judged(
 ) -> list[Effect]:
     """Return effects with the outputs in which they show in these records.
 
-    Effects that show in none of them are left out.
+    Effects that show in no output are left out.
     """
     if any(output.in_series for output in outputs):
         return _in_series(effects, any(output.stage == "linkage" for output in outputs))
@@ -26,10 +26,10 @@ def as_judged(
 
 
 def _in_series(effects: Sequence[Effect], separate: bool) -> list[Effect]:
-    """Return effects for loader and linkage in series; the linkage's show in the loader's output.
+    """Return effects for loader and linkage in series; those of the linkage show in the loader.
 
-    `separate` where other records have δc, and judge the linkage alone as well. Effects of the
-    sensor of δc are left out where none has it.
+    `separate`: other records have δc, and judge the linkage separately as well. Otherwise effects
+    of the sensor of δc are left out.
     """
 
     def shown(effect: Effect) -> Effect:

@@ -1,8 +1,8 @@
-"""The JSBSim model flown open loop: from its own trim, by how far the measured surfaces moved.
+"""The JSBSim model flown open loop from its own trim, driven by the measured surfaces.
 
-An aircraft that is heavier, or whose lift or moment differs, trims elsewhere. A record of it says
-where its surfaces stood in trim (`trim`); what they did from there on is added to the model's own
-trim, so that what is compared is the aircraft's answer, and no jolt from one trim to another.
+An aircraft with another weight, lift or moment trims at other surface positions. The record gives
+its surface positions in trim (`trim`). The surfaces' deflections from there are added to the
+model's own trim, so that the model does not start with a transient from one trim to the other.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from coupled.schema import changed
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats]
-_flying = Lock()  # JSBSim never lets another thread run: two flights at once would only alternate
+_flying = Lock()  # JSBSim holds the GIL, so two flights at once would only alternate
 
 
 def command_of(position: Floats, points: Points) -> Floats:
-    """Return the command about trim at which a surface stands so, same shape."""
+    """Return the commands about trim that give these surface positions, same shape."""
     commands, positions = points
     order = np.argsort(positions)
     return np.interp(position, positions[order], commands[order])
 
 
 def about(position: float, filed: float, points: Points) -> float:
-    """Return the command that holds a surface there, from that of its trim as `filed`."""
+    """Return the command that holds a surface at a position, about that of the `filed` trim."""
     if abs(position - filed) <= SAME_TRIM_rad:
         return 0.0
     held, before = command_of(np.array([position, filed]), points)
@@ -49,12 +49,11 @@ def about(position: float, filed: float, points: Points) -> float:
 
 @dataclass(frozen=True)
 class Moved:
-    """What one control's surface did over a record.
+    """The motion of one control's surface over a record.
 
-    `channel` is its name. Where the model has a map from command to position (`points`), `values`
-    are its positions in rad; `trim` is where it stood in trim, and `filed` where it stands in that
-    of the model that the map is of. Else they are commands about trim. Row k holds what row k
-    answers to.
+    `channel` is its name. With a map from command to position (`points`), `values` are positions
+    in rad, `trim` is the position in trim, and `filed` that in trim of the map's model. Otherwise
+    `values` are commands about trim. Row k is the input of the motion in row k.
     """
 
     channel: str
@@ -64,7 +63,7 @@ class Moved:
     filed: float = 0.0
 
     def commands(self, own: float) -> Floats:
-        """Return the commands about the trim of a model that then holds the surface at `own`."""
+        """Return the commands about the trim of a model whose surface trims at `own`."""
         if self.points is None:
             return self.values
         moved = own - self.trim if abs(own - self.trim) > SAME_TRIM_rad else 0.0
@@ -73,7 +72,7 @@ class Moved:
 
 @dataclass(frozen=True)
 class Flown:
-    """A flight: the channels asked for, shape (frames, channels), and where the surfaces trim."""
+    """A flight: the requested channels, shape (frames, channels), and the surfaces in trim."""
 
     motion: Floats
     trim: tuple[float, ...]  # rad, in the order of the controls
@@ -82,7 +81,7 @@ class Flown:
 def flown_in(
     record: Record, controls: Sequence[ControlName], frame_rate_Hz: float
 ) -> tuple[list[Wrapper], Floats]:
-    """Return the conditions of a record's flight and how they move the trims (`fly_open_loop`)."""
+    """Return the conditions of a record's flight and the trims they move (`fly_open_loop`)."""
     frame_s = 1.0 / frame_rate_Hz
     trims = np.column_stack([trim_shift(record, control, frame_s) for control in controls])
     return wrappers_of(record, frame_s), trims
@@ -98,12 +97,12 @@ def fly_open_loop(
     conditions: Sequence[Wrapper] = (),
     trims: Floats | None = None,
 ) -> Flown:
-    """Return the flight of a model from its trim, by what its surfaces did; a row a frame.
+    """Return the flight of a model from its trim, driven by its surfaces; a row for each frame.
 
-    `air_m_per_s` is how fast the air rises over each frame. The `conditions` act on the model as
-    they did on the aircraft; `trims` are the commands by which they move the trim, shape (frames,
-    controls), which the surfaces' positions hold, too. Raises InputError where the model does not
-    trim so.
+    `air_m_per_s` is the vertical speed of the air over each frame. The `conditions` act on the
+    model as on the aircraft. `trims` are the commands by which they move the trim, shape (frames,
+    controls), which the surface positions include. Raises InputError if the model cannot be
+    trimmed.
     """
     still = changed(flight, {"gust_rms_m_per_s": 0.0}, "rig", "flight")
     frame_s = 1.0 / frame_rate_Hz
@@ -119,22 +118,22 @@ def fly_open_loop(
         for i, (one, own) in enumerate(zip(moved, trim, strict=True)):
             asked[:-1, i] = one.commands(own)
             if trims is not None and one.points is not None:
-                asked[1:-1, i] -= trims[:-1, i]  # a row is the answer to the frame before it
+                asked[1:-1, i] -= trims[:-1, i]  # a row results from the frame before it
         asked[-1] = asked[-2]
         return Flown(_motion(airframe, asked[1:], channels), trim)
 
 
 def _motion(airframe: JSBSimAirframe, asked: Floats, channels: Sequence[str]) -> Floats:
-    """Return the channels, shape (frames, channels), as the aircraft flies by commands about trim.
+    """Return the channels, shape (frames, channels), of a flight with commands about trim.
 
-    A row is the answer to the row of commands before it.
+    A row results from the commands of the row before.
     """
     each = [airframe.reader(PROPERTIES[name]) for name in channels]
     step, readers = airframe.step, [read for read in each if read is not None]
     motion: list[list[float]] = []
     for a, b, c in asked.tolist():
         now = [read() for read in readers]
-        if not abs(now[0]) <= LOST_MOTION:  # nor is it a number
+        if not abs(now[0]) <= LOST_MOTION:  # true for NaN too
             motion += [motion[-1] if motion else now] * (len(asked) - len(motion))
             break
         motion.append(now)

@@ -1,8 +1,8 @@
-"""The multiplier's product F_mod, against what it should be: of δc itself, or of δc as read.
+"""The multiplier's product F_mod, compared with the product of δc itself or of δc as read.
 
-A digital product repeats the noise of the δc that it was made from, an analog one does not know of
-it; a wrong scale is in the one and not in the other. What repeats that noise is therefore no noise
-of F_mod's own channel (`echo`): taken for such, it would hide how the product is made.
+A digital product contains the sensor noise and scale error of δc, an analog product does not. The
+part of F_mod that repeats the noise of δc (`echo`) is therefore not the channel's own noise:
+included in the noise floor, it would hide whether the product is digital.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from coupled.rig.rig import Rig
 
 @dataclass(frozen=True)
 class Product:
-    """F_mod of a record in N, by δc and G_T; each signal of shape (frames,)."""
+    """F_mod of a record in N, from δc and G_T; each signal of shape (frames,)."""
 
     reading: Reading
 
@@ -42,17 +42,17 @@ class Product:
 
     @cached_property
     def own(self) -> Noise:
-        """The noise of its channel, by its spectrum."""
+        """The noise of the channel, from its spectrum."""
         return self.reading.heard("modifying_force")
 
     @cached_property
     def unsure(self) -> NDArray[np.bool_]:
-        """Where noise in δc says on which side of neutral it is, and a breakout makes F_mod jump.
+        """The frames in which noise of δc decides the sign of a jump of F_mod at the breakout.
 
-        And the rows of a live record at which the loader is not judged. There the prediction is the
-        measurement. A jump that F_mod's own noise covers counts too, where it is more than the
-        gradient's rise: δc as read is on its right side more often than δc smoothed, of an analog
-        product as of a digital one.
+        They include the rows of a live record in which the loader is not judged. The prediction
+        there is the measurement. A jump below the noise of F_mod counts too, if it exceeds the
+        rise of the gradient: δc as read has the right sign more often than δc smoothed, for both
+        kinds of product.
         """
         away, level = self._smooth - self._neutral, self._level.rms
         below, above, beyond = (self._made(self._neutral + k * level) for k in (-1.0, 1.0, 3.0))
@@ -64,12 +64,12 @@ class Product:
 
     @cached_property
     def echo(self) -> Floats:
-        """What a product of δc as read has of that reading's noise, N."""
+        """The noise in the product of δc as read that comes from that reading, N."""
         more = self._made(self._computed) - self._made(self._smooth)
         return np.where(self.unsure, 0.0, more)
 
     def predict(self, rig: Rig, seen: Floats | None = None) -> Floats:
-        """Return what a rig makes of δc, smoothed or as `seen` in d, N."""
+        """Return a rig's product of δc, smoothed or as `seen` in d, N."""
         of = self.reading
         if rig.controls[of.control].loader.multiplier == "digital":
             read = self._computed
@@ -79,7 +79,7 @@ class Product:
         return np.where(self.unsure, self.recorded, self._made(read, rig))
 
     def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the same of δc with the k-th sample of its noise."""
+        """Return the product with the k-th sample of the noise of δc."""
         return self.predict(rig, with_error(self._likely, k, self._level))
 
     @cached_property
@@ -92,10 +92,10 @@ class Product:
 
     @cached_property
     def _likely(self) -> Floats:
-        """δc as it likely was, d: with the share of what the smoother takes off that was motion.
+        """The estimate of δc, d: smoothed, plus the motion's share of what the smoother removes.
 
-        Of a fast motion beside little noise it is a large one, and an analog product, which has
-        all of the motion, would seem to repeat the noise.
+        For a fast motion with little noise that share is large. Without it, an analog product,
+        which contains the whole motion, would seem to repeat the noise of δc.
         """
         rest = self._computed - self._smooth
         noise = self._level.sample(len(rest), np.random.default_rng(53))
@@ -110,16 +110,16 @@ class Product:
 
     @cached_property
     def _gradients(self) -> tuple[Floats, Floats | None]:
-        """G_T within the break and beyond it, N/d."""
+        """G_T below and above the break, N/d."""
         return self.reading.gradient(), self.reading.second()
 
     @cached_property
     def _neutral(self) -> Floats:
-        """δc at which the services hold the control neutral, d."""
+        """The δc of neutral with the services, d."""
         return 0.0 * self._smooth + neutral(self.reading)
 
     def _made(self, read: Floats, rig: Rig | None = None) -> Floats:
-        """Return the product of δc as read, N, by a rig, without one the nominal."""
+        """Return the product of δc as read, N, by a rig; default: the nominal one."""
         of = self.reading
         rig = of.rig if rig is None else rig
         missed, assumed = of.missed.under(rig, of.control), of.assumed()

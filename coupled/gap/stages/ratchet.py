@@ -1,18 +1,15 @@
-"""Play, dry friction and noise: what smoothing leaves of an input's noise ratchets them.
+"""Correction of noise-induced creep: residual input noise ratchets backlash and friction.
 
-A play keeps the extremes of what drives it. Where friction holds the loader still, δc as measured
-trembles on; each greatest tremble pushes the grip's side of a play, and none draws it back. So a
-fit finds the play too large, by 1 % of 0.8 mm at 20 μm of noise, and by 2 % at 40. It is pushed as
-far as the tremble is large: the stage is driven once more with as much noise again, and what that
-changes is taken off in proportion (simulation and extrapolation: Cook and Stefanski, JASA 89,
-1994). With the noise of both signs, what goes straight with it falls out. Noise may be too small to
-push what √2 times as much does: then the record shows no push, and none is taken off.
+A backlash keeps the extremes of its input. While friction holds the loader still, the smoothed δc
+still contains noise; each maximum of it moves the grip's side of the backlash. A fit then finds the
+backlash too large, by 1 % of 0.8 mm at 20 μm of noise. Friction with presliding creeps likewise
+while the force rests: each noise peak of F makes the contact slip a little. Where the force is
+found to rest completely it is held constant (`resting`).
 
-A contact of dry friction that yields walks likewise: where the force rests, each tremble of F as
-measured lets it slip a little, and it gives way as the real one, which never felt that, does not.
-Of 24 blind records (seed 103) it walked by over half a floor in three, and by ten in one that held
-its force for seconds. It walks as far as the tremble is large, and is put back alike. Where the
-force rests altogether it is held (`resting`), and does not tremble.
+The creep grows with the noise. The stage is replayed with as much noise again, in both signs, so
+that linear contributions cancel, and the change is extrapolated to zero noise (SIMEX: Cook and
+Stefanski, JASA 89, 1994). Noise may be too small for a creep that √2 times as much would cause.
+Then the record does not show the creep, and the correction is not applied.
 """
 
 from __future__ import annotations
@@ -29,13 +26,13 @@ from coupled.parallel import in_threads
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
-Driven = Callable[[Rig, float], Floats]  # by a rig and so many times a sample of the noise
+Driven = Callable[[Rig, float], Floats]  # response of a rig with a multiple of a noise sample
 
 
 def unratcheted(rig: Rig, control: ControlName, at: Driven, measured: Floats) -> Floats:
-    """Return what a linkage makes of its input, without what noise does to its play.
+    """Return a linkage's response without noise-induced creep of its backlash.
 
-    `at` drives it with so many times a sample of the input's noise added; shapes (frames,).
+    `at` gives the response with a multiple of a sample of input noise added; shapes (frames,).
     """
     loader = rig.controls[control].loader
     if loader.play == 0.0 and loader.bend_hysteresis_share == 0.0:
@@ -46,9 +43,9 @@ def unratcheted(rig: Rig, control: ControlName, at: Driven, measured: Floats) ->
 def unwalked(
     rig: Rig, control: ControlName, at: Driven, measured: Floats, times: float = 1.0
 ) -> Floats:
-    """Return what a loader makes of its force, without what noise does to a contact that yields.
+    """Return a loader's response without noise-induced creep of presliding friction.
 
-    The force holds so many `times` the noise that is passed.
+    The force contains `times` the noise that the smoother passes.
     """
     if rig.controls[control].loader.friction_stiffness == 0.0 or not is_dry(rig, control):
         return at(rig, 0.0)
@@ -56,10 +53,10 @@ def unwalked(
 
 
 def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
-    """Tell whether noise of the force would walk a contact that yields, by more than it shakes it.
+    """Tell whether noise of the force makes presliding friction creep by more than it vibrates.
 
-    By the filed friction, or by a little where none is filed, with a contact of a usual length;
-    `noise` is δc's own, rms in d.
+    Tested with the filed friction, or a little if none is filed, and a usual presliding length.
+    `noise` is the noise of δc, rms in d.
     """
     loader = rig.controls[control].loader
     level = max(loader.friction, loader.breakaway) or WALKED_N
@@ -74,11 +71,11 @@ def is_walked(rig: Rig, control: ControlName, at: Driven, noise: float) -> bool:
 
 
 def _put_back(measured: Floats, plain: Floats, up: Floats, down: Floats) -> Floats:
-    """Return an answer without what noise has pushed it by, from two with as much noise again.
+    """Return a response without creep, from two responses with as much noise again.
 
-    All that is foretold is taken off, unless the answer then departs from what was measured by
-    more: between the two shares of `PUSHED`, part of it. A play's size takes up what is small of a
-    push, and what is measured cannot say then how large it was.
+    The predicted creep is removed unless this increases the mean square residual; between the two
+    shares of `PUSHED` it is removed in part. A small creep is absorbed by a fitted backlash, so
+    that the residual does not show it.
     """
     push = RATCHET * (plain - 0.5 * (up + down))
     before, after = (float(np.mean((measured - one) ** 2)) for one in (plain, plain + push))

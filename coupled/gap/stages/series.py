@@ -2,17 +2,17 @@
 
     F → loader → δc → servo, play → + bend(F) → δ
 
-The loader's answer to the measured force is predicted, and drives the linkage; what the transducer
-at the grip reads is compared with the record. Every effect of the loader and of the linkage shows
-in that one output. A static record gives one number only, the slope of δ over F,
+The loader's response to the measured force is predicted, and drives the linkage; the predicted
+reading of the transducer at the grip is compared with the record. All effects of loader and
+linkage show in this one output. A static record gives one number only, the slope of δ over F,
 
     dδ/dF = 1/(G_B + ΔG) + K
 
-so that a bend, a gradient and a scale of the force are the same law there. The loader's mass and
-damping distinguish them where the force is fast enough for both to matter.
+so a bend, a gradient and a force scale are not separable. The loader's mass and damping make them
+separable if the force excites both.
 
-On a bench that imposes the motion, what moves the grip takes up a rigid play by the side of the
-force, δ = x + sgn(F)·play/2 + bend(F). Within the play no force acts, and δ may be anywhere in it.
+On a bench that imposes the motion, the grip takes up a rigid backlash on the side of the force,
+δ = x + sgn(F)·play/2 + bend(F). Within the backlash the force is zero and δ is arbitrary.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from coupled.rig.nodes import Nodes
 from coupled.rig.replay import drive_series
 from coupled.rig.rig import Rig
 
-NO_FORCE = 3.0  # of the noise of F: within it, the force is none
-SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
+NO_FORCE = 3.0  # standard deviations of F's noise within which the force is taken as zero
+SAMPLED = 47  # seed of the noise with which creep is tested
 
 
 class Series:
-    """The grip's motion under a force, as measured and as a rig predicts it."""
+    """The motion of the grip under a force, as measured and as predicted by a rig."""
 
     def __init__(self, reading: Reading, force: Drive, hosted: Hosted) -> None:
         self._reading, self.force, self._hosted = reading, force, hosted
@@ -49,7 +49,7 @@ class Series:
         self._walks: bool | None = None
 
     def _driven(self, force: Floats) -> Driven:
-        """Return the answer to a force, N at the frames, and so many times its noise."""
+        """Return the response to a force, N at the frames, plus a multiple of its noise."""
         reading, nodes = self._reading, Nodes(force)
 
         def at(rig: Rig, times: float) -> Floats:
@@ -105,5 +105,5 @@ class Series:
         return self._predicted(force.smooth, 1.0)
 
     def noisy(self, rig: Rig, k: int) -> Floats:
-        """Return the prediction with sample number k of what is wrong with the smoothed force."""
+        """Return the prediction with sample number k of the error of the smoothed force."""
         return self._predicted(self.force.with_error(k), 2.0**0.5)(rig)

@@ -1,7 +1,7 @@
-"""A servo that is given set points: what of the library can be true of it.
+"""The library for a servo with commanded set points.
 
-A number that is given has no sensor, so no scale and no hum. And no limit of the servo's rate is
-true that lies below a speed which the grip was seen to reach.
+A command has no sensor, so sensor effects are left out. A limit of the servo's rate must be above
+the speed that the grip reached.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ RATE_LIMIT = "loader.servo_rate_limit_{d}_per_s"
 def under_set_points(
     library: Sequence[Effect], records: Collection[Record], control: ControlName
 ) -> list[Effect]:
-    """Return a library for set points, with the limit of the servo's rate above what it reached."""
+    """Return a library for set points, with the servo's rate limit above the speed reached."""
     grip = channel(control, "deflection")
     seen = [_reached(record[grip], record) for record in records if grip in record]
     reached = max(seen, default=0.0)
@@ -40,9 +40,10 @@ def under_set_points(
 
 
 def _reached(grip: Floats, record: Record) -> float:
-    """Return the speed in d/s that the grip surely reached, over a few frames, beyond its noise.
+    """Return the speed in d/s that the grip reached, over a few frames, above its noise.
 
-    A play only makes it slower than the servo; a bend would add to it, but has no say here.
+    Backlash only makes the grip slower than the servo. A bend would add to the speed; it is
+    neglected.
     """
     rate_Hz = (len(grip) - 1) / float(record.time_s[-1] - record.time_s[0])
     noise = REACHED_BEYOND * heard(grip).rms

@@ -1,15 +1,15 @@
-"""Each stage's residual: what is measured less what the stage makes of its measured input.
+"""The residual of each stage: measured output minus prediction from the measured input.
 
-The chain is cut at every measured signal, so that a fault upstream is inherited by nobody.
-Inputs are smoothed (`smooth`). A residual is over its floor: its own noise and its inputs'.
+The chain is cut at every measured signal, so a fault upstream does not affect a stage. Inputs are
+smoothed (`smooth`). A residual is divided by its noise floor: its own noise and its inputs'.
 
     schedule      q̄ → G_T                       surface   δ̂, q̄ → its position
     loader        F, G_T, n_z → δc               sensing   δc as read, against its neighbours
     multiplier    δc, G_T → F_mod (part of the loader)
     linkage       δc, F → δ
-    compensation  δc, F → δ̂ (the host's own arithmetic)
+    compensation  δc, F → δ̂ (equations of the host)
 
-A wrong scale S₁ cannot be driven alone: it shows in all three of loader, multiplier and linkage.
+A wrong scale S₁ has no output of its own: it shows in loader, multiplier and linkage.
 """
 
 from __future__ import annotations
@@ -77,14 +77,13 @@ from coupled.rig.serving import held_force
 
 Floats = NDArray[np.float64]
 STEPPED = ("loader", "linkage")  # stages that run at the loader's own steps
-SAMPLED = 47  # seed of the noise by which a play or a contact is seen to be pushed
+SAMPLED = 47  # seed of the noise with which creep is tested
 
 
 class DrivenBy(NamedTuple):
-    """The quantity of a control that drives a stage.
+    """The quantity of a control that is a stage's input.
 
-    `between` is by how much the prediction may be off, rms, since the inputs are not known between
-    the frames.
+    `between` is the rms error of the prediction because the inputs between frames are unknown.
     """
 
     quantity: str = ""
@@ -95,7 +94,7 @@ UNDRIVEN = DrivenBy()
 
 
 def hosted_by(reading: Reading) -> Hosted:
-    """Return what a record holds of services and host, and of where the cab stopped the grip."""
+    """Return what a record contains of services and host, and where the cab stopped the grip."""
     held = held_force(reading.rig, reading.record, reading.control)
     assumed = reading.assumed()
     more = None if assumed is None else assumed.gradient
@@ -104,10 +103,10 @@ def hosted_by(reading: Reading) -> Hosted:
 
 @dataclass(frozen=True)
 class Reader(Reading):
-    """Builds the outputs that a record lets judge, and says which channels lack."""
+    """Builds the outputs that a record allows, and lists missing channels."""
 
     def outputs(self) -> list[Output]:
-        """Return every output that the record lets judge, in the order of the chain."""
+        """Return every output that the record allows, in the order of the chain."""
         lacking = self.missing()
         makers = {
             "schedule": self._schedule,
@@ -140,11 +139,11 @@ class Reader(Reading):
         judged: NDArray[np.bool_] | None = None,
         echo: Floats | None = None,
     ) -> Output:
-        """Return an output whose floor is its own noise and its input's, carried through.
+        """Return an output whose floor is its own noise and its input's, propagated.
 
-        Where it is not `judged`, the prediction is the measurement. Of one that is `driven_by` a
-        quantity of the control, it is known what the floor hides. What repeats an `echo` is none
-        of its own noise.
+        The prediction of frames that are not `judged` is the measurement. For an output that is
+        `driven_by` a quantity of the control, `hides` is set. The part of the residual that
+        repeats an `echo` does not count as noise.
         """
         base = predict(self.rig)
         own = left_noise(own, measured, without_echo(measured - base, echo), judged)
@@ -184,7 +183,7 @@ class Reader(Reading):
 
         share, rest = echoed(gradient[ran], predict(self.rig, pressure)[ran])
         if share > ECHO_SHARE:
-            # The host's G_T holds the noise of q̄ as recorded: it was made from it, and no other.
+            # G_T contains the noise of the recorded q̄, so the host computed it from that q̄.
             def as_read(rig: Rig) -> Floats:
                 return predict(rig, pressure)
 
@@ -209,9 +208,9 @@ class Reader(Reading):
         def driven(
             f: Floats, seen: Floats, starts: Mask = own_starts, otherwise: bool = False
         ) -> Driven:
-            """Return the answer to a force, and so many times its noise, by where windows start.
+            """Return the response to a force plus a multiple of its noise, with restarts.
 
-            `otherwise`: with less known of what force and services did between the frames.
+            `otherwise`: force and services between the frames are interpolated more coarsely.
             """
             nodes = Nodes(f, coarsely if otherwise and jumps(f) else on_nodes)
             misread = computed - seen
@@ -264,20 +263,20 @@ class Reader(Reading):
         return [replace(whole, rough=self._judged(lambda rig: answer(rig, 0.0), computed))]
 
     def _restarts(self, every: int = 0) -> Mask:
-        """Return the frames at which a replay starts as measured, and those `every` so many."""
+        """Return the frames at which a replay restarts as measured; also every `every` frames."""
         frames = np.arange(len(self.record))
         starts = np.zeros(len(frames), dtype=bool) if self.live is None else self.live.starts
         return starts | (frames % every == 0) if every else starts
 
     def _judged(self, predict: Predict, measured: Floats) -> Predict:
-        """Return a prediction that is the measurement where the loader is not judged."""
+        """Return a prediction that equals the measurement where the loader is not judged."""
         judged = self.judged
         if judged is None:
             return predict
         return lambda rig: np.where(judged, predict(rig), measured)
 
     def _without_what_was_felt(self, force: Drive, answer: Floats) -> Drive:
-        """Return a broadband force with as much noise as its answer does not show."""
+        """Return a broadband force with the noise reduced to what its response does not show."""
         if force.noise.rms <= BROAD * float(np.std(force.recorded)):
             return force
         share = felt(force.recorded, answer)
@@ -288,7 +287,7 @@ class Reader(Reading):
         return replace(force, noise=level) if share <= HALF_FELT else force.unsmoothed(level)
 
     def _series(self) -> list[Output]:
-        """Return the grip's motion under the force, where δc is not recorded."""
+        """Return the grip's motion under the force, for records without δc."""
         grip = self.signal("deflection")
         force = self._without_what_was_felt(self.pulled(), grip)
         series = Series(self, force, hosted_by(self))
@@ -299,9 +298,9 @@ class Reader(Reading):
         return [found.under(series.force.noise)]
 
     def _answering(self) -> list[Output]:
-        """Return the force that answers an imposed motion."""
+        """Return the force as the output under an imposed motion."""
         motion, force = Imposed(self), self.signal("force")
-        own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # of a play
+        own = min(self.driving("force"), between_jumps(force), key=lambda one: one.rms)  # backlash
         made = (force, motion.predict(), motion.noisy, own, DrivenBy(self.imposed))
         return [self._made("loader", self.name_of("force"), *made)]
 
@@ -339,12 +338,12 @@ class Reader(Reading):
         driven_by = DrivenBy("computed", _rms(between))
         name = self.name_of("deflection")
         linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
-        # A bend adds to δc; of set points the whole way is the servo's.
+        # A bend adds to δc; with set points the whole motion is the servo's.
         handed_on = None if self.set_points else computed
         return [replace(linkage, noises={"force": force.noise.rms}, handed_on=handed_on)]
 
     def _compensation(self) -> list[Output]:
-        """Return δ̂ against the host's arithmetic on what the record says that it read."""
+        """Return δ̂, predicted by the host's equations from δc and F as read."""
         return [self._output("compensation", *compensated(self))]
 
     def _surface(self) -> list[Output]:
@@ -362,14 +361,14 @@ class Reader(Reading):
         shift = trim_shift(self.record, self.control, 1.0 / self.rig.frame_rate)
 
         def position(wanted: Floats) -> Floats:
-            """Return where the surface stands; a row answers to the one before it."""
+            """Return the surface position; a row results from the command in the row before."""
             asked = np.concatenate(([0.0], (wanted + shift)[:-1]))
             return np.interp(held + asked, commands_at, positions)
 
         def predict(rig: Rig) -> Floats:
             return position(replay_surface(rig, self.control, estimate, pressure))
 
-        # The host's own noise is in δ̂ and reaches the surface: the floor is the sensor's alone.
+        # The host's noise is in δ̂ and moves the surface, so the floor is the sensor's noise.
         left = measured - position(command)
         own = left_noise(heard(left), measured, left)
         floor = float(np.hypot(own.rms, SURFACE_KNOWN * np.ptp(measured)))

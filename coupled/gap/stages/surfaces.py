@@ -1,9 +1,9 @@
-"""What the airframe's surfaces did, by their recorded positions.
+"""The motion of the airframe's surfaces, from their recorded positions.
 
-Each model has a map of its own from command to position, found by flying it. A surface that the
-aircraft moves itself (a yaw damper, the laws of an F-16) stands where its motion wants it, too:
-what was commanded is then the host's own command, which is flown through the model's laws, and the
-surface cannot be judged by it.
+Each model has its own map from command to position, found by flying it. If the aircraft itself
+moves a surface (a yaw damper, the control laws of an F-16), the position depends on the aircraft's
+motion too. The input is then the host's command, flown through the model's laws, and the surface
+stage is not judged.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ def surface_channel(control: ControlName) -> str:
 
 
 def surface_points(rig: Rig, control: ControlName) -> Points | None:
-    """Return commands about trim, and a surface's positions that the model gives them, rad.
+    """Return commands about trim and the surface positions that the model gives them, rad.
 
-    None where the aircraft moves the surface by laws of its own.
+    None if the aircraft's own laws move the surface.
     """
     assert rig.flight is not None
     plain = changed(rig.flight, UNALTERED, rig.name, "flight")
@@ -73,15 +73,15 @@ def _points(
 def _moves_itself(
     airframe: JSBSimAirframe, controls: Sequence[ControlName], rate_Hz: float, control: ControlName
 ) -> bool:
-    """Tell whether a surface moves as the air rises and other controls are moved.
+    """Tell whether a surface moves with gusts or other controls.
 
-    Or goes on under its own control after a frame, as with a tab or an actuator of the model's own.
+    Also true if it still moves one frame after its own command, as with an actuator in the model.
     """
     at = motion_channels(controls, flown=True).index(surface_channel(control))
     own, frames = controls.index(control), round(SURFACE_SHAKE_s * rate_Hz)
 
     def goes(moved: int) -> list[float]:
-        """Return where the surface stands, frame by frame, as a control is held off neutral."""
+        """Return the surface position frame by frame while one control is held off neutral."""
         places = []
         for _ in range(frames):
             first, second, third = (SURFACE_SHAKE * (i == moved) for i in range(3))
@@ -98,7 +98,7 @@ def _moves_itself(
 
 
 def filed_trim(rig: Rig, control: ControlName) -> float:
-    """Return where a control's surface stands in the trim that `surface_points` counts from."""
+    """Return a surface's position in the trim to which `surface_points` refers, rad."""
     assert rig.flight is not None
     plain = changed(rig.flight, UNALTERED, rig.name, "flight")
     controls = tuple(rig.controls)
@@ -106,7 +106,7 @@ def filed_trim(rig: Rig, control: ControlName) -> float:
 
 
 def own_trim(rig: Rig, control: ControlName) -> float:
-    """Return where a control's surface stands in the trim of the rig's own aircraft."""
+    """Return a surface's position in the trim of the rig's own aircraft, rad."""
     assert rig.flight is not None
     still = changed(rig.flight, {"gust_rms_m_per_s": 0.0}, rig.name, "flight")
     controls = tuple(rig.controls)
@@ -127,11 +127,11 @@ def moved(
     trims: Mapping[ControlName, tuple[float, float]],
     rng: np.random.Generator,
 ) -> tuple[list[Moved], list[Moved]]:
-    """Return what the surfaces did, and the same with a sample of the error in that.
+    """Return the motion of the surfaces, and the same with a sample of its error.
 
-    In the order of the rig's controls. `trims` are where they stood in trim, rad, and by how much
-    they jump from there after the first row, which no smoother is to blur. A control that the
-    record knows nothing of is taken to have been left alone.
+    In the order of the rig's controls. `trims` are the positions in trim, rad, and the jumps from
+    there after the first row, which are not smoothed. A control without any channel in the record
+    is taken as not moved.
     """
     found = list[Moved]()
     wrong = list[Moved]()
@@ -143,7 +143,7 @@ def moved(
             continue
         position, filed = record[name], filed_trim(rig, control)
         trim, jump = trims.get(control, (filed, 0.0))
-        if VALIDITY in record:  # a live flight's surface is its model's own: it has no noise
+        if VALIDITY in record:  # the surface of a live flight is the model's: no noise
             one = Moved(name, position, points, trim, filed)
             found, wrong = [*found, one], [*wrong, one]
             continue
@@ -151,7 +151,7 @@ def moved(
         left = position - _led(rig, record, control, trim)
         level = left_noise(heard(position), position, left)
         if float(np.std(left)) < HALF_FELT * heard(position).rms:
-            # What is rough in it was commanded: it is the surface's motion, and no noise.
+            # The command explains its roughness, so that is motion of the surface, not noise.
             smooth, error = position, level.sample(len(position), rng)
             error *= min(1.0, float(np.std(left)) / max(level.rms, 1e-300))
         else:
@@ -163,7 +163,7 @@ def moved(
 
 
 def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
-    """Return where the host's own command puts a surface that stands there in trim, rad."""
+    """Return the position that the host's command gives a surface with this trim, rad."""
     points = surface_points(rig, control)
     assert points is not None
     held = about(trim, filed_trim(rig, control), points)
@@ -173,7 +173,7 @@ def _led(rig: Rig, record: Record, control: ControlName, trim: float) -> Floats:
 
 
 def _asked(rig: Rig, record: Record, control: ControlName) -> Floats:
-    """Return the host's own command of a surface, none where the record holds no estimate."""
+    """Return the host's command of a surface; zero if the record has no estimate."""
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     if name not in record or pressure not in record:
         return np.zeros(len(record))

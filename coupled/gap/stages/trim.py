@@ -1,14 +1,14 @@
-"""Where a record's surfaces stood in trim, which need not be where the model's do.
+"""The surface positions in trim of a record, which may differ from the model's.
 
-A record starts in trim. A surface that stands off the model's trim by more than noise either
-belongs to an aircraft that trims elsewhere (its mass, lift or moment differs), and then the
-first row stands there, too, and the aircraft stays in trim; or something has moved it since
-(a rigging offset), and the aircraft answers. Both are weighed: by the first row, and by which
-the model follows better, flown open loop. Where neither tells, it is the aircraft's trim; of a
-record without motion, the surface's fault.
+A record starts in trim. A surface that differs from the model's trim by more than noise has one of
+two causes. If the aircraft trims elsewhere (other weight, lift or moment), the first row is
+there too, and the aircraft stays in trim. If something moved the surface afterwards (a rigging
+offset), the aircraft responds. The two are compared by the first row, and by the model's residual
+in open-loop flight. Without evidence the aircraft's trim is assumed; for a record without motion, a
+fault of the surface.
 
-What a record says of its trim is also a measurement of its own, which the model's trim is held
-against: with the angle of attack in trim it tells lift, moment and weight apart.
+The trim is also an output that is compared with the model's trim. With the angle of attack in trim
+it discriminates lift, moment and weight.
 """
 
 from __future__ import annotations
@@ -45,10 +45,9 @@ WEIGHED = ("pitch_rate_rad_per_s", "alpha_rad", "load_factor")
 
 @dataclass(frozen=True)
 class Trim:
-    """Where a surface stood in trim, rad: where its motion counts from, and what was measured.
+    """A surface's position in trim, rad: the origin of its motion, and the measurement.
 
-    `error` is the standard error of `measured`; `jump` by how much the surface stands off from the
-    second row on.
+    `error` is the standard error of `measured`; `jump` the surface's offset from the second row on.
     """
 
     position: float
@@ -58,7 +57,7 @@ class Trim:
 
 
 def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
-    """Return where a control's surface stood in trim; None where the record does not tell."""
+    """Return a control's surface position in trim; None if the record does not show it."""
     name, points = surface_channel(control), surface_points(rig, control)
     if name not in record or points is None:
         return None
@@ -78,11 +77,10 @@ def trim_of(rig: Rig, record: Record, control: ControlName) -> Trim | None:
 
 
 def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float, float] | None:
-    """Return by how much a surface stands off its trim and command at first, and its error, rad.
+    """Return a surface's initial offset from trim and command, and its standard error, rad.
 
-    Beside what it lacks of the command or lags behind it: where the command moves at once, a lag
-    and a cable's stretch would pass for another trim. None where the record does not hold the
-    command.
+    Shortfall and lag behind the command are fitted too; if the command moves at once, they would
+    imitate another trim. None if the record does not have the command.
     """
     name, pressure = channel(control, "estimate"), "dynamic_pressure_Pa"
     points = surface_points(rig, control)
@@ -97,23 +95,23 @@ def _standing_off(rig: Rig, record: Record, control: ControlName) -> tuple[float
     held = about(own_trim(rig, control), filed_trim(rig, control), points)
     left = measured[1:rows] - np.interp(held + asked[: rows - 1], *points)
     noise = heard(measured)
-    crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # how few values coloured noise has
+    crowded = (1.0 + noise.memory) / (1.0 - noise.memory)  # variance of a mean, over white noise's
     smooth = np.interp(held + smoothed(asked)[: rows - 1], *points)
     return _constant(left, smooth - np.interp(held, *points), noise.rms * math.sqrt(crowded))
 
 
 def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float]:
-    """Return the constant in what a surface is off by, rad, and its standard error.
+    """Return the constant part of a surface's deviation, rad, and its standard error.
 
-    `ordered` is what the command moves it by. A share of that and of its rate are fitted beside
-    the constant; where they bring nothing and it is sure all the same, it is the mean, which is
-    known better. Sure it is beside them, or before the command has moved the surface by a quarter
-    of it: no lag or stretch is more than the command that it is of.
+    `ordered` is the motion by the command. A share of it and of its rate are fitted beside the
+    constant. If they do not improve the fit and the constant is significant, it is estimated by
+    the mean, which is more precise. It is significant in that fit, or from the rows before the
+    command has moved the surface by a quarter of it, since a lag is no larger than its command.
     """
     answers = np.column_stack([ordered, np.gradient(ordered)])
     answers /= np.maximum(np.linalg.norm(answers, axis=0), 1e-300)
     one = np.ones(len(left))
-    apart = one - answers @ np.linalg.lstsq(answers, one)[0]  # what of a constant they are not
+    apart = one - answers @ np.linalg.lstsq(answers, one)[0]  # orthogonal to the command
     known = float(apart @ apart)
     mean, alone = float(np.mean(left)), noise / math.sqrt(len(left))
     still = np.maximum.accumulate(np.abs(ordered)) <= TRIM_STILL * abs(mean)
@@ -134,9 +132,9 @@ def _constant(left: Floats, ordered: Floats, noise: float) -> tuple[float, float
 def _followed(
     rig: Rig, record: Record, control: ControlName, own: float, there: float
 ) -> float | None:
-    """Return by how much twice the log-likelihood is higher with the surface in trim `there`.
+    """Return twice the log-likelihood gain of the surface being in trim at `there`.
 
-    None where the record does not hold the motion.
+    None if the record does not have the motion.
     """
     rows = min(len(record), round(TRIM_FLIGHT_s * rig.frame_rate))
     short = Record(record.channels, record.data[:rows], record.manifest)
@@ -161,9 +159,9 @@ def _followed(
 
 
 def _lagged(surface: Floats, rate_Hz: float) -> Floats:
-    """Return a constant and the surface so much before, shape (rows, 1 + lags).
+    """Return a constant and delayed surface positions, shape (rows, 1 + lags).
 
-    What a model lacks of an aircraft's answer is linear in them; a departure from trim is not.
+    Model errors of the aircraft's response are linear in them; an error of the trim is not.
     """
     rows = np.arange(len(surface))
     before = [np.maximum(rows - round(lag * rate_Hz), 0) for lag in TRIM_LAGS_s]

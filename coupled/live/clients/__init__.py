@@ -1,1 +1,1 @@
-"""Reference clients of the open protocol, to be copied: they need nothing of this package."""
+"""Reference clients of the open protocol, to be copied: they do not import this package."""

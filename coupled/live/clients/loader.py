@@ -6,8 +6,8 @@ Copy this file. Give `Loader` a function that measures and one that acts:
     while True:
         loader.step(measure=lambda: [(force_N, computed_m, deflection_m)], act=print)
 
-`step` answers each of the host's packets at once. Without one for 100 ms the orders it hands out
-are zero, and so are those of a host that says "off": the loader's own gradient remains.
+`step` answers each of the host's packets at once. After 100 ms without a packet, or if the host's
+mode is "off", the orders passed to `act` are zero: the loader's own gradient remains.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Act = Callable[[Sequence[Block]], object]
 
 
 class Loader:
-    """Answers one host; binds to loopback unless given another address."""
+    """Answers one host; binds to loopback by default."""
 
     def __init__(self, port: int, controls: int = 1, address: str = "127.0.0.1") -> None:
         self.controls = controls
@@ -49,7 +49,7 @@ class Loader:
         self.port = int(self._socket.getsockname()[1])
 
     def step(self, measure: Measure, act: Act, wait_s: float = WATCHDOG_s) -> bool:
-        """Wait for a packet of the host, act on it, answer; tell whether one came."""
+        """Wait for a packet of the host, act on it, answer; return whether one came."""
         self._socket.settimeout(wait_s)
         try:
             packet, host = self._socket.recvfrom(512)
@@ -64,7 +64,7 @@ class Loader:
         return heard
 
     def _take(self, packet: bytes) -> bool:
-        """Take the orders of a packet; tell whether it is a valid one, and new."""
+        """Take the orders of a packet; return whether it is valid and new."""
         size = HEADER.size + self.controls * ORDER_BLOCK.size + CRC.size
         if len(packet) != size or CRC.unpack(packet[-4:])[0] != zlib.crc32(packet[:-4]):
             self.dropped += 1
@@ -97,5 +97,5 @@ class Loader:
         return whole + CRC.pack(zlib.crc32(whole))
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the socket."""
         self._socket.close()

@@ -1,1 +1,1 @@
-"""The page in the browser: a process of its own, so that nothing it does makes a frame late."""
+"""The page in the browser, in a process of its own, so that it does not delay frames."""

@@ -1,7 +1,7 @@
-"""What host and page share: the last rows of the flight, and the state of things as JSON.
+"""Memory shared by host and page: the last rows of the flight, and the state as JSON.
 
-The host writes and never waits. The rows lie in a ring; the state is written between two counts,
-and read again where it was written meanwhile. Both ends are this module's.
+The host never waits. The rows are in a ring buffer. The state is written between two counters, and
+read again if it was written meanwhile.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-ROWS = 4096  # of the ring: 34 s at 120 Hz
+ROWS = 4096  # of the ring buffer: 34 s at 120 Hz
 STATE_bytes = 1 << 17
 MOST_COLUMNS = 64
-_HEAD = 4  # numbers: rows written, the state's two counts, its length
+_HEAD = 4  # numbers: rows written, the state's two counters, its length
 
 # Of the flight, then of each control in the rig's order.
 FLIGHT = (
@@ -28,18 +28,18 @@ CONTROL = ("force_N", "computed", "deflection", "estimate", "gradient", "modifyi
 
 
 def columns(controls: int) -> int:
-    """Return how many numbers a row has."""
+    """Return the number of columns of a row."""
     return len(FLIGHT) + controls * len(CONTROL)
 
 
 def shared_memory() -> Any:
-    """Return the memory that host and page share; it is passed to the page as it starts."""
+    """Return the memory shared by host and page; it is passed to the page's process at start."""
     size = 8 * (_HEAD + ROWS * MOST_COLUMNS) + STATE_bytes
     return multiprocessing.get_context("spawn").RawArray("b", size)
 
 
 class Board:
-    """The shared memory, from either end."""
+    """The shared memory, for either process."""
 
     def __init__(self, memory: Any) -> None:
         whole = np.frombuffer(memory, np.uint8)
@@ -55,14 +55,14 @@ class Board:
         self._head[0] = count + 1
 
     def rows(self, since: int, width: int) -> tuple[int, Floats]:
-        """Return how many rows there are, and those since a count that are still there."""
+        """Return the number of rows written, and the rows since a count that still exist."""
         count = int(self._head[0])
-        first = max(since, count - ROWS // 2)  # the older half may be written anew meanwhile
+        first = max(since, count - ROWS // 2)  # the older half may be overwritten meanwhile
         places = np.arange(first, count) % ROWS
         return count, self._ring[places, :width]
 
-    def say(self, state: dict[str, Any]) -> None:
-        """Write the state; one that is too long is left out."""
+    def write_state(self, state: dict[str, Any]) -> None:
+        """Write the state; a state that is too long is skipped."""
         text = json.dumps(state).encode()
         if len(text) > STATE_bytes:
             return
@@ -72,7 +72,7 @@ class Board:
         self._head[2] = self._head[1]
 
     def state(self, seen: int) -> tuple[int, str]:
-        """Return the state's count and its JSON; an empty text where it is the one seen."""
+        """Return the state's counter and JSON; an empty text if the state was seen before."""
         for _ in range(10):
             done = int(self._head[2])
             if done == seen:

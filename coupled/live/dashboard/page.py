@@ -1,4 +1,4 @@
-"""The host's end of the page: it shows each frame, and hears what its user asks for."""
+"""The host's side of the page: it shows each frame, and receives the user's requests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from coupled.errors import InputError
 from coupled.live.dashboard.board import FLIGHT, Board, columns, shared_memory
-from coupled.live.host import Host, Word
+from coupled.live.host import Host, Request
 from coupled.live.roundtrip import RECENT
 from coupled.record.channels import (
     ALTITUDE,
@@ -29,16 +29,16 @@ from coupled.record.channels import (
 )
 
 STATE_EVERY_s = 0.2
-START_s = 30.0  # how long the page's process may take to start
-MOST_WORDS = 64  # taken in one look, each some 10 µs of the frame
+START_s = 30.0  # time limit for the start of the page's process
+MOST_WORDS = 64  # requests taken in a frame, each some 10 µs
 SHOWN = ("force", "computed", "deflection", "estimate", "gradient", "modifying_force")
 
 
 class Page:
-    """The page of one flight; a watcher of the host, and the hand of one without a stick.
+    """The page of one flight: a watcher of the host, and a source of hand positions.
 
-    `address` and `port` are where it is served, 0 for a free port; `controls` those of the rig.
-    Raises InputError where it cannot be.
+    `address` and `port` are those of the server, 0 for a free port; `controls` those of the rig.
+    Raises InputError if it cannot be served.
     """
 
     name = "page"
@@ -69,19 +69,19 @@ class Page:
             raise InputError("--dashboard", place, answer.get("problem", "does not start"))
         return answer["url"]
 
-    def board(self, host: Host) -> None:
-        """Begin."""
-        assert host.aboard is not None
-        aboard, rig = host.aboard, host.aboard.manoeuvre.rig
-        at = aboard.channels.index
+    def begin(self, host: Host) -> None:
+        """Start: write the constants of the flight."""
+        assert host.access is not None
+        access, rig = host.access, host.access.manoeuvre.rig
+        at = access.channels.index
         first = at(control_channels(host.names[-1])[-1]) + 1
-        self._lateral = len(aboard.channels) - first > HEADING
+        self._lateral = len(access.channels) - first > HEADING
         self._flown = rig.flight is not None
         self._motion = first
         self._places = [at(channel(name, quantity)) for name in host.names for quantity in SHOWN]
         self._row = np.zeros(self._width)
         setup = {
-            "run": aboard.manoeuvre.name,
+            "run": access.manoeuvre.name,
             "frame_s": host.frame_s,
             "loader": "sim" if host.plan.link is None else host.plan.link.name,
             "hand": host.plan.wishes.name if host.plan.wishes is not None else "",
@@ -100,10 +100,10 @@ class Page:
         self._state |= {"phase": "flying", "setup": setup}
         self._show(host)
 
-    def look(self, host: Host, k: int) -> None:
-        """Show frame k."""
-        assert host.aboard is not None
-        data, row, m = host.aboard.data[k], self._row, self._motion
+    def observe(self, host: Host, k: int) -> None:
+        """Write frame k to the shared memory."""
+        assert host.access is not None
+        data, row, m = host.access.data[k], self._row, self._motion
         row[0], row[1], row[2] = k, 1e3 * host.pacer.late_s, data[m + PRESSURE]
         if self._flown:
             row[4], row[6], row[7] = data[m + PITCH], data[m + ALTITUDE], data[m + SPEED]
@@ -117,7 +117,7 @@ class Page:
             self._show(host)
 
     def _show(self, host: Host) -> None:
-        """Write how things stand."""
+        """Write the current state."""
         attached, link = host.attached, host.plan.link
         trips = None if link is None else link.round_trips
         self._state |= {
@@ -131,21 +131,21 @@ class Page:
             "calibrated": {name: one.calibrated for name, one in host.service.items()},
             "adapt": host.plan.adapt,
             "services": host.services(),
-            "happened": {key: value[-8:] for key, value in vars(host.happened).items()},
+            "happened": {key: value[-8:] for key, value in vars(host.events).items()},
         }
-        self.board_memory.say(self._state)
+        self.board_memory.write_state(self._state)
 
     def warn(self, text: str) -> None:
         """Show a warning."""
         self._state["warnings"] = [*self._state["warnings"][-4:], text]
 
-    def words(self) -> Sequence[Word]:
-        """Return what was asked for since the last call; a page that has gone lets go.
+    def requests(self) -> Sequence[Request]:
+        """Return the requests since the last call; if the page has closed, hands return to 0.
 
-        Of a hand's words the last counts. Of others there is one at most: to change a switch takes
-        a part of the frame.
+        Of positions of a hand the last one counts. At most one other request is returned, since
+        changing a switch takes a part of the frame.
         """
-        found: list[Word] = []
+        found: list[Request] = []
         try:
             for _ in range(MOST_WORDS):
                 if self.gone or found or not self._wire.poll():
@@ -155,29 +155,29 @@ class Page:
                     if word["control"] in self._wanted:
                         self._wanted[word["control"]] = word["value"]
                 else:
-                    found.append(Word(**word))
+                    found.append(Request(**word))
         except (EOFError, OSError):
             self.gone = True
             self._wanted = dict.fromkeys(self._wanted, 0.0)
-            self.warn("the page has gone; the flight goes on")
+            self.warn("the page was closed; the flight continues")
         return found
 
     def read(self, control: str) -> float:
-        """Return where the page's user wants a control, −1 to 1."""
+        """Return the position that the user gives a control, −1 to 1."""
         return self._wanted[control]
 
     def close(self) -> None:
-        """Keep the page open at the end of the flight: what was found is shown on it."""
+        """Keep the page open at the end of the flight, for the results."""
 
     def finish(self, **state: Any) -> None:
-        """Show what came of the flight: `phase`, `record`, `diagnosis`."""
+        """Show the results of the flight: `phase`, `record`, `diagnosis`."""
         self._state |= state
-        self.board_memory.say(self._state)
+        self.board_memory.write_state(self._state)
 
     def wait(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Wait until the user leaves the page, or `until` is true."""
+        """Wait until the user leaves the page or `until` is true."""
         while not self.gone and self._process.is_alive() and not until():
-            if self._wire.poll(0.2) and any(word.what == "leave" for word in self.words()):
+            if self._wire.poll(0.2) and any(word.what == "leave" for word in self.requests()):
                 return
 
     def end(self) -> None:
@@ -191,5 +191,5 @@ class Page:
 
 
 def _run(*words: Any) -> None:
-    """Be the page's process; the server is loaded there alone."""
+    """Run the page's process; the server is imported only there."""
     importlib.import_module("coupled.live.dashboard.server").serve(*words)

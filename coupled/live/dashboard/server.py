@@ -1,11 +1,11 @@
-"""The page's process: HTTP for its files, a websocket for what is flown and what is asked for.
+"""The page's process: HTTP for its files, a websocket for flight data and requests.
 
-It binds to loopback unless given another address. Every request needs the token of this flight; a
-websocket must come from the page itself (its Origin is the address that it is served at). What a
-browser asks for is checked here, and once more by the host.
+It binds to loopback by default. Every request needs the token of this flight. A websocket must
+come from the page itself (its Origin is the server's address). Requests of a browser are checked
+here, and again by the host.
 
-No browser can take the time that the flight needs: connections, viewers and words a second are
-bounded, a request that does not come is not waited for, and the process gives way to the flight's.
+Browsers cannot delay the flight: connections, viewers and requests per second are limited, idle
+connections are closed, and the process has a lower priority than the flight's.
 """
 
 from __future__ import annotations
@@ -58,16 +58,16 @@ HEADERS = {
 RATE_Hz = 60.0
 MOST_VIEWERS = 8
 MOST_CONNECTIONS = 32  # a page opens six for its files, and one that stays
-REQUEST_s = 5.0  # until a connection has sent its request
-WORDS_per_s, MOST_WORDS = 10.0, 20  # of all viewers, on average and at once; a hand's do not count
-NICE = 10  # steps by which the page's process gives way
+REQUEST_s = 5.0  # time limit for a connection to send its request
+WORDS_per_s, MOST_WORDS = 10.0, 20  # requests of all viewers, mean and burst; not of hands
+NICE = 10  # increment of the process's nice value
 LARGEST_bytes = 2048
 WORDS = ("stop", "mark", "set", "lead", "save", "hand", "leave")
 
 
 @dataclass(frozen=True)
-class Door:
-    """Where the page is served, and the token that opens it."""
+class PageAddress:
+    """The address of the page, and the token that it requires."""
 
     address: str
     port: int
@@ -75,13 +75,13 @@ class Door:
 
     @property
     def url(self) -> str:
-        """Return what a user opens."""
+        """Return the URL for the user."""
         shown = f"[{self.address}]" if ":" in self.address else self.address
         return f"http://{shown}:{self.port}/?token={self.token}"
 
 
-def word_of(text: str) -> dict[str, Any] | None:
-    """Return what a browser asked for, or None for what is no word of the page."""
+def request_of(text: str) -> dict[str, Any] | None:
+    """Return a browser's request, or None if it is invalid."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
@@ -101,10 +101,10 @@ def word_of(text: str) -> dict[str, Any] | None:
 
 
 class Bounded(H11Protocol):
-    """A connection that is one of MOST_CONNECTIONS at most, and has to send its request soon."""
+    """A connection, limited in number (MOST_CONNECTIONS) and in time to its request."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Refuse one too many; else wait for its request."""
+        """Refuse a connection beyond the limit; else start the time limit of its request."""
         assert isinstance(transport, asyncio.Transport)
         super().connection_made(transport)
         if len(self.connections) > MOST_CONNECTIONS:
@@ -113,19 +113,19 @@ class Bounded(H11Protocol):
             self.loop.call_later(REQUEST_s, self._give_up)
 
     def _give_up(self) -> None:
-        """End a connection that has sent no request; a websocket has another protocol by then."""
+        """Close a connection without a request; a websocket has another protocol by then."""
         if self.cycle is None and self.transport.get_protocol() is self:
             self.transport.abort()
 
 
 class Allowance:
-    """How many words may still be asked for: it fills by WORDS_per_s, up to MOST_WORDS."""
+    """The number of requests still allowed: it grows by WORDS_per_s, up to MOST_WORDS."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock, self._left, self._then = clock, float(MOST_WORDS), clock()
 
     def take(self) -> bool:
-        """Take one; tell whether there was one."""
+        """Use one request; return whether it is allowed."""
         now = self._clock()
         filled = self._left + WORDS_per_s * (now - self._then)
         self._then, self._left = now, min(float(MOST_WORDS), filled)
@@ -138,8 +138,8 @@ class Allowance:
 class Server:
     """The application: one flight's page."""
 
-    def __init__(self, door: Door, board: Board, host: Connection, width: int) -> None:
-        self._door, self._board, self._host, self._width = door, board, host, width
+    def __init__(self, served_at: PageAddress, board: Board, host: Connection, width: int) -> None:
+        self._served_at, self._board, self._host, self._width = served_at, board, host, width
         self._viewers = 0
         self._allowance = Allowance()
 
@@ -152,14 +152,14 @@ class Server:
         return Starlette(routes=list(reversed(routes)))
 
     def _known(self, token: str) -> bool:
-        return secrets.compare_digest(token.encode(), self._door.token.encode())
+        return secrets.compare_digest(token.encode(), self._served_at.token.encode())
 
     def _own_host(self, host: str) -> bool:
-        """Tell whether a request names this server: a page elsewhere cannot borrow its name."""
+        """Tell whether the Host header names this server (protection from DNS rebinding)."""
         name = host.rpartition(":")[0].strip("[]")
-        if self._door.address in ("0.0.0.0", "::"):
+        if self._served_at.address in ("0.0.0.0", "::"):
             return bool(name)
-        return name in {self._door.address, "localhost", "127.0.0.1", "::1"}
+        return name in {self._served_at.address, "localhost", "127.0.0.1", "::1"}
 
     async def file(self, request: Request) -> Response:
         """Serve one of the page's files."""
@@ -174,11 +174,11 @@ class Server:
         file, kind = FILES[name]
         body = (STATIC / file).read_text(encoding="utf-8")
         if name == "":
-            body = body.replace("TOKEN", self._door.token)
+            body = body.replace("TOKEN", self._served_at.token)
         return Response(body, media_type=kind, headers=HEADERS)
 
     async def socket(self, socket: WebSocket) -> None:
-        """Send what is flown 60 times a second, and take what is asked for."""
+        """Send flight data 60 times a second, and receive requests."""
         host = socket.headers.get("host", "")
         own = self._own_host(host) and socket.headers.get("origin") == f"http://{host}"
         if not own or not self._known(socket.query_params.get("token", "")):
@@ -189,12 +189,12 @@ class Server:
             return
         await socket.accept()
         self._viewers += 1
-        moved: dict[str, dict[str, Any]] = {}  # a hand's last words, which the sender passes on
+        moved: dict[str, dict[str, Any]] = {}  # last positions of hands, passed on by the sender
         sender = asyncio.create_task(self._send(socket, moved))
         held: set[str] = set()
         try:
             while True:
-                word = word_of(await socket.receive_text())
+                word = request_of(await socket.receive_text())
                 if word is None:
                     continue
                 if word["what"] == "hand":
@@ -211,7 +211,7 @@ class Server:
         finally:
             self._viewers -= 1
             sender.cancel()
-            for control in held:  # who has gone holds nothing
+            for control in held:  # a closed connection releases its controls
                 self._pass({"what": "hand", "text": "", "control": control, "value": 0.0})
 
     def _pass(self, word: dict[str, Any]) -> None:
@@ -239,13 +239,13 @@ def bind(address: str, port: int) -> socket.socket:
     wire = socket.socket(family, socket.SOCK_STREAM)
     wire.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     wire.bind((address, port))
-    wire.listen(64)  # before its address is given away
+    wire.listen(64)  # before the address is published
     return wire
 
 
 def serve(address: str, port: int, token: str, memory: Any, host: Connection, width: int) -> None:
-    """Be the page's process: say where it is, serve it, and end when the host has gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's
+    """Run the page's process: report its URL, serve it, and end with the host."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the host
     if hasattr(os, "nice"):
         os.nice(NICE)
     try:
@@ -253,8 +253,8 @@ def serve(address: str, port: int, token: str, memory: Any, host: Connection, wi
     except OSError as error:
         host.send_bytes(json.dumps({"problem": error.strerror or str(error)}).encode())
         return
-    door = Door(address, int(wire.getsockname()[1]), token)
-    app = Server(door, Board(memory), host, width).app()
+    served_at = PageAddress(address, int(wire.getsockname()[1]), token)
+    app = Server(served_at, Board(memory), host, width).app()
     config = uvicorn.Config(
         app,
         http=Bounded,
@@ -272,5 +272,5 @@ def serve(address: str, port: int, token: str, memory: Any, host: Connection, wi
         server.should_exit = True
 
     threading.Thread(target=watch, daemon=True).start()
-    host.send_bytes(json.dumps({"url": door.url}).encode())
+    host.send_bytes(json.dumps({"url": served_at.url}).encode())
     asyncio.run(server.serve(sockets=[wire]))

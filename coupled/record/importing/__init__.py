@@ -1,1 +1,1 @@
-"""A user's own log made a record: its map, its files, its clock, and whether it can be true."""
+"""Import of a user's log as a record: its map, its files, its clock, and plausibility checks."""

@@ -1,4 +1,4 @@
-"""How a record came of a log: its clock, each channel's figures and doubts, what was left out."""
+"""The account of an import: its clock, each channel's figures and doubts, unused columns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class ClockAccount:
-    """How the rows of a log became frames; `method` tells whether they were interpolated."""
+    """How the rows of a log became frames; `method` is whether they were interpolated."""
 
     log_rows: int
     rows_used: int
@@ -26,7 +26,7 @@ class ClockAccount:
 
 @dataclass(frozen=True)
 class ChannelAccount:
-    """A channel's source in the log, its figures in its own unit, and what speaks against it."""
+    """A channel's source in the log, its figures in its own unit, and doubts about it."""
 
     source: str
     least: float
@@ -37,7 +37,7 @@ class ChannelAccount:
     filled_cells: int
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the JSON."""
         table = asdict(self)
         return {"from": table.pop("source"), **table, "doubts": list(self.doubts)}
 
@@ -52,7 +52,7 @@ class ImportAccount:
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON, as a record's manifest holds it."""
+        """Return the JSON for a record's manifest."""
         return {
             "clock": asdict(self.clock),
             "channels": {name: found.as_dict() for name, found in self.channels.items()},

@@ -1,4 +1,4 @@
-"""Cells of a log that are no plain numbers: a list in a cell, a date, a sign kept in a bit."""
+"""Cells of a log that are not plain numbers: lists, dates, signs in a bit, wrapped counts."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Floats = NDArray[np.float64]
 Line = Callable[[int], int]
 ISO = "iso"
 _DAY_us = 86_400_000_000
-MOST_STEPS = 2.0  # across a period, in the largest other step, where the period is right
-PERIOD = 0.002  # of it, a tolerance for counts and noise
-FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is unknown
+MOST_STEPS = 2.0  # step across a wrap, over the largest other step, with the right period
+PERIOD = 0.002  # tolerance of a period for counts and noise, relative
+FARTHEST = 0.25  # of a turn between two rows; from a half on, the direction is ambiguous
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a column is: its file and name, and the line of each row, counted from 0."""
+    """A column's file and name, and the line of each row, counted from 0."""
 
     file: object
     name: str
@@ -38,9 +38,9 @@ def element(
 ) -> pl.Series:
     """Return one element of each cell's list: `[0.1, 0.2]`, `0.1;0.2`.
 
-    `wanted` is its place, counted from 1, or its name among `labels`, the names of the elements
-    in each row. An empty cell stays empty, as does one that lacks the name. Raises InputError
-    where a list is too short, or is none, and for a place whose name changes.
+    `wanted` is its index, counted from 1, or its name among `labels`, the names of the elements in
+    each row. An empty cell stays empty, as does one without that name. Raises InputError if a list
+    is too short or is none, and for an index whose name changes.
     """
     lists = lists_in(column)
     if lists is None:
@@ -68,7 +68,7 @@ def element(
 
 
 def lists_in(column: pl.Series) -> pl.Series | None:
-    """Return a column's cells as lists, of text or of numbers; None where they are no lists."""
+    """Return a column's cells as lists of text or numbers; None if they are not lists."""
     if column.dtype == pl.String:
         plain = column.str.strip_chars().str.strip_chars("[](){}").str.strip_chars()
         plain = plain.str.replace_all(r"\s*[;,]\s*|\s+", ",")
@@ -86,8 +86,8 @@ def labels_of(
 ) -> list[list[str]] | None:
     """Return the names of the elements of a column's lists, row by row.
 
-    They are those of the first column of lists of words that are as long as its own in each row.
-    None where there is none.
+    They are from the first column with lists of words of the same length in each row. None if
+    there is none.
     """
     lists = lists_in(column)
     if lists is None:
@@ -101,7 +101,7 @@ def labels_of(
 
 
 def _words_in(cells: pl.Series) -> list[list[str]] | None:
-    """Return lists of words, row by row; None where a column holds none, or numbers."""
+    """Return lists of words, row by row; None if a column has none, or numbers."""
     if cells.dtype == pl.List(pl.String):
         found = [[str(word) for word in row or []] for row in cells.to_list()]
     elif cells.dtype == pl.String:
@@ -153,12 +153,12 @@ def _most(lists: pl.Series) -> int:
 
 
 def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
-    """Return raw numbers with the sign that the map says they hold, NaN where empty.
+    """Return raw numbers with the sign by the map, NaN if empty.
 
     `sign_bit` n: a set bit n means minus, the bits below it are the magnitude. `wraps_at` N:
-    whole counts from N/2 on stand for themselves less N (two's complement, read as unsigned).
-    With `unwrap`, and where the numbers are not whole and so no counts, an angle that starts
-    again at N is followed across it, from a first number between −N/2 and N/2.
+    integer counts from N/2 on are reduced by N (two's complement, read as unsigned). With `unwrap`,
+    and for numbers that are not integers, the angle is unwrapped at the period N, from a first
+    number between −N/2 and N/2.
     """
     if channel.sign_bit is None and channel.wraps_at is None:
         return raw
@@ -189,7 +189,7 @@ def signed(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
 
 
 def _unwrapped(raw: Floats, channel: Channel, file: object, line: Line) -> Floats:
-    """Return an angle without the jumps at its period, its first number within half of it."""
+    """Return an angle unwrapped at its period, with its first number within half of it."""
     period, name = channel.wraps_at or 0.0, channel.source
     there = np.isfinite(raw)
     values = raw[there]
@@ -223,7 +223,7 @@ def _check_period(
     file: object,
     line: Line,
 ) -> None:
-    """Refuse a period across which an angle steps farther than it does anywhere else."""
+    """Refuse a period if the step across it exceeds all other steps of the angle."""
     steps, period = np.abs(np.diff(turned)), channel.wraps_at or 0.0
     across = np.abs(np.diff(values) - np.diff(turned)) > 0.5 * period
     if not across.any() or across.all():
@@ -239,10 +239,10 @@ def _check_period(
 
 
 def moments(column: pl.Series, pattern: str, file: object, name: str, line: Line) -> pl.Series:
-    """Return dates or times of day as whole microseconds, shape (rows,).
+    """Return dates or times of day as integer microseconds, shape (rows,).
 
     `pattern` is `iso` (2026-03-01 12:00:00.5, 12:00:00.5, with or without T and time zone) or a
-    pattern of strptime's (`%d.%m.%Y %H:%M:%S.%f`). Times of day run on past midnight.
+    pattern of strptime (`%d.%m.%Y %H:%M:%S.%f`). Times of day continue past midnight.
     """
     if column.dtype != pl.String:
         raise InputError(file, name, "holds numbers, no dates: leave clock.date out")

@@ -1,8 +1,8 @@
-"""A log's clock, and the even grid of a record's frames laid over it.
+"""A log's clock, and the record's even frames over its rows.
 
-Rows whose stamps are even but for their rounding (or 2 % of a frame) are taken as they are,
-unchanged. Others are interpolated by PCHIP: it passes through every sample and overshoots
-none, where a cubic spline would ring at a step or a stop, and a straight line would cut corners.
+Rows with stamps that are even but for rounding (or 2 % of a frame) are used unchanged. Others are
+interpolated by PCHIP, which passes through every sample without overshoot. A cubic spline would
+oscillate at a step or a stop, and a straight line would cut corners.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from coupled.record.importing.rows import check_order, check_steps, row_count, s
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
-EVEN_frames = 0.02  # stamps that stray less than this stand on the grid
+EVEN_frames = 0.02  # largest deviation of even stamps
 MARGIN_rows = 3.0  # kept beyond the cut, for the interpolation
-MOST_UPSAMPLED = 10.0  # more frames a row than this would be invention
+MOST_UPSAMPLED = 10.0  # largest number of frames for each row
 MOST_FRAMES = 20_000_000
 LEAST_RATE_Hz, MOST_RATE_Hz = 1.0, 1e5  # of rows, where the map gives no frame rate
 
@@ -35,8 +35,8 @@ LEAST_RATE_Hz, MOST_RATE_Hz = 1.0, 1e5  # of rows, where the map gives no frame 
 class Grid:
     """The record's frames over a log's rows.
 
-    `kept` are those used of all `rows`; `time_s` is when each was taken, from frame 0 on, shape
-    (rows kept,); `frame` is the frame on which each stands where `even`, else nothing counts.
+    `kept` are the rows used; `time_s` is the time of each, from frame 0 on, shape (rows kept,);
+    `frame` is the frame of each if `even`, and otherwise unused.
     """
 
     kept: slice
@@ -50,12 +50,12 @@ class Grid:
 
     @property
     def frame_time_s(self) -> Floats:
-        """When each frame of the record is, shape (frames,)."""
+        """The times of the record's frames, shape (frames,)."""
         times: Floats = np.arange(self.frames) / self.frame_rate_Hz
         return times
 
     def inside(self) -> NDArray[np.bool_]:
-        """Tell which of the kept rows lie within the record."""
+        """Return the mask of the kept rows within the record."""
         end_s = (self.frames - 1) / self.frame_rate_Hz
         slack = 0.5 / self.frame_rate_Hz
         chosen: NDArray[np.bool_] = (self.time_s > -slack) & (self.time_s < end_s + slack)
@@ -69,9 +69,9 @@ def lay_grid(
     frame_rate_Hz: float | None,
     span_s: tuple[float, float] = (0.0, np.inf),
 ) -> Grid:
-    """Return the frames of the record, at the map's rate, or else `frame_rate_Hz`, or the log's.
+    """Return the frames of the record, at the rate of the map, of `frame_rate_Hz` or of the log.
 
-    `span_s` is what all logs have, in s from the first row of this one, where there are several.
+    `span_s` is the time common to all logs, in s from the first row of this one.
     """
     clock = log_map.clock
     begin_s = max(clock.start, span_s[0])
@@ -125,10 +125,10 @@ def lay_grid(
 def stamps_of(
     log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str = "clock"
 ) -> Stamps:
-    """Return when every row was taken, from the first one on, in s.
+    """Return the time of every row, from the first one on, in s.
 
     A clock without a column has as many rows as the first of the columns `used`. Raises
-    InputError where the times go back.
+    InputError if time goes back.
     """
     if isinstance(clock, Clock) and clock.rate is not None:
         rows = row_count(log, clock, used, map_file, key)
@@ -147,9 +147,9 @@ def beside(
     key: str,
     longest_gap: int,
 ) -> Grid:
-    """Return the same frames over the rows of another log, whose stamps count from frame 0, in s.
+    """Return the same frames over the rows of another log, with stamps from frame 0 on, in s.
 
-    Its rows stand wherever they stand: its channels are interpolated.
+    Its channels are interpolated.
     """
     end_s = (grid.frames - 1) / grid.frame_rate_Hz
     kept = _cut(log, stamps_s, clock.source, (0.0, end_s + delay_s))
@@ -174,7 +174,7 @@ def _cut(log: Log, stamps_s: Floats, source: str, span_s: tuple[float, float]) -
 
 
 def _rounding(time_s: Floats) -> float:
-    """Return the decimal place to which all stamps are rounded, in s, or 0."""
+    """Return the decimal to which all stamps are rounded, in s, or 0."""
     for place_s in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         counts = time_s / place_s
         if np.all(np.abs(counts - np.rint(counts)) < 1e-4):
@@ -183,7 +183,7 @@ def _rounding(time_s: Floats) -> float:
 
 
 def _frames_at(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
-    """Return the frame on which each row stands at a rate, or None where they stray from it."""
+    """Return the frame of each row at a rate, or None if the stamps are not even."""
     frame = np.rint(time_s * rate)
     stray_s = float(np.ptp(time_s - frame / rate))
     if np.any(np.diff(frame) < 1.0) or stray_s > max(EVEN_frames / rate, 1.01 * rounding_s):
@@ -192,7 +192,7 @@ def _frames_at(time_s: Floats, rate: float, rounding_s: float) -> Rows | None:
 
 
 def _check_rate(log: Log, clock: Clock, rate: float) -> None:
-    """Refuse rows at a rate that no control loader is logged at: their times have another unit."""
+    """Refuse an implausible rate of rows, which shows a wrong unit of time."""
     if LEAST_RATE_Hz <= rate <= MOST_RATE_Hz:
         return
     key = "unit" if clock.source else "rate_Hz"
@@ -211,7 +211,7 @@ def _own_rate(
         for digits in (0, 1, 2, 3, 9):
             rate = round(guess, digits)
             frame = _frames_at(time_s, rate, rounding_s) if rate > 0.0 else None
-            # A row a frame, but for those missing: a multiple of the rate would stand as well.
+            # One frame a row, except for missing rows; multiples of the rate would fit as well.
             if frame is not None and np.median(np.diff(frame)) == 1.0:
                 return rate, frame
     steps_ms = 1e3 * np.diff(time_s)
@@ -223,8 +223,8 @@ def _own_rate(
 def on_frames(grid: Grid, values: Floats, delay_s: float, held: bool = False) -> Floats:
     """Return a channel on the record's frames, shape (frames,).
 
-    `values` are those of the kept rows, NaN where a cell is empty. A `held` channel keeps a
-    value to the next row instead of leading over to it.
+    `values` are those of the kept rows, NaN if a cell is empty. A `held` channel keeps its value
+    until the next row instead of being interpolated.
     """
     valid = np.isfinite(values)
     asked_s = grid.frame_time_s + delay_s
@@ -235,7 +235,7 @@ def on_frames(grid: Grid, values: Floats, delay_s: float, held: bool = False) ->
     inside_s = np.clip(asked_s, time_s[0], time_s[-1])
     result = np.asarray(PchipInterpolator(time_s, given)(inside_s), dtype=np.float64)
     if grid.even and delay_s == 0.0:
-        # What was measured stays as it was, to the last bit.
+        # Measured values are not changed in any bit.
         there = valid & (grid.frame >= 0) & (grid.frame < grid.frames)
         result[grid.frame[there]] = values[there]
     return result

@@ -1,4 +1,4 @@
-"""A log made a record: read by its map, laid on even frames, judged, and accounted for."""
+"""A log converted to a record: read by its map, put on even frames, checked, with an account."""
 
 from __future__ import annotations
 
@@ -33,19 +33,18 @@ from coupled.schema import LARGEST, SMALLEST
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
-TURNING = ("roll_rad", "heading_rad")  # angles that jump by a turn
+TURNING = ("roll_rad", "heading_rad")  # angles that wrap
 
 
 def import_log(
     log_file: Path | Sequence[Path], map_file: Path | None = None, rig: Rig | None = None
 ) -> tuple[Record, ImportAccount]:
-    """Return the record of a log, or of several, and the account of how it came to be.
+    """Return the record of a log, or of several, and the account of the import.
 
-    The first log's rows make the frames; a channel of a further one is interpolated to them by
-    its own stamps, and the record lasts as long as all logs do. The record's manifest holds the
-    account too. Without a map the log is one of a program whose heads are known. A `rig` gives the
-    frame rate, and its travels and force gradients are held against the channels. Raises
-    InputError.
+    The first log's rows make the frames; a channel of another log is interpolated by its own
+    stamps, and the record covers the time common to all. The record's manifest has the account
+    too. Without a map the log must be of a program with known heads. A `rig` gives the frame rate,
+    and its travels and force gradients are compared with the channels. Raises InputError.
     """
     files = [log_file] if isinstance(log_file, Path) else list(log_file)
     inputs = [*files, *([map_file] if map_file else [])]
@@ -114,7 +113,7 @@ def import_log(
 
 
 def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list[str]) -> Floats:
-    """Return a channel at the log's rows, in the unit that it ends in."""
+    """Return a channel at the log's rows, in the unit of its name."""
     key = f"channels.{name}"
     values = log.values(channel, map_file, key)
     stated = log.units.get(channel.source, "")
@@ -129,12 +128,12 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
         row = int(np.argmax(huge))
         problem = f"row {log.line(row)} makes {si[row]:.3g}, larger than any real one"
         raise InputError(log.file, channel.source, problem)
-    si[np.abs(si) < SMALLEST] = 0.0  # −0 as well, which a sign on an exact zero makes
+    si[np.abs(si) < SMALLEST] = 0.0  # includes −0, from a sign of an exact zero
     return np.asarray(si)
 
 
 def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats) -> int:
-    """Return how many empty cells were interpolated; refuse those at an end, or too many."""
+    """Return the number of interpolated empty cells; refuse those at an end, or too many."""
     channel = log_map.channels[name]
     most = log_map.clock.longest_gap if channel.longest_gap is None else channel.longest_gap
     empty = ~np.isfinite(values)
@@ -160,7 +159,7 @@ def _check_gaps(log: Log, log_map: LogMap, name: str, grid: Grid, values: Floats
 def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
     if name not in TURNING:
         return on_frames(grid, values, delay_s, held=name.endswith("_stop"))
-    # Between 359° and 1° lies 0°, not 180°.
+    # Interpolate across the wrap: 0° between 359° and 1°, not 180°.
     turn = 2.0 * np.pi
     valid = np.isfinite(values)
     smooth = values.copy()
@@ -173,7 +172,7 @@ def _on_frames(name: str, grid: Grid, values: Floats, delay_s: float) -> Floats:
 
 
 def _notes(logs: Mapping[str, Log]) -> list[str]:
-    """Return what is to be said of the logs, each with its name where there are several."""
+    """Return the notes on the logs, each with the log's name if there are several."""
     several = len({log.file for log in logs.values()}) > 1
     notes = [
         f"{log.file.name}: {note}" if several else note
@@ -198,7 +197,7 @@ def _clock_warnings(grid: Grid) -> list[str]:
 
 
 def _unmapped(logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> tuple[str, ...]:
-    """Return the columns that the map leaves out, with their log where there are several."""
+    """Return the unmapped columns, with their log if there are several."""
     used = {
         (log_of(name, log_map, logs, map_file), channel.source)
         for name, channel in log_map.channels.items()

@@ -1,12 +1,12 @@
-"""Logs that JSBSim, FlightGear and X-Plane write, known by their heads: they need no map.
+"""Logs of JSBSim, FlightGear and X-Plane, recognised by their heads: they need no map.
 
-JSBSim (`<output type="CSV">`): `Time`, then names with units, as `q bar (psf)`, and properties by
-their paths, `/fdm/jsbsim/velocities/q-rad_sec`. FlightGear (`/logging/log`, its README.logging):
-`Time`, the simulated time in s, then properties by their paths, or by titles of the user's own.
-X-Plane (`Data.txt`): names in two parts set apart by `|`, as `_totl,_time |pitch,__deg |`.
+JSBSim (`<output type="CSV">`): `Time`, then names with units, such as `q bar (psf)`, and properties
+by their paths, `/fdm/jsbsim/velocities/q-rad_sec`. FlightGear (`/logging/log`, its README.logging):
+`Time`, the simulated time in s, then properties by their paths, or by titles of the user. X-Plane
+(`Data.txt`): names in two parts separated by `|`, such as `_totl,_time |pitch,__deg |`.
 
-What a head does not settle is left out. X-Plane's `P`, `Q` and `R`: its own pages call Q the yaw
-rate, its users' programs the pitch rate. Positions of controls: shares of an unknown travel.
+Ambiguous columns are left out: X-Plane's `P`, `Q` and `R` (its documentation calls Q the yaw rate,
+programs of its users the pitch rate), and positions of controls (shares of an unknown travel).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from coupled.errors import InputError
 from coupled.files import open_file
 from coupled.record.importing.mapping import CHANNELS, Channel, Clock, Layout, LogMap
 
-LOOKED_AT_bytes = 2**17  # of a file, in which its head is
-# A column's name, and the channel and unit that it is.
+LOOKED_AT_bytes = 2**17  # of a file, which contain its head
+# A column's name, with its channel and unit.
 _JSBSIM = {
     "q bar (psf)": ("dynamic_pressure_Pa", "psf"),
     "V_{Total} (ft/s)": ("true_airspeed_m_per_s", "ft/s"),
@@ -94,7 +94,7 @@ XPLANE_TIMES = ("_totl,_time", "missn,_time", "_real,_time")
 
 @dataclass(frozen=True)
 class _Head:
-    """What a program's log is called, how it is laid out, and what its columns are."""
+    """A program's name, and the layout and columns of its log."""
 
     program: str
     delimiter: str
@@ -105,7 +105,7 @@ class _Head:
 def known_map(path: Path) -> tuple[str, LogMap]:
     """Return the program that wrote a log, and the map of its columns.
 
-    Raises InputError where the head is none of theirs, or none of its columns is known.
+    Raises InputError if the head or all of its columns are unknown.
     """
     with open_file(path) as file:
         text = file.read(LOOKED_AT_bytes).decode("utf-8-sig", "replace")
@@ -130,7 +130,7 @@ def known_map(path: Path) -> tuple[str, LogMap]:
 
 
 def _head(line: str) -> tuple[_Head, list[str]] | None:
-    """Return whose head a line is, and the names of its columns."""
+    """Return the program of a head line, and the names of its columns."""
     names = [name.strip() for name in line.split("|")]
     time = next((time for time in XPLANE_TIMES if time in names), "")
     if time:

@@ -1,4 +1,4 @@
-"""Each channel of an imported log held against itself, the others, and the rig."""
+"""Checks of each channel of an imported log: by itself, with other channels, and with the rig."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Judged:
-    """A channel's figures, in its own unit, and what speaks against it."""
+    """A channel's figures, in its own unit, and doubts about it."""
 
     least: float
     greatest: float
@@ -34,9 +34,9 @@ def judge(
 ) -> dict[str, Judged]:
     """Return {channel: figures and doubts}.
 
-    `record` are the channels on its frames, shape (frames,); `logged` the same as the log has
-    them, before any interpolation, which would blur a copy or a quantisation. Raises InputError
-    for what cannot be on this rig at all.
+    `record` are the channels on its frames, shape (frames,); `logged` the same before any
+    interpolation, which would hide a copy or a quantisation. Raises InputError for values that are
+    impossible on this rig.
     """
     pairs = _by_others(record, rig, file)
     found = {}
@@ -79,7 +79,7 @@ def _is_position(name: str) -> bool:
 
 
 def _by_others(record: Mapping[str, Floats], rig: Rig | None, file: object) -> dict[str, list[str]]:
-    """Return the doubts that take two channels, or a channel and the rig, to see."""
+    """Return the doubts from two channels, or from a channel and the rig."""
     doubts: dict[str, list[str]] = {}
     for control in CONTROL_NAMES:
         data = rig.controls.get(control) if rig is not None else None
@@ -133,7 +133,7 @@ def _travel(name: str, values: Floats, data: Control, file: object) -> str | Non
 def _force(
     record: Mapping[str, Floats], control: str, moved: str, data: Control | None
 ) -> str | None:
-    """Hold a force against the gradient, as recorded or as the rig's table has it."""
+    """Compare a force with the gradient, as recorded or of the rig's table."""
     force, gradient = (channel(control, q) for q in ("force", "gradient"))
     if force not in record:
         return None
@@ -141,7 +141,7 @@ def _force(
     if total is None:
         return None
     expected = record[force]
-    if data is not None:  # breakout and friction are no spring's, and may be most of a small pull
+    if data is not None:  # breakout and friction may be most of a small pull
         held = data.loader.breakout + data.loader.friction
         expected = np.sign(expected) * np.maximum(np.abs(expected) - held, 0.0)
     plain = plausible.force_ratio(record[force], record[moved], total)
@@ -155,7 +155,7 @@ def _force(
 
 
 def _filed_gradient(record: Mapping[str, Floats], data: Control | None) -> Floats | None:
-    """Return the gradient that a rig's table gives: by q̄, or without it where it is the same."""
+    """Return the gradient of a rig's table at q̄; without q̄ only if it is constant."""
     if data is None:
         return None
     if "dynamic_pressure_Pa" in record:

@@ -1,8 +1,8 @@
-"""The map of a log: which of its columns is which channel, in what unit, sign and time.
+"""The map of a log: the column, unit, sign and time of each channel.
 
-A channel of the record is sign · unit · (scale · raw + offset), with `offset` in the log's
-unit; what a sensor reads `delay_s` late is moved forward by that. Where several logs were given,
-a channel says which is its own, and each log has its own stamps, all from one clock.
+A channel of the record is sign · unit · (scale · raw + offset), with `offset` in the log's unit; a
+sensor's delay `delay_s` is removed. With several logs, a channel names its own, and each log has
+its own stamps, all from one clock.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LOAD_FACTOR = "load_factor"
 
 
 class Layout(Section):
-    """How the log's file is laid out; `format` is by the file's extension where not given."""
+    """The layout of the log's file; `format` is by default that of the file's extension."""
 
     format: Literal["csv", "parquet", "mat", "hdf5", "mdf", "tdms", "mcap", "ulog"] | None = None
     delimiter: str = quantity("", ",", min_length=1, max_length=1)
@@ -51,7 +51,7 @@ def _rows_given(value: object) -> object:
 
 
 class Stamped(Section):
-    """How the times of a log's rows are read, and which rows are used."""
+    """The times of a log's rows, and which rows are used."""
 
     source: str = named("from", "")
     unit: str = ""  # the log's own, or s where it states none
@@ -73,7 +73,7 @@ class Clock(Stamped):
 
 
 def _no_bool(value: object) -> object:
-    if isinstance(value, bool):  # which Python takes for 1
+    if isinstance(value, bool):  # a subclass of int in Python
         raise PydanticCustomError("sign", "should be 1 or -1")
     return value
 
@@ -86,7 +86,7 @@ def _one_element(value: object) -> object:
 
 
 class OtherClock(Stamped):
-    """Where a further log's rows have their time from, if not as the first log's."""
+    """The clock of a further log, if its stamps differ from the first log's."""
 
     source: str = named("from", min_length=1)
 
@@ -159,7 +159,7 @@ def _check_name(name: str, path: Path) -> None:
 
 
 def _faults(found: LogMap, path: Path) -> list[InputError]:
-    """Return what of a map's values does not go together."""
+    """Return the contradictions between a map's values."""
     faults: list[InputError] = []
     with collected(faults):
         _check_clock(found.clock, path)
@@ -214,7 +214,7 @@ def _check_stamps(clock: Stamped, path: Path, key: str) -> None:
 
 
 def dropped_rows(clock: Stamped, path: Path, key: str) -> list[tuple[int, int]]:
-    """Return the first and the last row of each entry of `drop_rows`, as faults count rows."""
+    """Return the first and the last row of each entry of `drop_rows`, numbered as in faults."""
     found = []
     for entry in clock.drop_rows:
         match = re.fullmatch(r"\s*(\d{1,12})(?:\s*-\s*(\d{1,12}))?\s*", str(entry), re.ASCII)
@@ -227,7 +227,7 @@ def dropped_rows(clock: Stamped, path: Path, key: str) -> list[tuple[int, int]]:
 
 
 def own_unit(channel: str) -> str:
-    """Return the unit that a channel of a record ends in: `N/m`, `rad`; `1` where it has none."""
+    """Return the unit at the end of a channel's name: `N/m`, `rad`; `1` if it has none."""
     if channel == LOAD_FACTOR:
         return "g"
     parts = channel.split("_")
@@ -245,7 +245,7 @@ def _own(text: str) -> Unit:
 
 
 def known_unit(text: str, file: object, key: str) -> Unit:
-    """Return the unit of a text, or refuse it with the nearest known one."""
+    """Return the unit of a text; raises InputError with the nearest known one."""
     unit = parse_unit(text)
     if unit is None:
         hint = nearest(text, unit_names())
@@ -254,7 +254,7 @@ def known_unit(text: str, file: object, key: str) -> Unit:
 
 
 def factor_of(channel: str, text: str, file: object) -> float:
-    """Return what a number in a unit is to be multiplied by for a channel of the record."""
+    """Return the factor from a unit to that of a channel of the record."""
     key = f"channels.{channel}.unit"
     given, own = known_unit(text, file, key), _own(own_unit(channel))
     if channel == LOAD_FACTOR and given.dimension == _own("1").dimension:

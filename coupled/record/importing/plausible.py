@@ -1,7 +1,7 @@
-"""Whether a channel can be what its name says: each rule once, on arrays in SI.
+"""Plausibility rules for channels, on arrays in SI.
 
-A rule returns what it found, as a few words or a number, or nothing. Doubts are for a
-person to weigh: a bench record has a q̄ that never changes, and is none the worse for it.
+A rule returns its finding, as a few words or a number, or nothing. Findings are doubts for the user
+to judge: for example, a constant q̄ is normal in a bench record.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from coupled.record.channels import CONTROL_NAMES
 from coupled.units import POUND_N, PSF_Pa
 
 Floats = NDArray[np.float64]
-FAR_BEYOND = 3.0  # times the travel: no rig does that, so its unit is another
-ROUNDING = 1e-9  # of a channel's own spread, as records in text are rounded
-# Of what follows the rate: a delay τ makes ω·τ of the motion follow it, and leaves (ω·τ)²/2 beside.
-BESIDE_A_DELAY = 0.3  # up to ω·τ = 0.6, more than a sensor is late
-FAR_RATIO = 2.0  # of a force over its spring's: a diagnosis refuses another rig's file from here on
-# What N, and m or rad, are in other units; lbf has rules of its own.
+FAR_BEYOND = 3.0  # times the travel, from which the unit is wrong
+ROUNDING = 1e-9  # of a channel's own spread, for rounding of records in text
+# Share of the motion correlated with the rate: a delay τ gives ω·τ, and leaves (ω·τ)²/2.
+BESIDE_A_DELAY = 0.3  # up to ω·τ = 0.6, more than the delay of any sensor
+FAR_RATIO = 2.0  # of a force over its spring's, from which a diagnosis refuses another rig's file
+# N, and m or rad, in other units; lbf has rules of its own.
 _FORCES = {"kgf or daN": 9.9, "ozf": POUND_N / 16.0, "kN": 1e3}
 _LENGTHS = {"in": 0.0254, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}
 _ANGLE = {"deg": np.pi / 180.0}
-TOGETHER = 0.6  # correlation of a force with a spring's, from which its size says its unit
-WHOLE_RANGE = 0.9  # of the range, over which a position that starts again jumps
-SMALL_STEP = 0.2  # of the range, which a logged position moves at most in a row
+TOGETHER = 0.6  # correlation of a force with a spring's, from which its ratio shows its unit
+WHOLE_RANGE = 0.9  # of the range: jump of a position that wraps
+SMALL_STEP = 0.2  # of the range: largest other step of a position from row to row
 _D4 = np.sqrt(70.0)  # fourth differences of white noise: 1, 4, 6, 4, 1 squared and summed
 
-# Beyond these no channel of a rig or a transport aircraft in normal flight goes.
+# Bounds of channels of a rig or a transport aircraft in normal flight.
 _BOUNDS: dict[str, tuple[float, float]] = {
     "force_N": (-2500.0, 2500.0),
     "modifying_force_N": (-2500.0, 2500.0),
@@ -46,9 +46,9 @@ _LONGEST_m = 1.0
 
 
 def noise_level(values: Floats) -> float:
-    """Return the standard deviation of a channel's white noise, by its fourth differences.
+    """Return the standard deviation of a channel's white noise, from its fourth differences.
 
-    The median makes it blind to steps and to single bad values.
+    The median makes it robust to steps and outliers.
     """
     if values.size < 5:
         return 0.0
@@ -61,9 +61,9 @@ def is_constant(values: Floats) -> bool:
 
 
 def copy_of(name: str, channels: Mapping[str, Floats]) -> str | None:
-    """Return the first channel before `name` that has the same numbers, all of them.
+    """Return the first channel before `name` with exactly the same numbers.
 
-    An estimate is the computed deflection where nothing is corrected; constants match idly.
+    Not an estimate and the computed deflection, which agree without correction, nor constants.
     """
     values = channels[name]
     if is_constant(values):
@@ -80,7 +80,7 @@ def copy_of(name: str, channels: Mapping[str, Floats]) -> str | None:
 
 
 def clipped_at(values: Floats) -> float | None:
-    """Return the extreme at which a noisy channel stays, exactly, for five rows or more."""
+    """Return the extreme at which a noisy channel is constant for five rows or more."""
     if noise_level(values) == 0.0:
         return None
     still = np.diff(values) == 0.0
@@ -98,7 +98,7 @@ def _longest(true: NDArray[np.bool_]) -> int:
 
 
 def quantised_step(values: Floats) -> float | None:
-    """Return the step of a channel so coarsely quantised that the step hides its noise."""
+    """Return the step of a channel whose quantisation hides its noise."""
     levels = np.unique(values)
     if levels.size < 3:
         return None
@@ -108,12 +108,12 @@ def quantised_step(values: Floats) -> float | None:
     counts = whole / step
     regular = whole.size == steps.size and np.all(np.abs(counts - np.rint(counts)) < 0.02)
     coarse = step > 1.5 * noise_level(values) and step > 1e-3 * np.ptp(values)
-    # Few rows always lie on some levels: each must have been met more than once, on average.
+    # Few rows always lie on some levels, so each level must occur more than once on average.
     return step if regular and coarse and 2 * levels.size < values.size else None
 
 
 def spikes(values: Floats) -> list[int]:
-    """Return the rows that stand out between neighbours that agree."""
+    """Return the rows that differ from neighbours which agree."""
     if values.size < 5:
         return []
     deviation = values[1:-1] - 0.5 * (values[2:] + values[:-2])
@@ -126,8 +126,8 @@ def spikes(values: Floats) -> list[int]:
 def starts_again(values: Floats) -> int | None:
     """Return the first row at which a position jumps over nearly all of its range, or None.
 
-    An angle or a counter that starts again does so; between jumps it moves in small steps. A
-    value that is back at the next row is a spike.
+    A wrapped angle or counter does so, with small steps between jumps. A value that returns at the
+    next row is a spike.
     """
     steps = np.abs(np.diff(values))
     span = float(np.ptp(values))
@@ -141,10 +141,9 @@ def starts_again(values: Floats) -> int | None:
 
 
 def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float | None:
-    """Return the force over what gradient times deflection say, by least squares.
+    """Return the force over gradient times deflection, by least squares.
 
-    None where the two hardly go together: a control that is moved fast is held by its inertia and
-    damping, whatever its gradient.
+    None if they hardly correlate: the force of a fast motion is from inertia and damping.
     """
     expected = gradient * deflection
     shared, power = float(force_N @ expected), float(expected @ expected)
@@ -153,18 +152,18 @@ def force_ratio(force_N: Floats, deflection: Floats, gradient: Floats) -> float 
 
 
 def bend_sign(force_N: Floats, computed: Floats, deflection: Floats) -> int:
-    """Return the sign of the slope of δ − δc on F; 0 where the two hardly go together.
+    """Return the sign of the slope of δ − δc on F; 0 if they hardly correlate.
 
-    Under a pull a structure yields, so that δ = δc + K·F with K > 0: −1 means that δ and δc are
-    exchanged, or scaled apart. What follows the rate of the motion, as a late sensor makes it, is
-    taken off both first.
+    A structure bends under a pull, so that δ = δc + K·F with K > 0: −1 means that δ and δc are
+    exchanged, or have different scales. The part correlated with the rate of the motion, by a late
+    sensor, is removed from both first.
     """
     rate = np.gradient(computed)
     off = np.column_stack([np.ones(rate.size), rate])
     apart = deflection - computed
     left, pull = (y - off @ np.linalg.lstsq(off, y, rcond=None)[0] for y in (apart, force_N))
     scale = float(np.sqrt((left @ left) * (pull @ pull)))
-    # A difference of rounding errors, of two channels that are the same, has no slope.
+    # The difference of two equal channels is rounding only.
     if float(np.std(apart)) <= ROUNDING * float(np.std(computed)) or scale == 0.0:
         return 0
     if float(np.std(left)) < BESIDE_A_DELAY * float(np.std(apart - left)):
@@ -174,10 +173,10 @@ def bend_sign(force_N: Floats, computed: Floats, deflection: Floats) -> int:
 
 
 def unit_doubt(ratio: float, turned: bool) -> str | None:
-    """Say in which unit a force would be right that is `ratio` times what a spring gives, if any.
+    """Return the unit in which a force would be right that is `ratio` times a spring's, if any.
 
-    `turned` tells that the deflection is an angle. A ratio within a factor of 2 is in question
-    only where it is that of pounds.
+    `turned`: the deflection is an angle. A ratio within a factor of 2 is in doubt only if it is
+    that of pounds.
     """
     size = abs(ratio)
     if in_pounds(size):
@@ -186,7 +185,7 @@ def unit_doubt(ratio: float, turned: bool) -> str | None:
         return "was N already, not lbf?"
     if 1.0 / FAR_RATIO < size < FAR_RATIO:
         return None
-    says = f"is {size:.2g} of what gradient and deflection say"
+    says = f"is {size:.2g} of gradient times deflection"
     for units, kind in ((_FORCES, "force"), (_ANGLE if turned else _LENGTHS, "deflection")):
         for word, factor in units.items():
             wrong = size * factor if kind == "force" else size / factor
@@ -196,37 +195,37 @@ def unit_doubt(ratio: float, turned: bool) -> str | None:
 
 
 def in_pounds(ratio: float) -> bool:
-    """Tell whether a force ratio is that of a force in lbf that passes for one in N."""
+    """Tell whether a force ratio is that of a force in lbf read as N."""
     return abs(ratio * POUND_N - 1.0) < 0.25
 
 
 def from_newtons(ratio: float) -> bool:
-    """Tell whether a force ratio is that of a force in N that was taken for lbf."""
+    """Tell whether a force ratio is that of a force in N read as lbf."""
     return abs(ratio / POUND_N - 1.0) < 0.25
 
 
 def move_oppositely(first: Floats, second: Floats) -> bool:
-    """Tell whether two channels that ought to move together move against each other."""
+    """Tell whether two channels that should have one sign have opposite ones."""
     a, b = first - np.median(first), second - np.median(second)
     scale = float(np.sqrt((a @ a) * (b @ b)))
     return scale > 0.0 and float(a @ b) / scale < -0.3
 
 
 def lacks_its_sign(force_N: Floats, deflection: Floats) -> bool:
-    """Tell whether a force is never negative though the control moves to both sides by far."""
+    """Tell whether a force is never negative while the control moves far to both sides."""
     most, least = float(deflection.max()), float(deflection.min())
     both = min(most, -least) > 0.2 * max(most, -least)
     return both and float(force_N.min()) >= 0.0 and float(np.ptp(force_N)) > 0.0
 
 
 def beyond_travel(deflection: Floats, travel: float) -> float | None:
-    """Return the greatest deflection over the travel, where it exceeds it by more than noise."""
+    """Return the largest deflection over the travel, if it exceeds it by more than noise."""
     most = float(np.max(np.abs(deflection)))
     return most / travel if most > 1.05 * travel + 5.0 * noise_level(deflection) else None
 
 
 def size_doubt(name: str, values: Floats) -> str | None:
-    """Say what a channel's size tells against its unit: degrees, millimetres, g less one."""
+    """Return a doubt about a channel's unit from its size: degrees, millimetres, g less one."""
     low, high = float(values.min()), float(values.max())
     most = max(-low, high)
     control, _, rest = name.partition("_")
@@ -241,7 +240,7 @@ def size_doubt(name: str, values: Floats) -> str | None:
 
 
 def _largest(name: str) -> tuple[bool, float]:
-    """Tell whether a channel is an angle or its rate, and the most that it can be."""
+    """Return whether a channel is an angle or its rate, and its largest plausible value."""
     if name.endswith("_rad_per_s"):
         return True, _FASTEST_rad_per_s
     if name.endswith("_rad") and "_N_per_" not in name:
@@ -252,7 +251,7 @@ def _largest(name: str) -> tuple[bool, float]:
 
 
 def _level_doubt(median: float) -> str | None:
-    """Say that a load factor is not +1 for most of the time, as in level flight it is."""
+    """Return a doubt if a load factor is not +1 for most of the time, as in level flight."""
     if abs(median) < 0.3:
         return "is 0 in level flight: offset 1?"
     if median < -0.5:
@@ -261,7 +260,7 @@ def _level_doubt(median: float) -> str | None:
 
 
 def pressure_doubt(pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Floats) -> str | None:
-    """Say that q̄ does not fit airspeed and altitude in the standard air, ½·ρ·V²."""
+    """Return a doubt if q̄ differs from ½·ρ·V² of airspeed and altitude, standard atmosphere."""
     kelvin = np.maximum(288.15 - 0.0065 * np.clip(altitude_m, -500.0, 11_000.0), 216.65)
     density = 1.225 * (kelvin / 288.15) ** 4.2559
     density *= np.exp(-np.maximum(altitude_m - 11_000.0, 0.0) / 6341.6)
@@ -273,4 +272,4 @@ def pressure_doubt(pressure_Pa: Floats, airspeed_m_per_s: Floats, altitude_m: Fl
         return None
     if 0.7 < ratio * PSF_Pa < 1.4:
         return "looks like psf"
-    return f"is {ratio:.3g} of what airspeed and altitude say"
+    return f"is {ratio:.3g} of ½ρV² by airspeed and altitude"

@@ -1,6 +1,6 @@
-"""The columns of a log, by name, whatever its format; a fault names the line.
+"""The columns of a log by name, in any format; a fault names the line.
 
-A log may hold columns that are no numbers: only what the map asks for is read as such.
+Columns of a log need not be numbers: only those in the map are parsed.
 """
 
 from __future__ import annotations
@@ -39,14 +39,13 @@ LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a re
 
 @dataclass(frozen=True)
 class Log:
-    """A log's columns, as they stand in it. `lines` tells the line of each row of a CSV.
+    """A log's columns, as in the file. `lines` has the line of each row of a CSV.
 
-    Where a format samples groups of columns by clocks of their own, `stamps` names the column
-    with each one's times, and `groups` the group; `refused` tells why a column is not read.
-    `part` is the group that a log is a part of another of. Columns of one name are called
-    `name#1`, `name#2`, …, and `doubled` has {name: those}. `decimal` is the mark in numbers that
-    are text. `notes` are lines for the user: what the reader's library warned of, which rows
-    were left out.
+    If a format samples groups of columns by clocks of their own, `stamps` names each one's column
+    of times, and `groups` the group; `refused` is the reason why a column is not read. `part` is
+    the group of a log that is a part of another. Columns of one name are called `name#1`,
+    `name#2`, …, and `doubled` has {name: those}. `decimal` is the mark in numbers that are text.
+    `notes` are lines for the user: warnings of the reader's library, rows left out.
     """
 
     file: Path
@@ -63,15 +62,15 @@ class Log:
 
     @property
     def name(self) -> str:
-        """Its file's name, and which part of it."""
+        """The name of its file, with its part."""
         return f"{self.file.name}: {self.part}" if self.part else self.file.name
 
     def line(self, row: int) -> int:
-        """Return where a row, counted from 0, stands in the file, counted from 1."""
+        """Return the line in the file, counted from 1, of a row counted from 0."""
         return row + 1 if self.lines is None else int(self.lines[row])
 
     def find(self, name: str, map_file: Path, key: str) -> pl.Series:
-        """Return the column of a name that a map gives under `key`."""
+        """Return the column of a name that the map has under `key`."""
         if name in self.doubled:
             raise InputError(self.file, name, _which(self.doubled[name]))
         if name in self.refused:
@@ -84,7 +83,7 @@ class Log:
         return self.columns[name]
 
     def values(self, channel: Channel, map_file: Path, key: str) -> Floats:
-        """Return a channel's column as doubles, signed, NaN where a cell is empty: (rows,)."""
+        """Return a channel's column as doubles, signed, NaN if a cell is empty: (rows,)."""
         name = channel.source
         column = self._pointed(name, self.find(name, map_file, f"{key}.from"))
         if channel.element is not None:
@@ -95,15 +94,15 @@ class Log:
         return signed(raw, channel, self.file, self.line)
 
     def point(self, column: pl.Series) -> pl.Series:
-        """Return a column whose numbers, where they are text, have a decimal point."""
+        """Return a column with decimal points, if its numbers are text."""
         if self.decimal == "." or column.dtype != pl.String:
             return column
         return column.str.replace_all(",", ".", literal=True)
 
     def _pointed(self, name: str, column: pl.Series) -> pl.Series:
-        """Return `point` of a column; a point beside a decimal comma is refused.
+        """Return `point` of a column; refuse a point beside a decimal comma.
 
-        It may be a decimal point, or set thousands apart.
+        It may be a decimal point or a thousands separator.
         """
         if self.decimal == "," and column.dtype == pl.String:
             points = column.str.contains(".", literal=True).fill_null(value=False).to_numpy()
@@ -115,10 +114,10 @@ class Log:
         return self.point(column)
 
     def times(self, clock: Stamped, map_file: Path, key: str) -> Stamps:
-        """Return when each row was taken.
+        """Return the time of each row.
 
-        Counted from the first row before it becomes a double: a clock in ns since 1970 keeps
-        all its digits. A counter is followed across the number at which it wraps.
+        The first time is subtracted before the conversion to doubles, so that a clock in ns since
+        1970 keeps all its digits. A counter is unwrapped.
         """
         name = clock.source
         column = self.find(name, map_file, f"{key}.from")
@@ -146,7 +145,7 @@ class Log:
         return Stamps(Fraction(first) * exact, steps * factor)
 
     def _unwrapped(self, count: Floats, clock: Stamped, map_file: Path, key: str) -> Floats:
-        """Return a counter, less its first number, without the jumps where it starts again."""
+        """Return a counter, less its first number, unwrapped."""
         if clock.wraps_at is None or not np.isfinite(count).any():
             return count
         span = float(np.nanmax(count) - np.nanmin(count))
@@ -158,7 +157,7 @@ class Log:
         return count
 
     def _time_unit(self, name: str, key: str) -> str:
-        """Return the unit of time that the log states for a column; s where it states none."""
+        """Return the log's unit of time for a column; s if it gives none."""
         text = self.units.get(name, "").strip(" -[]()")
         stated, second = parse_unit(text), parse_unit("s")
         if stated is not None and second is not None and stated.dimension == second.dimension:
@@ -171,7 +170,7 @@ class Log:
 
 @dataclass(frozen=True)
 class Stamps:
-    """When the rows of a log were taken: the first one exactly, in s, and all from it on, in s."""
+    """The times of a log's rows: the first one exactly, in s, and all relative to it, in s."""
 
     first_s: Fraction
     from_first_s: Floats
@@ -185,7 +184,7 @@ def _counted(count: pl.Series, per_s: int) -> Stamps:
 
 
 def read_log(path: Path, layout: Layout) -> Log:
-    """Return the columns of a log in the format of the map, or of the file's extension."""
+    """Return the columns of a log in the format of the map or of the file's extension."""
     kind = layout.format or FORMATS.get(path.suffix.lower())
     if kind is None:
         known = ", ".join(FORMATS)
@@ -215,7 +214,7 @@ def _log(path: Path, found: list[Found]) -> Log:
 
 
 def _apart(names: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
-    """Return names of which none is met twice, and {name met twice: what it is called instead}."""
+    """Return unique names, and {duplicate name: its unique names}."""
     times = Counter(names)
     doubled: dict[str, list[str]] = {name: [] for name, count in times.items() if count > 1}
     unique = []
@@ -223,7 +222,7 @@ def _apart(names: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]
         own = name
         if name in doubled:
             own = f"{name}#{len(doubled[name]) + 1}"
-            while own in times:  # a column that is called so by itself
+            while own in times:  # another column has this name
                 own = own.replace("#", "##", 1)
             doubled[name].append(own)
         unique.append(own)
@@ -244,7 +243,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
     delimiter = layout.delimiter
     if path.suffix.lower() == ".tsv" and delimiter == ",":
         delimiter = "\t"
-    if delimiter == " ":  # columns set apart by any white space
+    if delimiter == " ":  # any white space
         kept = ["\t".join(line.split()) for line in kept]
         delimiter = "\t"
     try:
@@ -269,7 +268,7 @@ def _read_csv(path: Path, content: bytes, layout: Layout) -> Log:
     for name, column in zip(names, table.slice(under).get_columns(), strict=True):
         columns[name] = _cells(column, layout)
     found = np.array(lines[under:], dtype=np.int64)
-    whole = found if len(found) == table.height - under else None  # else a cell held a line's end
+    whole = found if len(found) == table.height - under else None  # a cell contained a line end
     return Log(
         path,
         columns,
@@ -293,7 +292,7 @@ def _text(path: Path, content: bytes, encoding: str) -> str:
 
 
 def _rows(text: str, layout: Layout) -> tuple[list[str], list[int]]:
-    """Return the lines that are rows, and where they stand in the file."""
+    """Return the lines that are rows, and their numbers in the file."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     kept, where = [], []
     for number, line in enumerate(lines[layout.skip_rows :], layout.skip_rows + 1):

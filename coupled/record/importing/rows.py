@@ -1,7 +1,7 @@
-"""Which rows of a log are used, and in what order, where the map's clock says so.
+"""The rows of a log that are used, and their order, by the clock of the map.
 
-`drop_rows` comes first, then `sort`, then `drop_duplicates`. Each change is noted; rows are
-never dropped or moved without the map's word.
+`drop_rows` comes first, then `sort`, then `drop_duplicates`. Each change is noted; rows are never
+dropped or moved without a key of the map.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from coupled.record.importing.reading import Log, Stamps
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
-# Into how many pieces, in the order of time, rows of others may split a run of rows in the log's.
-# Late rows split a run once or twice; two recordings at the same times, at every row.
+# Largest number of pieces, by time, into which other rows may split a run of rows of the log. Late
+# rows split a run once or twice, two recordings of the same time at every row.
 MOST_PIECES = 4
-COARSE = 0.1  # share of repeated stamps from which the stamps are coarse, and no row is double
+COARSE = 0.1  # share of repeated stamps from which the stamps are coarse, not rows duplicate
 
 
 def use_rows(log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str) -> Log:
-    """Return the log with the rows that the map's clock asks for, in that order.
+    """Return the log with the rows that the map's clock selects, in that order.
 
-    `used` are the columns that the map reads of this log: rows that repeat the stamp and these
-    are duplicates. Raises InputError for a row that is not there, and for rows of two times.
+    `used` are the log's columns in the map: rows with equal stamp and equal `used` are duplicates.
+    Raises InputError for a missing row, and for rows of two times.
     """
     log = _drop(log, clock, row_count(log, clock, used, map_file, key), map_file, key)
     if clock.sort:
@@ -42,14 +42,14 @@ def use_rows(log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key:
 
 
 def row_count(log: Log, clock: Stamped, used: Sequence[str], map_file: Path, key: str) -> int:
-    """Return how many rows the clock's column has; without one, the first column of `used`."""
+    """Return the number of rows of the clock's column, or else of the first column of `used`."""
     if clock.source:
         return log.find(clock.source, map_file, f"{key}.from").len()
     return next((log.columns[name].len() for name in used if name in log.columns), 0)
 
 
 def stamps_in_file(log: Log, clock: Stamped, map_file: Path, key: str) -> Stamps:
-    """Return when each row was taken, in the rows' order, whatever that is."""
+    """Return the time of each row, in the rows' order."""
     stamps = log.times(clock, map_file, key)
     if stamps.from_first_s.size < 2:
         raise InputError(log.file, clock.source, "has fewer than two rows")
@@ -62,7 +62,7 @@ def stamps_in_file(log: Log, clock: Stamped, map_file: Path, key: str) -> Stamps
 
 
 def check_order(log: Log, time_s: Floats, clock: Stamped, key: str) -> None:
-    """Refuse times that go back anywhere in the log, and name what the map may say to it."""
+    """Refuse times that go back in the log, with the keys of the map that allow them."""
     steps_s = np.diff(time_s)
     back = np.flatnonzero(steps_s < 0.0)
     if not back.size:
@@ -86,7 +86,7 @@ def check_order(log: Log, time_s: Floats, clock: Stamped, key: str) -> None:
 def check_steps(
     log: Log, time_s: Floats, first: int, clock: Stamped, key: str, longest_gap: int
 ) -> None:
-    """Refuse stamps that repeat, and gaps of more rows than `longest_gap`, from row `first` on."""
+    """Refuse repeated stamps, and gaps of more rows than `longest_gap`, from row `first` on."""
     steps_s = np.diff(time_s)
     if (steps_s == 0.0).any():
         row = int(np.argmax(steps_s == 0.0))
@@ -139,7 +139,7 @@ def _sort(log: Log, clock: Stamped, map_file: Path, key: str) -> Log:
     steps_s = np.diff(time_s)
     if not (steps_s < 0.0).any():
         return log
-    run = np.concatenate(([0], np.cumsum(steps_s < 0.0)))  # rows between two steps back
+    run = np.concatenate(([0], np.cumsum(steps_s < 0.0)))  # rows between two backward steps
     by_time = run[order]
     pieces = np.bincount(by_time[np.concatenate(([True], np.diff(by_time) != 0))])
     mixed = np.flatnonzero(pieces > MOST_PIECES)
@@ -171,12 +171,12 @@ def _drop_duplicates(
 
 
 def _lines(log: Log, rows: int) -> Rows:
-    """Return where each row stands in the file, counted from 1."""
+    """Return the line of each row in the file, counted from 1."""
     return log.lines if log.lines is not None else np.arange(1, rows + 1, dtype=np.int64)
 
 
 def _repeats(column: pl.Series) -> NDArray[np.bool_]:
-    """Tell which cells are the same as the one before; empty cells are alike."""
+    """Return which cells equal the one before; empty cells are equal."""
     if column.dtype.is_nested():
         cells = column.to_list()
         repeats = [False, *(a == b for a, b in pairwise(cells))]
@@ -187,7 +187,7 @@ def _repeats(column: pl.Series) -> NDArray[np.bool_]:
 
 
 def _take(log: Log, order: Rows, rows: int, note: str) -> Log:
-    """Return the log with these rows in all columns that are as long as its clock's."""
+    """Return the log with these rows in all columns of the clock's length."""
     if not order.size:
         raise InputError(log.file, "", "has no rows left: clock.drop_rows names them all")
     columns = {

@@ -1,8 +1,8 @@
-"""Logs that are no text are read in a process of their own.
+"""Logs that are not text, read in a process of their own.
 
-Their readers are compiled code that a damaged file can crash, past any `except`, or keep busy
-for ever, or make to ask for all memory: then only that process ends, and the command says in
-one line that the file is damaged.
+Their readers are compiled code. A damaged file can crash it beyond any `except`, or make it run for
+ever or exhaust the memory. Then only that process ends, and the command reports a damaged file in
+one line.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from coupled.record.importing.formats.columns import Found, pack, unpack
 from coupled.record.importing.formats.warned import kept_warnings
 from coupled.record.importing.mapping import Layout
 
-REFUSED = 3  # exit code of a process that says itself what is wrong
-LONGEST_s = 20.0  # that a reader may take, and
+REFUSED = 3  # exit code of a process that reports the fault itself
+LONGEST_s = 20.0  # time limit of a reader, plus
 LONGEST_s_per_MiB = 10.0
 MOST_NOTES = 8  # warnings of a reader that are shown
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -40,7 +40,7 @@ _WORDS = {
     },
     **{"tdms": "a TDMS", "mcap": "an MCAP", "ulog": "a ULog"},
 }
-# What reads a format, and the packages of the extra `logs` that it imports.
+# The reader of a format, and the packages of the extra `logs` that it imports.
 _READERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "mat": ("read_matlab", ()),
     "hdf5": ("read_hdf5", ("h5py",)),
@@ -53,7 +53,7 @@ _READERS: dict[str, tuple[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Task:
-    """What a separate process is to read: a `kind` of file, and which of its matrices.
+    """The task of a separate process: a `kind` of file, and which matrix to read.
 
     `missing` are the words that mean an empty cell.
     """
@@ -79,7 +79,7 @@ def read_separately(
 def read_parquet_separately(
     path: Path, content: bytes
 ) -> tuple[dict[str, pl.Series], tuple[str, ...]]:
-    """Return the columns of a Parquet file, of whatever type, and its reader's warnings.
+    """Return the columns of a Parquet file, of any type, and its reader's warnings.
 
     Raises InputError.
     """
@@ -94,7 +94,7 @@ def _answer(
         kind = "hdf5"
     _check_installed(path, kind)
     task = Task(kind, str(path), layout.matrix, layout.names, layout.missing)
-    # The packages are found where this process finds them, and nowhere else.
+    # The packages are searched only where this process finds them.
     found = {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     try:
         done = subprocess.run(
@@ -121,7 +121,7 @@ def _answer(
 
 
 def is_hdf5(content: bytes) -> bool:
-    """Tell whether a MATLAB file is one of v7.3, which are HDF5 behind a block of MATLAB's."""
+    """Tell whether a MATLAB file is of v7.3: HDF5 after a block of MATLAB's."""
     return _HDF5 in (content[:8], content[512:520]) or content[:19] == b"MATLAB 7.3 MAT-file"
 
 
@@ -133,7 +133,7 @@ def _check_installed(path: Path, kind: str) -> None:
 
 
 def read_here(task: Task, content: bytes, notes: list[str]) -> pl.DataFrame:
-    """Read a log in this process; add to `notes` what its reader warns of."""
+    """Read a log in this process; add its reader's warnings to `notes`."""
     if task.kind == "parquet":
         with kept_warnings(notes):
             return pl.read_parquet(io.BytesIO(content))
@@ -149,7 +149,7 @@ def read_here(task: Task, content: bytes, notes: list[str]) -> pl.DataFrame:
 
 
 def shortened(notes: Sequence[str], kind: str) -> list[str]:
-    """Return a reader's warnings as lines for the user, each once, and not without end."""
+    """Return a reader's warnings as lines for the user, each once, up to `MOST_NOTES`."""
     lines = list(dict.fromkeys(" ".join(note.split()) for note in notes if note.strip()))
     more = [f"… and {len(lines) - MOST_NOTES} more"] if len(lines) > MOST_NOTES else []
     library = _READERS[kind][1][0] if kind in _READERS and _READERS[kind][1] else "its reader"

@@ -1,6 +1,6 @@
-"""Several logs of one test, each with stamps of its own from one clock, on the same frames.
+"""Several logs of one test, each with its own stamps of one clock, on the same frames.
 
-So are the parts of one log that has groups of columns sampled apart (MDF, TDMS, MCAP, ULog).
+The parts of one log with groups of columns sampled apart (MDF, TDMS, MCAP, ULog) are treated alike.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from coupled.record.importing.rows import use_rows
 
 
 def read_logs(files: Sequence[Path], log_map: LogMap, map_file: Path) -> dict[str, Log]:
-    """Return the logs by their names, the one that makes the frames first, with the rows used."""
+    """Return the logs by their names, first the one that makes the frames, with the rows used."""
     logs: dict[str, Log] = {}
     for file in files:
         if file.name in logs:
@@ -42,7 +42,7 @@ def read_logs(files: Sequence[Path], log_map: LogMap, map_file: Path) -> dict[st
 
 
 def _used(name: str, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> list[str]:
-    """Return the columns of a log that the map reads."""
+    """Return the columns of a log in the map."""
     return [
         channel.source
         for own, channel in log_map.channels.items()
@@ -51,14 +51,14 @@ def _used(name: str, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -
 
 
 def _key(log: Log, log_map: LogMap) -> str:
-    """Return the key of the map under which a log's clock is, or may be, given."""
+    """Return the key of the map for a log's clock."""
     if log.part or log.file.name in log_map.clocks:
         return f'clocks."{log.name}"'
     return "clock"
 
 
 def _parts(log: Log, logs: Mapping[str, Log], log_map: LogMap, map_file: Path) -> list[Log]:
-    """Return a log as the parts of it that are used and were sampled apart, the clock's first."""
+    """Return the used parts of a log that were sampled apart, the clock's first."""
     clock = log_map.clocks.get(log.file.name, log_map.clock)
     if not log.stamps or not clock.source:
         return [log]
@@ -88,7 +88,7 @@ def _not_given(name: str, names: Iterable[str]) -> str:
 
 
 def log_of(channel: str, log_map: LogMap, logs: Mapping[str, Log], map_file: Path) -> str:
-    """Return the file name of the log that a channel is in; the first unless the map says more."""
+    """Return the file name of the log with a channel; the first unless the map names one."""
     name = log_map.channels[channel].log
     source = log_map.channels[channel].source
     file = name or next(iter(logs.values())).file.name
@@ -100,11 +100,11 @@ def log_of(channel: str, log_map: LogMap, logs: Mapping[str, Log], map_file: Pat
 
 
 def clock_of(log: Log, log_map: LogMap) -> Clock | OtherClock:
-    """Return what a log's stamps are read by.
+    """Return the clock by which a log's stamps are read.
 
-    A part that was sampled apart has its times in a column of its own: the one that is called
-    as the clock's is in its group, or else the one that its format stamps it by. One logger
-    wrote both: its rows are sorted, and their duplicates dropped, as those of the clock are.
+    A part that was sampled apart has a column of times of its own: that with the clock's name in
+    its group, or else the one by which its format stamps it. Its rows are sorted, and their
+    duplicates dropped, as those of the clock, since one logger wrote both.
     """
     clock = log_map.clocks.get(log.file.name, log_map.clock)
     if not log.part:
@@ -132,7 +132,7 @@ def clock_of(log: Log, log_map: LogMap) -> Clock | OtherClock:
 def lay_grids(
     logs: Mapping[str, Log], log_map: LogMap, map_file: Path, frame_rate_Hz: float | None
 ) -> dict[str, Grid]:
-    """Return the record's frames over the rows of each log, over what all of them last."""
+    """Return the record's frames over the rows of each log, for the time common to all."""
     main, *others = logs
     if not others:
         return {main: lay_grid(logs[main], log_map, map_file, frame_rate_Hz)}
@@ -145,7 +145,7 @@ def lay_grids(
         end = next(name for name in logs if last_s[name] == span_s[1])
         problem = f"begins {span_s[0] - span_s[1]:.6g} s after {end} ends: one clock for both?"
         raise InputError(logs[begin].file, clock_of(logs[begin], log_map).source, problem)
-    # A row that lies on the end but for its stamp's rounding is not cut off.
+    # A row at the end, but for its stamp's rounding, is included.
     slack_s = EVEN_frames * float(np.median(np.diff(stamps[main].from_first_s)))
     span_s = span_s[0] - slack_s, span_s[1] + slack_s
     grid = lay_grid(logs[main], log_map, map_file, frame_rate_Hz, span_s)

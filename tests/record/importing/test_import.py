@@ -314,8 +314,8 @@ def test_a_force_in_pounds_is_seen_against_the_rig(tmp_path: Path) -> None:
         (1 / 9.807, "the force in kgf or daN?"),
         (0.0254, "the deflection in in?"),
         (0.01, "the deflection in cm?"),
-        (0.4, "is 0.4 of what gradient and deflection say: another unit, scale or rig?"),
-        (-3.0, "is 3 of what gradient and deflection say: another unit, scale or rig?"),
+        (0.4, "is 0.4 of gradient times deflection: another unit, scale or rig?"),
+        (-3.0, "is 3 of gradient times deflection: another unit, scale or rig?"),
     ],
 )
 def test_a_force_far_from_its_springs_is_in_doubt(factor: float, says: str | None) -> None:
@@ -338,7 +338,7 @@ def test_a_force_is_held_against_a_schedule_that_is_flat_without_dynamic_pressur
     for each, seen in ((flat, True), (rig, False)):
         _, account = import_log(tmp_path / "log.csv", tmp_path / "map.toml", each)
         found = account.channels["column_force_N"].doubts
-        assert any("gradient and deflection" in doubt for doubt in found) is seen
+        assert any("gradient times deflection" in doubt for doubt in found) is seen
 
 
 def test_a_deflection_that_falls_short_under_force_is_in_doubt(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a reader of a format gives: columns, each with its unit and the rows that it belongs to."""
+"""The result of a format's reader: columns, each with its unit and its group of rows."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ WORDS = ("name", "unit", "group", "stamps", "refused")
 
 @dataclass(frozen=True)
 class Found:
-    """A column of a log: `values`, shape (rows,), as the file has them.
+    """A column of a log: `values`, shape (rows,), as in the file.
 
-    `unit` is what the file states, or "". Columns of one `group` were sampled together, at the
-    times in the column `stamps`; both are "" where the file does not say. `refused` tells why a
-    column that is there is not read.
+    `unit` is that of the file, or "". Columns of one `group` were sampled together, at the times in
+    the column `stamps`; both are "" if the file does not give them. `refused` is the reason why an
+    existing column is not read.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Found:
 
 
 def as_numbers(values: object) -> Numbers | None:
-    """Return a column's values as whole numbers or doubles, or None where they are neither."""
+    """Return a column's values as integers or doubles, or None if they are neither."""
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "biuf":
         return None
@@ -69,7 +69,7 @@ def columns_of_matrix(
 
 
 def by_their_groups(columns: Sequence[Found]) -> list[Found]:
-    """Return columns named `group.name` where two groups have one of the name, else `name`."""
+    """Return columns named `group.name` if two groups have one of the name, else `name`."""
     times = Counter(column.name for column in columns)
 
     def full(group: str, name: str) -> str:
@@ -86,7 +86,7 @@ def by_their_groups(columns: Sequence[Found]) -> list[Found]:
 
 
 def pack(columns: Sequence[Found]) -> pl.DataFrame:
-    """Return columns as a table that one process hands to another, a row a column."""
+    """Return columns as a table for another process, one row for each column."""
     words = {key: [getattr(c, key) for c in columns] for key in WORDS}
     whole = [c.values.dtype.kind != "f" for c in columns]
     floats = [pl.Series([] if w else c.values) for c, w in zip(columns, whole, strict=True)]

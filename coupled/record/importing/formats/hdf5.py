@@ -1,8 +1,8 @@
-"""HDF5, and the MATLAB files of v7.3 that are made of it: vectors by their place, `LOG.force`.
+"""HDF5, and MATLAB files of v7.3, which are HDF5: vectors by their path, `LOG.force`.
 
-MATLAB's tables and dates are read by mat-io, and its other objects refused by name. Only what the
-file itself holds is read: links to other files, data kept in other files and
-views of them are passed over, since a log could name any file of its reader's.
+MATLAB's tables and dates are read by mat-io; its other objects are refused by name. Only data in
+the file itself are read. Links to other files, external data and virtual data sets are skipped,
+since a log could otherwise name any file on the computer.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from coupled.record.importing.formats.columns import (
 from coupled.record.importing.formats.objects import refused_object, replace_objects
 
 DEEPEST = 6  # groups within groups
-MOST_VALUES = 200_000_000  # of one data set, which a small file can declare without end
+MOST_VALUES = 200_000_000  # of one data set; a small file can declare any size
 UNITS = ("unit", "units", "Unit", "Units")
 
 
@@ -47,7 +47,7 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
             table = _own(file, matrix.replace(".", "/"))
             values = _array(table) if isinstance(table, h5py.Dataset) else None
             if values is not None and "MATLAB_class" in table.attrs:
-                values = values.T  # as MATLAB shows it
+                values = values.T  # MATLAB's orientation
             words = names if isinstance(names, list) else _words(file, _own(file, names))
             columns = columns_of_matrix(path, matrix, values, names, words)
             found.update({name: Found(name, column) for name, column in columns.items()})
@@ -59,7 +59,7 @@ def read_hdf5(path: Path, content: bytes, matrix: str, names: list[str] | str) -
 
 
 def _own(group: Any, name: str) -> Any:
-    """Return what a group itself holds under a name, or None for what lies in another file."""
+    """Return an item of a group by its name, or None if it is in another file."""
     if not name or name not in group:
         return None
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
@@ -71,13 +71,13 @@ def _walk(found: dict[str, Found], file: Any, group: Any, place: str, depth: int
     for name in group:
         if depth > DEEPEST or len(found) >= MOST_COLUMNS:
             return
-        if str(name).startswith("#"):  # where MATLAB keeps what its cells refer to
+        if str(name).startswith("#"):  # MATLAB's storage of cells
             continue
         _take(found, file, _own(group, name), f"{place}.{name}" if place else str(name), depth)
 
 
 def _holds_all(file: Any) -> bool:
-    """Tell whether all data that objects may refer to lie in the file itself."""
+    """Tell whether all data of objects are in the file itself."""
     elsewhere: list[str] = []
 
     def look(name: str, item: Any) -> None:
@@ -92,7 +92,7 @@ def _holds_all(file: Any) -> bool:
 
 
 def _refused(item: Any) -> str:
-    """Return the class of a MATLAB object, or of what is no plain array; "" for what is."""
+    """Return the class of a MATLAB object, or the kind of another special array; else ""."""
     if "MATLAB_sparse" in item.attrs:
         return "sparse matrix"
     if "MATLAB_object_decode" in item.attrs:
@@ -138,7 +138,7 @@ def _keep(found: dict[str, Found], name: str, values: Any, unit: str) -> None:
 
 
 def _array(item: Any) -> Any:
-    """Return a data set's values, or None where they lie elsewhere or are too many."""
+    """Return a data set's values, or None if they are in another file or too many."""
     if item.shape is None or item.external or item.is_virtual or item.size > MOST_VALUES:
         return None
     if item.attrs.get("MATLAB_empty", 0):
@@ -166,7 +166,7 @@ def _unit(attributes: Mapping[str, Any]) -> str:
 
 
 def _unpacked(values: Any, attributes: Mapping[str, Any]) -> Any:
-    """Return physical values where attributes of netCDF's conventions say how they are packed."""
+    """Return physical values of data packed by netCDF's conventions."""
     scale, offset = _number(attributes, "scale_factor"), _number(attributes, "add_offset")
     empty = [_number(attributes, key) for key in ("_FillValue", "missing_value")]
     if values.dtype.kind not in "iuf" or {scale, offset, *empty} == {None}:
@@ -184,7 +184,7 @@ def _number(attributes: Mapping[str, Any], key: str) -> float | None:
 
 
 def _words(file: Any, item: Any) -> list[str]:
-    """Return the words of a char matrix, of a cell of them, or of a data set of strings."""
+    """Return the words of a char matrix, of a cell array of them, or of a data set of strings."""
     if not isinstance(item, h5py.Dataset) or (values := _array(item)) is None:
         return []
     if _refers(item):

@@ -1,7 +1,7 @@
 """The vectors of a MATLAB file, by name: variables, fields of structs, columns of a matrix.
 
-Only numbers are taken. Function handles and cells are looked at as data and passed over; tables
-and dates are read by mat-io, and other objects refused. Nothing that a file holds is ever run.
+Only numbers are read. Function handles and cells are skipped; tables and dates are read by mat-io,
+and other objects refused. Nothing in a file is executed.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ MOST_FIELDS = 10_000
 def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str) -> list[Found]:
     """Return the vectors of a MATLAB file, v4 to v7.2.
 
-    A field of a struct is `struct.field`, of an array of structs `struct(1).field`. With
-    `matrix` the columns of that variable are taken too, by `names`: a list, or the variable
-    that holds them.
+    A field of a struct is `struct.field`, of an array of structs `struct(1).field`. With `matrix`
+    the columns of that variable are included, by `names`: a list, or the variable that holds them.
     """
     variables = _load(path, content)
     found: dict[str, Found] = {}
@@ -49,10 +48,10 @@ def read_matlab(path: Path, content: bytes, matrix: str, names: list[str] | str)
 
 
 def _load(path: Path, content: bytes) -> dict[str, Any]:
-    """Return the variables; what a damaged file raises ends this separate process.
+    """Return the variables; an exception on a damaged file ends this separate process.
 
-    scipy does not list the variables of a file with objects, and gives all objects one name:
-    each variable is then read by itself.
+    scipy does not list the variables of a file with objects, and gives all objects one name, so
+    each variable of such a file is read by itself.
     """
     if not _has_objects(content):
         return _load_together(path, content)
@@ -70,7 +69,7 @@ def _load(path: Path, content: bytes) -> dict[str, Any]:
 
 
 def _has_objects(content: bytes) -> bool:
-    """Tell whether the head of a file of v5 to v7.2 says where its objects are kept."""
+    """Tell whether the head of a file of v5 to v7.2 refers to stored objects."""
     return content[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and bool(
         content[116:124].strip(b"\0 ")
     )
@@ -89,7 +88,7 @@ def _load_together(path: Path, content: bytes) -> dict[str, Any]:
 
 
 def _text(value: Any) -> str:
-    """Return a word that scipy gives as bytes, or as an array of letters."""
+    """Return a word that scipy gives as bytes or as an array of letters."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
@@ -109,7 +108,7 @@ def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None
 
 
 def _words(value: Any) -> list[str]:
-    """Return the words of a char matrix or of a cell of them."""
+    """Return the words of a char matrix or of a cell array of them."""
     if not isinstance(value, np.ndarray):
         return []
     if value.dtype.kind == "U":

@@ -1,9 +1,9 @@
-"""MCAP, as robots and test benches log, by mcap: messages in JSON, ROS 2's CDR or protobuf.
+"""MCAP, the format of robots and test benches, by mcap: messages in JSON, ROS 2's CDR or protobuf.
 
-The columns are `topic.field`. Elements of an array are `field[0]`; where a list of names of the
-same length stands beside it or above it in the message, or each element has a `name` or an `id`,
-they are `field[name]` too: the order of joints may change from message to message. ROS 1's
-messages are left out: their decoder makes a program of what the file says and runs it.
+The columns are `topic.field`. Elements of an array are `field[0]`. If the message has a list of
+names of the same length, or each element has a `name` or an `id`, they are `field[name]` too, since
+the order of joints may change between messages. ROS 1's messages are not read: their decoder
+compiles and executes content of the file.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_num
 DEEPEST = 6  # messages within messages
 LONGEST = 64  # elements of an array that become columns
 STAMPS = "log_time"
-NAMES = ("name", "names", "label", "labels", "id", "ids")  # how fields with names of elements end
-IDENTIFIERS = ("id", "ids", "joint_id", "joint_ids")  # whose numbers name elements
+NAMES = ("name", "names", "label", "labels", "id", "ids")  # endings of fields of names
+IDENTIFIERS = ("id", "ids", "joint_id", "joint_ids")  # fields of numbers that name elements
 Labels = tuple[list[str], ...]
 TIMES = ({"sec", "nanosec"}, {"seconds", "nanos"}, {"sec", "nsec"})
 
 
 class _Json(DecoderFactory):
-    """Decodes messages in JSON, which need no schema."""
+    """Decodes messages in JSON, which have no schema."""
 
     def decoder_for(
         self, message_encoding: str, schema: Schema | None
@@ -47,8 +47,8 @@ class _Json(DecoderFactory):
 def read_mcap(path: Path, content: bytes) -> list[Found]:
     """Return the fields of numbers, and each topic's `log_time` and `publish_time`, in ns.
 
-    An array's elements are `field[0]`, `field[1]`, …, and by their names `field[name]`. A place
-    at which the name changes is refused. A field that holds s and ns is one column.
+    An array's elements are `field[0]`, `field[1]`, …, and by their names `field[name]`. An index
+    whose name changes is refused. A field with s and ns is one column.
     """
     reader = make_reader(io.BytesIO(content))
     summary = reader.get_summary()
@@ -107,7 +107,7 @@ def _columns(topic: str, rows: list[dict[str, _Value]]) -> list[Found]:
 
 
 def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Value]:
-    """Yield the numbers of a decoded message; `labels` are the names of elements known so far."""
+    """Yield the numbers of a decoded message; `labels` are the names of elements found so far."""
     if isinstance(value, (bool, int, float)):
         yield _Value(name, value)
         return
@@ -132,7 +132,7 @@ def _values(value: Any, name: str, depth: int, labels: Labels) -> Iterator[_Valu
 
 
 def _labels(fields: Mapping[str, Any]) -> Labels:
-    """Return the lists of words in a message, those first whose field's name says names."""
+    """Return the lists of words in a message, first those of fields for names."""
     lists = {
         key: [_called(word) for word in value]
         for key, value in fields.items()
@@ -145,7 +145,7 @@ def _labels(fields: Mapping[str, Any]) -> Labels:
 
 
 def _own_names(elements: Any) -> list[str] | None:
-    """Return the names that elements have in a field of their own, as {"name": "a", …}."""
+    """Return the names that elements have in a field of their own, such as {"name": "a", …}."""
     each = [_fields(element) or {} for element in elements]
     for key in each[0] if each else ():
         words = [fields.get(key) for fields in each]
@@ -155,7 +155,7 @@ def _own_names(elements: Any) -> list[str] | None:
 
 
 def _called(word: object) -> str:
-    """Return an element's name, which is never one of the numbers that count elements."""
+    """Return an element's name; it is never an index."""
     text = str(word)
     return f"id {text}" if text.lstrip("-").isdecimal() else text
 

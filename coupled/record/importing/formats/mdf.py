@@ -1,7 +1,7 @@
-"""MDF of version 4, as measurement systems of cars and test benches write it, by asammdf.
+"""MDF of version 4, the format of measurement systems of cars and test benches, by asammdf.
 
-A group of channels has a clock of its own, in s from the start of the measurement. asammdf
-converts raw numbers to physical ones, but for formulas: it would compute what the file says.
+A group of channels has its own clock, in s from the start of the measurement. asammdf converts raw
+numbers to physical ones, except by formulas, since it would execute them.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from coupled.record.importing.formats.columns import (
 )
 
 FORMULA = 3  # a conversion by a formula in text
-TIME = 1  # what a master counts, in s; others are angles, lengths and rows
-DEEPEST = 16  # conversions that a conversion refers to
+TIME = 1  # type of a master channel in s; others are angles, lengths and rows
+DEEPEST = 16  # nested conversions
 RUN = "is converted by a formula, which is not run: save it as plain numbers"
-MASTER = "time"  # where the clock of a group has no name
+MASTER = "time"  # name of a group's clock without a name
 
 
 def read_mdf(path: Path, content: bytes, missing: Sequence[str] = ()) -> list[Found]:
-    """Return the channels of numbers: `name`, or `group.name` where two groups have one such.
+    """Return the channels of numbers: `name`, or `group.name` if two groups have one.
 
-    Values are physical. A channel whose values are texts is refused, but for the texts
-    `missing`, which mean an empty cell.
+    Values are physical. A channel with texts as values is refused, except for the texts `missing`,
+    which mean an empty cell.
     """
     if content[:8] != b"MDF     " or content[8:9] != b"4":
         raise InputError(path, "", "is no MDF of version 4; its program, or asammdf, converts it")
@@ -55,7 +55,7 @@ def _group(mdf: Any, place: int, group: Any, missing: Sequence[str]) -> list[Fou
     conversions = [channel.conversion for channel in group.channels]
     formulas = [_has_formula(conversion) for conversion in conversions]
     for channel, formula in zip(group.channels, formulas, strict=True):
-        if formula:  # asammdf would compute it
+        if formula:  # asammdf would execute it
             channel.conversion = None
     master = mdf.masters_db.get(place)
     stamps, refused, unit = MASTER, "", "s"
@@ -95,7 +95,7 @@ def _has_formula(conversion: Any, depth: int = 0) -> bool:
 
 
 def _physical(raw: Numbers, conversion: Any, missing: Sequence[str]) -> tuple[Numbers, str]:
-    """Return asammdf's own physical values, NaN for the texts `missing`, or why there are none."""
+    """Return asammdf's physical values, NaN for the texts `missing`, or why there are none."""
     physical = np.asarray(conversion.convert(raw, as_object=True))
     numbers = as_numbers(physical)
     if numbers is not None:
@@ -110,7 +110,7 @@ def _physical(raw: Numbers, conversion: Any, missing: Sequence[str]) -> tuple[Nu
 
 
 def _cell(value: Any, missing: Sequence[str]) -> float | str:
-    """Return a physical value as a number, NaN where it is a text that means none, or the text."""
+    """Return a physical value as a number, NaN for a text in `missing`, or the text."""
     if isinstance(value, (bytes, str)):
         text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
         text = text.strip("\0 ")

@@ -1,7 +1,7 @@
 """MATLAB's tables, timetables, dates and durations, by mat-io; other objects are refused by name.
 
-A file keeps objects apart from its variables: where a variable holds one, there are only numbers
-that say which it is. These are never a column.
+A file stores objects apart from its variables. The variable of an object has only numbers that
+refer to it, which are never a column.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ DEEPEST = 6  # structs within structs
 def replace_objects(
     found: dict[str, Found], content: bytes, variables: Sequence[str], suffix: str = ".mat"
 ) -> None:
-    """Put the columns of the objects in `variables` in place of the refusals in `found`.
+    """Replace the refusals in `found` by the columns of the objects in `variables`.
 
-    Where mat-io is not installed, or does not read them, `found` stays, with the reason.
+    Without mat-io, or for objects that it does not read, `found` keeps them, with the reason.
     """
     if importlib.util.find_spec("matio") is None:
         _explain(found, "reading it needs mat-io: pip install 'coupled[logs]'")
         return
     try:
         matio: Any = importlib.import_module("matio")
-    except Exception as error:  # of a release that does not go with the pandas installed
+    except Exception as error:  # of a release incompatible with the installed pandas
         _explain(found, f"mat-io cannot be loaded: {type(error).__name__}: {str(error)[:100]}")
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -43,7 +43,7 @@ def replace_objects(
                 loaded = matio.load_from_mat(
                     str(path), variable_names=[variable], add_table_attrs=True
                 )
-            except Exception as error:  # of a library, on a file that may hold anything
+            except Exception as error:  # of a library on unknown content
                 why = f"mat-io cannot read it: {type(error).__name__}: {str(error)[:100]}"
                 _explain(found, why, variable)
                 continue
@@ -53,7 +53,7 @@ def replace_objects(
 
 
 def refused_object(name: str, kind: object) -> Found:
-    """Return the column of a MATLAB object of a class, which is refused."""
+    """Return the refused column of a MATLAB object."""
     word = kind.decode("utf-8", "replace") if isinstance(kind, bytes) else str(kind)
     return Found(name, np.zeros(0), refused=f"{MARK}{word.strip()[:60] or 'object'}")
 
@@ -62,7 +62,7 @@ MARK = "is a MATLAB "
 
 
 def _explain(found: dict[str, Found], why: str, variable: str = "") -> None:
-    """Say why objects are not read, where that is not said yet."""
+    """Add the reason to refused objects without one."""
     for name, column in found.items():
         own = not variable or name == variable or name.startswith((f"{variable}.", f"{variable}("))
         if own and column.refused.startswith(MARK) and ":" not in column.refused:
@@ -70,7 +70,7 @@ def _explain(found: dict[str, Found], why: str, variable: str = "") -> None:
 
 
 def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None:
-    """Add to `found` the columns of the tables, dates and durations in a value."""
+    """Add the columns of the tables, dates and durations in a value to `found`."""
     if depth > DEEPEST or len(found) >= MOST_COLUMNS:
         return
     if hasattr(value, "columns") and hasattr(value, "index"):
@@ -88,7 +88,7 @@ def _collect(found: dict[str, Found], name: str, value: Any, depth: int) -> None
 
 
 def _table(found: dict[str, Found], name: str, table: Any) -> None:
-    """Add the variables of a table; those of a timetable are stamped by its row times."""
+    """Add the variables of a table; row times stamp those of a timetable."""
     index = np.asarray(table.index)
     timed = index.dtype.kind in "mM"
     group = name if timed else ""
@@ -111,7 +111,7 @@ def _table(found: dict[str, Found], name: str, table: Any) -> None:
 
 
 def _ns(times: Any) -> Any:
-    """Return dates, or durations, in whole ns; doubles with NaN where one is missing."""
+    """Return dates or durations in integer ns; doubles with NaN if one is missing."""
     lacking = np.isnat(times)
     counts = times.astype(f"{'datetime64' if times.dtype.kind == 'M' else 'timedelta64'}[ns]")
     counts = counts.astype(np.int64)

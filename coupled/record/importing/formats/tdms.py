@@ -1,4 +1,4 @@
-"""TDMS, as LabVIEW writes it, by npTDMS: a channel's waveform properties are its clock."""
+"""TDMS, the format of LabVIEW, by npTDMS: a channel's waveform properties are its clock."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from coupled.record.importing.formats.columns import (
 )
 from coupled.record.importing.formats.warned import kept_warnings
 
-MASTER = "time"  # the column that a waveform's start and step make, in s
+MASTER = "time"  # the column from a waveform's start and step, in s
 
 
 def read_tdms(path: Path, content: bytes) -> list[Found]:
-    """Return the channels of numbers: `name`, or `group.name` where two groups have one such.
+    """Return the channels of numbers: `name`, or `group.name` if two groups have one.
 
-    Where channels are waveforms, `time` is when their rows were taken, in s from the first start
-    in the file, or from the first's own where none is stated.
+    For waveforms, `time` is the time of the rows, in s from the first start in the file, or from
+    their own first row if no start is given.
     """
     file = TdmsFile.read(io.BytesIO(content))
     channels = [each for group in file.groups() for each in group.channels()]
@@ -62,7 +62,7 @@ def read_tdms(path: Path, content: bytes) -> list[Found]:
 
 
 def _own(label: str, stamps: str) -> str:
-    """Return the name of a group's part that has one clock."""
+    """Return the name of the part of a group with one clock."""
     return f"{label}{stamps.removeprefix(MASTER)}"
 
 

@@ -1,4 +1,4 @@
-"""ULog, as PX4's autopilots write it, by pyulog: `topic.field`, stamped in µs since the start."""
+"""ULog, the format of PX4's autopilots, by pyulog: `topic.field`, stamped in µs from the start."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from coupled.record.importing.formats.columns import MOST_COLUMNS, Found, as_num
 
 STAMPS = "timestamp"
 HEAD_bytes = 16  # of the file, before its messages
-KINDS = b"ABCDFILMOPQRS"  # of messages that the format has
+KINDS = b"ABCDFILMOPQRS"  # types of messages of the format
 
 
 def read_ulog(path: Path, content: bytes) -> list[Found]:
-    """Return the fields of numbers; a topic's second source is `topic[1]`, as PX4 numbers them."""
+    """Return the fields of numbers; a topic's second instance is `topic[1]`, as in PX4."""
     if content[:7] != b"ULog\x01\x12\x35":
         raise InputError(path, "", "is no ULog file")
     columns: list[Found] = []
     log = ULog(io.BytesIO(content))
     place = _damage(content)
-    if place or log.file_corruption:  # pyulog passes over it, or ends there, without a word
+    if place or log.file_corruption:  # pyulog skips or ends there without a warning
         where = f"from byte {place} on" if place else "in parts"
         warnings.warn(f"the file is damaged {where}, and rows are lost", stacklevel=1)
     for data in log.data_list:
@@ -40,7 +40,7 @@ def read_ulog(path: Path, content: bytes) -> list[Found]:
 
 
 def _damage(content: bytes) -> int:
-    """Return the place of the first message that is none, or is cut short; 0 in a whole file."""
+    """Return the byte of the first invalid or incomplete message; 0 in a whole file."""
     place = HEAD_bytes
     while place < len(content):
         size = int.from_bytes(content[place : place + 2], "little")

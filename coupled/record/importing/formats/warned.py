@@ -1,4 +1,4 @@
-"""What the libraries that read logs warn of, kept: it is a line for the user, or a refusal."""
+"""Collected warnings of the libraries that read logs, for a line to the user or a refusal."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import logging
 import warnings
 from collections.abc import Iterator
 
-# Warnings that speak of code and not of the file.
+# Warnings about code, not about the file.
 OF_CODE = (DeprecationWarning, PendingDeprecationWarning, FutureWarning, ResourceWarning)
 
 
 class _Kept(logging.Handler):
-    """Keeps what a library logs as a warning or worse."""
+    """Collects a library's log messages from level warning on."""
 
     def __init__(self, notes: list[str]) -> None:
         super().__init__(logging.WARNING)
@@ -25,9 +25,9 @@ class _Kept(logging.Handler):
 
 @contextlib.contextmanager
 def kept_warnings(notes: list[str]) -> Iterator[None]:
-    """Keep in `notes` all that libraries warn of, log or print within, a line each.
+    """Collect in `notes` all that libraries warn of, log or print in the context, a line each.
 
-    Warnings that speak of code, as a deprecation, are not of the file, and are left out.
+    Warnings about code, such as deprecations, are left out.
     """
     said, keeper = io.StringIO(), _Kept(notes)
     loggers = [logging.getLogger(), *map(logging.getLogger, logging.root.manager.loggerDict)]

@@ -1,1 +1,1 @@
-"""A first map of an unknown log, from names, units and sizes; what they leave open is asked."""
+"""A first map of an unknown log, from names, units and sizes, with questions for the rest."""

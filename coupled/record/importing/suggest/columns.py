@@ -1,4 +1,4 @@
-"""The columns of a log as a person who looks for channels sees them."""
+"""The columns of a log with the properties from which channels are guessed."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from coupled.record.importing.reading import LATEST_ns, Log
 from coupled.record.importing.suggest.names import Reading, read_name
 
 Floats = NDArray[np.float64]
-FEW = 0.1  # of its cells may be empty or no numbers
+FEW = 0.1  # share of a column's cells that may be empty or not numbers
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: what its name says, and what its cells hold.
+    """A column: the content of its name and of its cells.
 
-    `values` are its numbers, NaN where empty, shape (rows,); of a column of lists, of their
-    first elements, and `length` is how many each list has. Dates are in s from the first.
+    `values` are its numbers, NaN if empty, shape (rows,); for a column of lists, their first
+    elements, and `length` is the number of elements. Dates are in s from the first.
     """
 
     log: str
@@ -35,13 +35,13 @@ class Column:
 
     @property
     def moves(self) -> bool:
-        """Whether it ever changes."""
+        """Whether it is not constant."""
         there = self.values[np.isfinite(self.values)]
         return there.size > 1 and bool(there.max() > there.min())
 
 
 def columns_of(log: Log) -> list[Column]:
-    """Return a log's columns in their order; those that hold no numbers too."""
+    """Return a log's columns in their order, including those without numbers."""
     return [_column(log, name) for name in log.columns]
 
 

@@ -1,4 +1,4 @@
-"""How a text log is laid out: what sets its columns apart, where its header and its numbers are."""
+"""The layout of a text log: its delimiter, and the lines of its header and its numbers."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from coupled.record.importing.mapping import Layout
 from coupled.record.importing.reading import FORMATS
 from coupled.units import parse_unit
 
-LOOKED_AT = 400  # lines; a log does not change its layout further down
+LOOKED_AT = 400  # lines from which the layout is guessed
 COMMENTS = ("#", "%", "//", "*")
-DELIMITERS = ("\t", ";", ",", " ")  # a semicolon before a comma: the comma may be the decimal one
+DELIMITERS = ("\t", ";", ",", " ")  # a semicolon before a comma, which may be the decimal mark
 MOST_WORDS = 5
 _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
 
 def guess_layout(path: Path) -> Layout:
-    """Return the layout of a log; the plain one where its format is no text."""
+    """Return the layout of a log; the default one if its format is not text."""
     if FORMATS.get(path.suffix.lower(), "csv") != "csv":
         return Layout()
     encoding, text = _decoded(path, read_bytes(path))
@@ -87,7 +87,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _delimiter(lines: Sequence[str], path: Path) -> tuple[str, int]:
-    """Return what sets columns apart, and how many there are: the same in nearly every row."""
+    """Return the delimiter, and the number of columns, which is equal in nearly every row."""
     tail = lines[len(lines) // 3 :]
     for delimiter in DELIMITERS:
         widths = Counter(len(_split(line, delimiter)) for line in tail)
@@ -98,7 +98,7 @@ def _delimiter(lines: Sequence[str], path: Path) -> tuple[str, int]:
 
 
 def _skipped(row: int, lines: Sequence[str], comment: str) -> int:
-    """Return the lines to skip before a row; comments need none."""
+    """Return the number of lines to skip before a row, without comments."""
     others = [i for i in range(row) if lines[i].strip() and not lines[i].startswith(comment)]
     return row if others else 0
 
@@ -110,7 +110,7 @@ def _holds_units(row: Sequence[str]) -> bool:
 
 
 def _missing(rows: Sequence[Sequence[str]], width: int) -> list[str]:
-    """Return the words that stand in columns of numbers."""
+    """Return the words in columns of numbers."""
     words: Counter[str] = Counter()
     for place in range(width):
         column = [row[place] for row in rows if len(row) == width and row[place]]

@@ -1,7 +1,7 @@
-"""Which of two positions is the grip's and which the computed one, where names leave it open.
+"""Which of two positions is the grip's and which the computed one, if names do not decide it.
 
-A structure yields under a force: δ − δc = K·F, K > 0. Where the numbers show which is which, they
-settle what the names do not say; where they contradict a name, or show nothing, it is asked.
+A structure bends under a force: δ − δc = K·F, K > 0. This decides if names do not. If the numbers
+contradict a name, or show nothing, the proposal has a question.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from coupled.record.importing.suggest.columns import Column
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
-ALIGNED = 0.3  # correlation of force and motion, from which the force's sign is known
+ALIGNED = 0.3  # correlation of force and motion from which the force's sign is known
 
 
 def settle_ends(chosen: Mapping[str, Column]) -> tuple[dict[str, Column], dict[str, str]]:
-    """Return the columns by channel, positions exchanged where the numbers say so, and questions.
+    """Return the columns by channel, positions exchanged if the numbers require it, and questions.
 
-    A question is by the channel whose column it asks for.
+    The key of a question is the channel whose column is in question.
     """
     settled, asked = dict(chosen), dict[str, str]()
     for control in CONTROL_NAMES:
@@ -42,7 +42,7 @@ def settle_ends(chosen: Mapping[str, Column]) -> tuple[dict[str, Column], dict[s
         if sign < 0 and unsure:
             settled[ends[0]], settled[ends[1]] = deflection, computed
         elif sign < 0 or (sign == 0 and unsure and not _named(computed, deflection)):
-            says = "its name and the force do not agree" if sign else "the names leave that open"
+            says = "its name contradicts the force" if sign else "the names do not show it"
             both = f"{computed.name!r} or {deflection.name!r}"
             asked[ends[0]] = f"{both}: which is on the actuator's side? {says}"
             asked[ends[1]] = f"{both}: which is at the grip? {says}"
@@ -50,7 +50,7 @@ def settle_ends(chosen: Mapping[str, Column]) -> tuple[dict[str, Column], dict[s
 
 
 def _named(computed: Column, deflection: Column) -> bool:
-    """Tell whether one of two names says its end, which leaves the other end to the other."""
+    """Tell whether one of two names identifies its end, and thereby the other's."""
     return not (computed.reading.either_end and deflection.reading.either_end)
 
 
@@ -71,7 +71,7 @@ def _yields(computed: Column, deflection: Column, force: Column | None) -> int:
 
 
 def _direction(force: Floats, moved: Floats) -> float:
-    """Return the sign that turns a force so that it moves with the motion; 0 if unknown."""
+    """Return the sign that aligns a force with the motion; 0 if unknown."""
     a, b = force - force.mean(), moved - moved.mean()
     scale = float(np.sqrt((a @ a) * (b @ b)))
     share = float(a @ b) / scale if scale > 0.0 else 0.0

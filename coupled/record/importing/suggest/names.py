@@ -1,7 +1,7 @@
-"""What a column's name says: its channel, its unit, and how sure that is.
+"""The content of a column's name: its channel, its unit, and whether it is certain.
 
-A name is cut into words at its signs and capitals. A word may name a control, a quantity, or a
-unit; what the words of a name do not say is left open.
+A name is divided into words at its signs and capitals. A word may name a control, a quantity, or a
+unit.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ QUANTITIES = {
     "computed": _set("computed servo actuator cmd command commanded control target setpoint ref"),
     "deflection": _set("deflection defl grip hand true actual measured state sensor"),
 }
-# What measures a place, which says of which end it is only where no other word does.
+# Words for transducers of position, which identify the end only if no other word does.
 DEVICES = {"computed": _set("encoder enc pot lvdt"), "deflection": _set("laser")}
 ENDS = ("computed", "deflection")
-PLACES = _set("position pos angle disp displacement travel")  # of which end they leave open
-# A motion's channel by any of these sets of words, the longest found first.
+PLACES = _set("position pos angle disp displacement travel")  # of either end
+# A motion's channel by any of these sets of words, the longest match first.
 MOTION = {
     "dynamic_pressure_Pa": "qbar|q bar|qc|dynamic pressure|dyn press|impact pressure",
     "true_airspeed_m_per_s": "tas|true airspeed|airspeed true|vtas|vt",
@@ -53,7 +53,7 @@ MOTION = {
 }
 TIME = _set("time t timestamp stamp clock utc date datetime elapsed sec seconds")
 TORQUE = _set("torque moment nm")
-# A unit at the end of a name, as people write it there, in coupled's spelling.
+# Usual spellings of units at the end of a name, and their symbols in this package.
 SUFFIXES = {
     **{
         word: word
@@ -72,10 +72,10 @@ _LOWER = {key.lower(): unit for key, unit in SUFFIXES.items()}
 
 @dataclass(frozen=True)
 class Reading:
-    """What a name says. `channel` is "time", a record's channel, or "" where it says none.
+    """The content of a name. `channel` is "time", a record's channel, or "" if it has none.
 
-    `sure` is false where the name leaves the control open, or what of it is meant; `either_end`
-    where it is a place that may be the grip's or the computed one.
+    `sure` is false if the control or the meaning is ambiguous; `either_end`: it is a position of
+    the grip or the computed one.
     """
 
     channel: str
@@ -91,7 +91,7 @@ def words_of(name: str) -> list[str]:
 
 
 def read_name(name: str, listed_unit: str = "", log: str = "") -> Reading:
-    """Return what a column's name, the unit that the log states, and the log's own name say."""
+    """Return the reading of a column's name, with the log's unit and the log's own name."""
     if name in CHANNELS:
         return Reading(name, listed_unit or own_unit(name))
     stem, unit = _unit(name)
@@ -127,7 +127,7 @@ def _is(unit: str, other: str) -> bool:
 
 
 def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
-    """Return a control's channel, where the words name a control or what one has."""
+    """Return a control's channel, if the words name a control or one of its quantities."""
     present = _singular(words)
     controls = [control for control, names in CONTROLS.items() if present & names]
     if is_torque(words) and not _is(unit, "N"):
@@ -153,7 +153,7 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
 
 
 def is_torque(words: list[str]) -> bool:
-    """Tell whether a name is a torque's: no force without an arm, which no log holds."""
+    """Tell whether a name is a torque's, which needs an arm to be a force."""
     return bool(_singular(words) & TORQUE)
 
 

@@ -1,7 +1,7 @@
-"""A map proposed for a log: what is certain is filled in, what is not is asked in its place.
+"""A proposed map of a log: certain keys are filled in, the others are questions.
 
-A question is a value that no map may have, `"?"`, with what fits beside it: the map is refused
-until a person has answered. Signs of loads and scales of counts are asked, never guessed.
+A question is the value `"?"`, which no map may have, with candidates in a comment. The map is
+refused until the user has answered all. Signs of loads and scales of counts are always questions.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ Line = tuple[str, object, str]  # a key, its value, and a remark
 
 @dataclass(frozen=True)
 class Proposal:
-    """A map as text, the questions that it still asks, and the columns that it leaves out.
+    """A map as text, its open questions, and the columns that it leaves out.
 
-    `warnings` are what the readers of the logs warned of, and why columns are not read.
+    `warnings` are those of the logs' readers, and the reasons why columns are not read.
     """
 
     text: str
@@ -48,7 +48,7 @@ class Proposal:
     warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the JSON."""
         return {
             "channels": dict(self.mapped),
             "questions": list(self.questions),
@@ -58,9 +58,9 @@ class Proposal:
 
 
 def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
-    """Return a map for a log, or for several of one test, the first of which makes the frames.
+    """Return a map for a log, or for several of one test; the first one makes the frames.
 
-    A `rig`'s travels narrow the units. Raises InputError for what is no log.
+    A `rig`'s travels reduce the possible units. Raises InputError for a file that is not a log.
     """
     layout = guess_layout(files[0])
     read = [read_log(file, layout) for file in files]
@@ -99,7 +99,7 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
 def _stamps_first(
     columns: Sequence[Column], logs: Sequence[Log], chosen: Mapping[str, Column]
 ) -> list[Column]:
-    """Return the columns, those first that stamp the groups of what was chosen."""
+    """Return the columns, first those with the stamps of the chosen columns' groups."""
     stamps = {log.file.name: log.stamps for log in logs}
     order = [stamps[c.log].get(c.name) for name in CHANNELS if (c := chosen.get(name))]
     place = {name: i for i, name in reversed(list(enumerate(order)))}
@@ -122,7 +122,7 @@ def _layout_lines(layout: Layout) -> list[Line]:
 def _clocks(
     columns: Sequence[Column], logs: Sequence[str]
 ) -> tuple[list[Line], dict[str, list[Line]]]:
-    """Return the lines of `[clock]`, and those of the logs whose stamps are other ones."""
+    """Return the lines of `[clock]`, and those of logs with other stamps."""
     found = {name: _clock(columns, name, len(logs) > 1, main=name == logs[0]) for name in logs}
     first = found[logs[0]]
     plain = [line for line in first if line[0] != "frame_rate_Hz"]
@@ -141,7 +141,7 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
         steps = steps[np.isfinite(steps)]
         if column.kind in ("text", "lists") or not steps.size:
             continue
-        if steps.min() < 0.0 or steps.max() <= 0.0:  # none, or one that stands still
+        if steps.min() < 0.0 or steps.max() <= 0.0:  # not a time, or constant
             continue
         lines: list[Line] = [("from", column.name, "")]
         fit = [column.reading.unit] if column.reading.unit else sizes.time_units(steps)
@@ -159,7 +159,7 @@ def _clock(columns: Sequence[Column], log: str, several: bool, main: bool) -> li
 
 
 def _rate(values: Floats, unit: str) -> list[Line]:
-    """Return the line of the frames' rate, where the rows do not come evenly."""
+    """Return the line of the frame rate, if the rows are uneven."""
     values = values[np.isfinite(values)]
     known = parse_unit(unit)
     time_s = values * known.factor if known is not None else values
@@ -172,9 +172,9 @@ def _rate(values: Floats, unit: str) -> list[Line]:
 
 
 def _chosen(columns: Sequence[Column]) -> dict[str, Column]:
-    """Return the column of each channel; of several, one whose name is sure, then the first.
+    """Return the column of each channel; of several, the first with a certain name, or the first.
 
-    A place that may be at either end is the computed one where the grip has its own.
+    A position of either end is the computed one if the grip has its own.
     """
     chosen: dict[str, Column] = {}
     for column in sorted(columns, key=lambda c: (c.reading.either_end, not c.reading.sure)):
@@ -202,7 +202,7 @@ def _control(channel: str, rig: Rig | None) -> Control | None:
 def _channel_lines(
     channel: str, column: Column, control: Control | None, main: str, asked: Mapping[str, str]
 ) -> list[Line]:
-    remark = "" if column.reading.sure else "is it this? its name leaves that open"
+    remark = "" if column.reading.sure else "is it this? its name is ambiguous"
     lines: list[Line] = [("from", column.name, remark)]
     if channel in asked:
         lines = [("from", "?", asked[channel])]
@@ -237,7 +237,7 @@ def _own(channel: str) -> Unit:
 
 
 def _one_of(fit: Sequence[str], size: str) -> tuple[str, str]:
-    """Return the only unit that fits, or the question."""
+    """Return the only unit that fits, or a question."""
     if len(fit) == 1:
         return fit[0], f"by its size: {size}"
     return "?", f"{size}: {' or '.join(fit)}" if fit else f"{size}: which unit?"
@@ -246,7 +246,7 @@ def _one_of(fit: Sequence[str], size: str) -> tuple[str, str]:
 def _signs(
     sections: list[tuple[str, list[Line]]], chosen: Mapping[str, Column]
 ) -> list[tuple[str, list[Line]]]:
-    """Return the sections, with a question where force and deflection move against each other."""
+    """Return the sections, with a question if force and deflection have opposite signs."""
     for control in CONTROL_NAMES:
         own = {c: col for c, col in chosen.items() if c.startswith(control) and not col.length}
         force = own.get(f"{control}_force_N")
@@ -256,7 +256,7 @@ def _signs(
         if force.values.size != moved.values.size:  # sampled apart
             continue
         if sizes.kept_sign(force.values) or sizes.kept_sign(moved.values):
-            continue  # their raw counts say nothing of a direction
+            continue  # raw counts do not show a direction
         there = np.isfinite(force.values) & np.isfinite(moved.values)
         if there.any() and move_oppositely(force.values[there], moved.values[there]):
             remark = f"moves against {moved.name}: -1 here, or there? a pull is positive in both"

@@ -1,4 +1,4 @@
-"""What the size of a column's numbers says of its unit and sign, where it says one thing only."""
+"""Units and signs of a column from the size of its numbers, if unambiguous."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from coupled.rig.parameters import Control
 from coupled.units import parse_unit
 
 Floats = NDArray[np.float64]
-# The largest that a channel reaches in a test, in its own unit: from a gentle one to the limit.
+# The largest value of a channel in a test, in its own unit: of a gentle test, and the limit.
 _PEAKS = {
     "m": (0.01, 0.5),
     "rad": (0.02, 3.5),
@@ -31,19 +31,19 @@ _UNITS = {
     "g": ("g",),
 }
 _ALTITUDES = ("m", "ft")
-RATES_Hz = (5.0, 5000.0)  # what a test is logged at
+RATES_Hz = (5.0, 5000.0)  # range of the rates of test logs
 COMMON_Hz = (
     *(10.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 64.0, 75.0, 80.0, 100.0, 120.0, 125.0, 128.0),
     *(200.0, 240.0, 250.0, 256.0, 400.0, 480.0, 500.0, 1000.0, 2000.0),
 )
 TIMES = ("s", "ms", "us", "ns")
-COUNTS = 100.0  # whole numbers that reach further are an encoder's, or a converter's
+COUNTS = 100.0  # integers above this are counts of an encoder or a converter
 
 
 def units_that_fit(channel: str, values: Floats, control: Control | None = None) -> list[str]:
-    """Return the units in which a channel's largest value is a real one.
+    """Return the units in which a channel's largest value is realistic.
 
-    `control` is the rig's, whose travel narrows it: a test goes through a tenth of it at least.
+    The travel of the rig's `control` reduces them: a test covers at least a tenth of it.
     """
     if channel == "altitude_m":
         return list(_ALTITUDES)
@@ -58,7 +58,7 @@ def units_that_fit(channel: str, values: Floats, control: Control | None = None)
 
 
 def time_units(steps: Floats) -> list[str]:
-    """Return the units of time in which the median step is that of a test's log."""
+    """Return the units of time in which the median step is realistic for a test's log."""
     step = float(np.median(steps)) if steps.size else 0.0
     fit = []
     for name in TIMES:
@@ -70,9 +70,9 @@ def time_units(steps: Floats) -> list[str]:
 
 
 def even_rate(time_s: Floats) -> float | None:
-    """Return a rate, in Hz, for frames over rows that come unevenly; None where they come evenly.
+    """Return a rate, in Hz, for frames over uneven rows; None if they are even.
 
-    A rate that people choose, where one lies within 3 % of the rows' own.
+    A round rate, if there is one within 3 % of the rows' own.
     """
     rate = (time_s.size - 1) / float(np.ptp(time_s))
     stray = time_s - time_s[0] - np.arange(time_s.size) / rate
@@ -83,15 +83,15 @@ def even_rate(time_s: Floats) -> float | None:
 
 
 def are_counts(values: Floats) -> bool:
-    """Tell whether a column holds whole numbers as large as those of an encoder."""
+    """Tell whether a column has integers as large as those of an encoder."""
     there = values[np.isfinite(values)]
     return bool(there.size and np.all(there == np.rint(there)) and np.ptp(there) >= COUNTS)
 
 
 def kept_sign(values: Floats) -> str:
-    """Return in which way counts that are never negative may keep a sign, in words, or "".
+    """Return how counts that are never negative may encode a sign, in words, or "".
 
-    With a bit of its own for the sign, small and large numbers are met and none between.
+    With a sign bit there are small and large numbers, and none in between.
     """
     there = values[np.isfinite(values)]
     if not there.size or there.min() < 0.0 or not are_counts(values):
