@@ -62,13 +62,27 @@ class Imposed:
 
         def predicted(rig: Rig) -> Floats:
             data, true = rig.controls[reading.control], at_loader(rig)
-            force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
+            answer = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
-            read = data.sensing.force_scale * force + data.sensing.force_zero
-            read = stamped(read, late_s * rig.frame_rate)
-            return self._within_jumps(read, jumps) if jumps.any() else read
+
+            def read(force: Floats) -> Floats:
+                gauged = data.sensing.force_scale * force + data.sensing.force_zero
+                return stamped(gauged, late_s * rig.frame_rate)
+
+            force = read(answer.force)
+            if (answer.most > answer.least).any():
+                force = self._within_rests(force, read(answer.least), read(answer.most))
+            return self._within_jumps(force, answer.jumps) if answer.jumps.any() else force
 
         return predicted
+
+    def _within_rests(self, predicted: Floats, least: Floats, most: Floats) -> Floats:
+        """Return a prediction that at rest is the force measured, if friction can hold it.
+
+        Beyond its noise: what friction cannot hold is a misfit.
+        """
+        held = np.clip(self._force.smooth, np.minimum(least, most), np.maximum(least, most))
+        return np.where(most != least, held, predicted)
 
     def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
         """Return a prediction that leaves nearly open when, within a frame, a play was taken up.
