@@ -90,7 +90,8 @@ def fit_nominal(
     information = fits.whole.information
     while (worst := _least_determined(numbers, rig, control, effects, scales)) is not None:
         # It stays as filed, and the others are fitted beside that.
-        numbers[worst] = replace(numbers[worst], found=numbers[worst].filed, half=None)
+        one = numbers[worst]
+        numbers[worst] = replace(one, found=one.filed, half=None, at_bound=False)
         effects = [effect for effect in effects if effect.name != worst]
         fits = _fitted(rig, control, outputs, effects, tell)
         numbers |= {one.key: one for one in fits.numbers(rig, control)}

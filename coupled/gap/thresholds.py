@@ -131,6 +131,7 @@ STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations los
 
 PLAYS = 40  # chosen: plays of a scan before an imposed motion's are fitted,
 PLAY_LEAST = 1e-5  # chosen: of the travel, from which on
+PLAYS_ALIKE = 0.1  # chosen: relative difference of two, below which one is enough
 JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 
 # Settings of the nominal rig (`case`).

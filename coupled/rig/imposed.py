@@ -16,8 +16,9 @@ play whose contact yields bends by F/stiffness beside.
 
 A friction whose contact is rigid holds a loader at rest, and where it turns, with any force up to
 its level, and the motion does not determine which: there the answer is an interval. The contact
-yields by a ten-thousandth of the travel, so that the noise of a sensor is no slip. The acceleration is the mean over a frame about the sample:
-the blow at the end of a play lasts no time, and a force that is sampled has no room for it.
+yields by a ten-thousandth of the travel, so that the noise of a sensor is no slip. The acceleration
+is the mean over a frame about the sample: the blow at the end of a play lasts no time, and a force
+that is sampled has no room for it.
 """
 
 from __future__ import annotations

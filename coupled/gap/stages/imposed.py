@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import with_error
 from coupled.gap.signals.output import Floats, Output, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS
+from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS, PLAYS_ALIKE
 from coupled.record.channels import ControlName
 from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
@@ -124,18 +124,36 @@ def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
 def _plays(
     number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
-    """Return the play that leaves least of the force, where a fit starts: by two scans.
+    """Return the plays that leave least of the force, where a fit starts: by two scans each.
 
-    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
+    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two. Once as
+    the rig predicts the force, and once by any factor and offset of that: where the damping is not
+    known, the first may be far off.
     """
     ours = [output for output in outputs if output.stage == "loader"]
     key = dotted(number.key_on(control), control)
     filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
 
-    def left(play: float) -> float:
+    @cache
+    def left(play: float) -> tuple[float, float]:
         other = rig.changed({key: number.entered(filed, play)})
-        return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
+        each = [(one.measured / one.floor, one.residual(other, wide=True)) for one in ours]
+        as_filed = sum(float(np.sum(misfit**2)) for _, misfit in each)
+        scaled = sum(_beside_factor(seen, seen - misfit) for seen, misfit in each)
+        return as_filed, scaled
 
-    best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
-    best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
-    return [{number.name: best}]
+    found = []
+    for i in range(2):
+        rough = np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist()
+        best = min(rough, key=lambda play: left(play)[i])
+        fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
+        found.append(min(fine, key=lambda play: left(play)[i]))
+    alike = abs(found[1] - found[0]) < PLAYS_ALIKE * found[0]
+    return [{number.name: play} for play in found[: 1 if alike else 2]]
+
+
+def _beside_factor(seen: Floats, predicted: Floats) -> float:
+    """Return the sum of squares that any positive factor and offset of a prediction leave."""
+    about, moves = seen - seen.mean(), predicted - predicted.mean()
+    power, shared = float(moves @ moves), float(moves @ about)
+    return float(about @ about) - (shared**2 / power if min(power, shared) > 0.0 else 0.0)
