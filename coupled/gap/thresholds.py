@@ -80,6 +80,12 @@ SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps s
 HEALTHY_ALONE = 0.3  # chosen: relative scatter of a model's error where one record shows it
 HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is as it was
 
+# Whether a machine changed (`changed`).
+CHANGE_CHANCE = 0.02  # of a false alarm by all features of a healthy record together
+CHANGE_SHOWN = 0.9  # probability with which the stated size of change is shown
+CHANGE_STILL = 0.1  # chosen: of the rms speed, under which there is no direction
+CHANGE_BIN = 0.02  # chosen: of a record's frames, fewer of which give no mean
+
 # What drives a machine (`drives`).
 HELD_JUMPS = 20  # chosen: fewer changes do not show that a signal comes in set points
 HELD_AT_MOST = 10  # chosen: frames between two changes, beyond which the machine paused

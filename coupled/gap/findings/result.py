@@ -30,7 +30,8 @@ class StageResult:
     `settled` is the gap with the settings within their tolerance, `left` that with the effects
     found; `limit` the gap up to which noise may be all there is. `shown_in` names the stages in
     whose gaps a fault of this one would show, where it has no residual of its own. `hidden`: it
-    stays within a floor that would hide a gap, and is not judged for that.
+    stays within a floor that would hide a gap, and is not judged for that; it is `guilty` then only
+    where it changed since the healthy records.
     """
 
     name: str
@@ -82,6 +83,7 @@ class StageResult:
         if self.gap is None:
             found: dict[str, Any] = {"judged": False, "missing": list(self.missing)}
             found |= {"why": self.why} if self.why else {}
+            found |= {"guilty": True} if self.guilty else {}
             return found | ({} if self.hidden is None else {"floor_share": self.hidden.share})
         found = {"gap": self.gap}
         numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}

@@ -102,6 +102,11 @@ def _what(found: Findings, floor: str) -> str:
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
         return f"Whether the {found.control} has a gap cannot be said: {why}."
+    if found.verdict == "ambiguous" and not found.guilty:
+        return (
+            f"Whether the {found.control} has a gap cannot be said: the rig does not explain the"
+            " healthy records, and their scatter shows no change by a tenth."
+        )
     budgets = {one.stage: one for one in found.budget}
     if found.verdict == "unexplained":
         named = "; ".join(_effect(effect) for effect in found.effects)
