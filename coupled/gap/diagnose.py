@@ -16,6 +16,7 @@ from coupled.errors import InputError
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import library_of
+from coupled.gap.effects.scales import Scales, in_scale
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -110,7 +111,7 @@ def _diagnose(
         raise InputError(file, "", problem)
     every = library_of(rig, control)
     library = [effect for effect in every if effect.can_be_tried(list(records.values()), control)]
-    library = as_judged(library, readers, outputs)
+    library = in_scale(as_judged(library, readers, outputs), Scales.of(readers), rig, control)
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)
 

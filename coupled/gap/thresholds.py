@@ -151,6 +151,11 @@ YIELDED = 0.04  # chosen: of that, from which friction is read as yielding: 20 Î
 CLOCK_s = 5e-4  # chosen: by which a recorder may stamp one channel late, or early, unnoticed
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
 
+# The scale of a machine (`scales`).
+COLUMN_FORCE_N, COLUMN_WAY = 20.0, {"m": 0.03, "rad": 0.3}  # chosen: rms of a column's, a wheel's
+OTHER_SCALE = 5.0  # chosen: times as large or small, from which starts and bounds are another's
+BOUND_SCALES = 3.0  # chosen: rms forces, within which no bound on a force lies
+
 # Fitting (`fit`).
 DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls between its jumps
 MODEL_ERROR = 0.015  # of an effect's size; LuGre friction against Coulomb's, another integrator
