@@ -69,7 +69,7 @@ class Answer(NamedTuple):
 
 def answer_to(
     rig: Rig,
-    control: str,
+    control: ControlName,
     nodes: Floats,
     gradient: Floats,
     load_factor: Floats | None = None,
