@@ -30,6 +30,7 @@ Dimension = tuple[int, int, int, int]  # powers of mass, length, time, angle
 # An angle is a dimension of its own here: a log in degrees must not pass for a bare number.
 _NONE: Final[Dimension] = (0, 0, 0, 0)
 _FORCE: Final[Dimension] = (1, 1, -2, 0)
+_TORQUE: Final[Dimension] = (1, 2, -2, 0)
 _LENGTH: Final[Dimension] = (0, 1, 0, 0)
 _TIME: Final[Dimension] = (0, 0, 1, 0)
 _ANGLE: Final[Dimension] = (0, 0, 0, 1)
@@ -40,6 +41,7 @@ _ACCELERATION: Final[Dimension] = (0, 1, -2, 0)
 _WORDS: Final[dict[Dimension, str]] = {
     _NONE: "a bare number",
     _FORCE: "a force",
+    _TORQUE: "a torque",
     _LENGTH: "a length",
     _TIME: "a time",
     _ANGLE: "an angle",
@@ -74,6 +76,14 @@ _NAMED: Final[dict[str, Unit]] = {
             **{"lbf": POUND_N, "lb": POUND_N, "ozf": POUND_N / 16.0},
             **{"kgf": GRAVITY_m_per_s2, "kp": GRAVITY_m_per_s2},
         },
+        _TORQUE: {
+            **{"Nm": 1.0, "mNm": 1e-3, "Ncm": 0.01, "kNm": 1e3, "kgfcm": 0.01 * GRAVITY_m_per_s2},
+            **{
+                "ftlbf": POUND_N * FOOT_m,
+                "inlbf": POUND_N * INCH_m,
+                "inozf": POUND_N * INCH_m / 16,
+            },
+        },
         _LENGTH: {
             **{"m": 1.0, "mm": 1e-3, "cm": 0.01, "km": 1e3},
             **{"in": INCH_m, "ft": FOOT_m},
@@ -103,11 +113,14 @@ _QUOTIENTS: Final = (
 )
 _FACTOR: Final = re.compile(r"([A-Za-z]+|1|%)(?:\^?([23]))?")
 
+_TIMES: Final = re.compile(r"(?<=[A-Za-z])[·⋅*.](?=[A-Za-z])")
+
 
 def parse_unit(text: str) -> Unit | None:
-    """Return the unit that a text like `lbf/in`, `[deg/s]` or `m/s²` means, or nothing."""
+    """Return the unit that a text like `lbf/in`, `[deg/s]`, `N·m` or `m/s²` means, or nothing."""
     plain = text.strip().strip("[]()").strip()
     plain = plain.replace("°", "deg").replace("²", "^2").replace("µ", "u").replace(" ", "")
+    plain = _TIMES.sub("", plain)
     if len(plain) > 40:
         return None
     factor, dimension = 1.0, _NONE

@@ -94,7 +94,7 @@ def _print(fitted: NominalFit) -> None:
     for doubt in fitted.doubts:
         say(f"doubtful: {doubt}")
     for key in fitted.unknown:
-        say(f"not determined: {key}; nothing in these records depends on it")
+        say(f"not determined by these records: {key}; it stays as filed")
     for number in fitted.numbers:
         if number.at_bound:
             say(f"at the end of what it may be: {number.key}")

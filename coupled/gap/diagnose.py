@@ -16,10 +16,11 @@ from coupled.errors import InputError
 from coupled.gap.checks import check_record, check_trim
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import library_of
+from coupled.gap.effects.scales import Scales, in_scale
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
-from coupled.gap.findings.healthy import Baseline
+from coupled.gap.findings.healthy import Baseline, beside_healthy
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.refuted import search_unrefuted
@@ -78,12 +79,8 @@ def _diagnose(
     healthy: Mapping[str, Record],
     search: Search,
 ) -> Diagnosis:
-    baseline = None
-    if healthy:
-        well = _diagnose(rig, healthy, control, tell, {}, search)
-        case = Case(rig, control, well.outputs)
-        baseline = Baseline.of(tuple(healthy), case, well.choice.fit)
-        rig = baseline.rig
+    baseline = _reference(rig, healthy, control, tell, search) if healthy else None
+    rig = rig if baseline is None else baseline.rig
     live = [one for one in map(live_of, records.values()) if one is not None]
     records = {file: judged_part(record, file) for file, record in records.items()}
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
@@ -114,7 +111,7 @@ def _diagnose(
         raise InputError(file, "", problem)
     every = library_of(rig, control)
     library = [effect for effect in every if effect.can_be_tried(list(records.values()), control)]
-    library = as_judged(library, readers, outputs)
+    library = in_scale(as_judged(library, readers, outputs), Scales.of(readers), rig, control)
     if readers[0].set_points:
         library = under_set_points(library, list(records.values()), control)
 
@@ -146,9 +143,12 @@ def _diagnose(
         if stage.guilty
     ]
     budget = tuple(one for one in budgets if one is not None)
+    verdict = verdict_of(choice, stages, effects, budget)
+    change = None if baseline is None else baseline.compared(list(records.values()), judged)
+    verdict, stages = beside_healthy(verdict, stages, baseline, change)
     return Diagnosis(
         control=control,
-        verdict=verdict_of(choice, stages, effects, budget),
+        verdict=verdict,
         stages=stages,
         effects=effects,
         budget=budget,
@@ -163,10 +163,20 @@ def _diagnose(
         outputs=tuple(outputs),
         choice=choice,
         baseline=baseline,
+        change=change,
         trim=trim,
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
         left_out=tuple(dict.fromkeys(words for one in live for words in one.left_out)),
     )
+
+
+def _reference(
+    rig: Rig, healthy: Mapping[str, Record], control: ControlName, tell: Tell | None, search: Search
+) -> Baseline:
+    """Return the machine of its healthy records, as what others are held against."""
+    well = _diagnose(rig, healthy, control, tell, {}, search)
+    case = Case(well.nominal, control, well.outputs)
+    return Baseline.of(well.records, case, well.choice.fit)
 
 
 def _outputs(

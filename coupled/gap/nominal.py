@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from coupled.errors import InputError
 from coupled.gap.checks import check_record
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.freed import default_keys, freed
+from coupled.gap.effects.scales import Scales
 from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
 from coupled.gap.search.case import Tell
 from coupled.gap.search.fit import Fit, fit, touched
@@ -29,7 +30,7 @@ from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
-from coupled.gap.thresholds import ALIKE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
+from coupled.gap.thresholds import ALIKE, FLOOR_SHARE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
@@ -55,6 +56,7 @@ def fit_nominal(
 
     A key is one of the control's in a rig file, as `loader.mass_kg`; without any, the usual ones of
     the stages that the records judge. The rig's `tolerance` holds half of each one's 95 % interval.
+    A number that the records do not determine stays as filed, its tolerance too.
     Raises InputError where a record is of another rig, or no record depends on a key.
     """
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
@@ -81,27 +83,88 @@ def fit_nominal(
             needs = ", ".join(lacking) or f"what judges the {asked.stage}"
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
-    _tell(tell, "fitting", 0, len(records) + 2)
-    held = fit(rig, control, outputs, effects, part="fitted")
-    _tell(tell, "fitting to all", 1, len(records) + 2)
-    whole = fit(rig, control, outputs, effects, start=held.values)
-    each = _each(rig, control, outputs, effects, whole, tell)
-    numbers = tuple(
-        _number(rig, control, key, effect, whole, each)
-        for key, effect in zip(chosen, effects, strict=True)
-    )
-    used = touched(outputs, effects)
+    shown_in = {output.stage for output in touched(outputs, effects)}
+    fits = _fitted(rig, control, outputs, effects, tell)
+    numbers = dict(zip(chosen, fits.numbers(rig, control), strict=True))
+    scales = Scales.of(readers)
+    information = fits.whole.information
+    while (worst := _least_determined(numbers, rig, control, effects, scales)) is not None:
+        # It stays as filed, and the others are fitted beside that.
+        one = numbers[worst]
+        numbers[worst] = replace(one, found=one.filed, half=None, at_bound=False)
+        effects = [effect for effect in effects if effect.name != worst]
+        fits = _fitted(rig, control, outputs, effects, tell)
+        numbers |= {one.key: one for one in fits.numbers(rig, control)}
+    held = fits.held
+    found = tuple(numbers.values())
+    used = [output for output in outputs if output.stage in shown_in]
     files = list(records)
-    known = _known(rig, control, numbers)
-    doubts = _doubts_of_servo(known, control, {one.key for one in numbers}, held.rig, used)
+    known = _known(rig, control, found)
+    fitted = {one.key for one in found if one.half is not None}
+    doubts = _doubts_of_servo(known, control, fitted, held.rig, used)
     return NominalFit(
         control,
         known,
-        numbers,
-        tuple(one for group in whole.information.items() for one in _alike(rig, control, *group)),
+        found,
+        tuple(one for group in information.items() for one in _alike(rig, control, *group)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         doubts,
     )
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """Fits of the same numbers: to every other stretch, to all, and to each record alone."""
+
+    effects: Sequence[Effect]
+    held: Fit
+    whole: Fit
+    each: Sequence[Fit]
+
+    def numbers(self, rig: Rig, control: ControlName) -> list[Number]:
+        """Return the numbers as fitted to all."""
+        return [_number(rig, control, one, self.whole, self.each) for one in self.effects]
+
+
+def _fitted(
+    rig: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    effects: Sequence[Effect],
+    tell: Tell | None,
+) -> _Fits:
+    """Return the fits of numbers to every other stretch, to all, and to each record alone."""
+    records = len({output.record for output in outputs})
+    _tell(tell, "fitting", 0, records + 2)
+    held = fit(rig, control, outputs, effects, part="fitted")
+    _tell(tell, "fitting to all", 1, records + 2)
+    whole = fit(rig, control, outputs, effects, start=held.values)
+    return _Fits(effects, held, whole, _each(rig, control, outputs, effects, whole, tell))
+
+
+def _least_determined(
+    numbers: Mapping[str, Number],
+    rig: Rig,
+    control: ControlName,
+    effects: Sequence[Effect],
+    scales: Scales | None,
+) -> str | None:
+    """Return the key of the fitted number that the records determine least; None: all are.
+
+    A number is not determined if half of its interval is more than the number, filed and found. Of
+    a number filed as 0, half of the interval is also more than `FLOOR_SHARE` of its scale in these
+    records: a change by that would be plain.
+    """
+    loose = {}
+    for effect in effects:
+        one = numbers[effect.name]
+        scale = scales.size(effect.free[0].unit(rig, control)) if scales is not None else None
+        plain = FLOOR_SHARE * scale if scale is not None and one.filed == 0.0 else 0.0
+        least = max(abs(one.filed), abs(one.found), plain)
+        width = math.inf if one.half is None else one.half / max(least, 1e-300)
+        if width > 1.0:
+            loose[effect.name] = width
+    return max(loose, key=loose.__getitem__) if loose else None
 
 
 def _doubts_of_servo(
@@ -192,7 +255,6 @@ def _each(
 def _number(
     rig: Rig,
     control: ControlName,
-    key: str,
     effect: Effect,
     whole: Fit,
     each: Sequence[Fit],
@@ -208,7 +270,7 @@ def _number(
         found = parameter.low  # the fit stays by a hair within its bounds
     filed = float(parameter.nominal(rig, control))
     known = half if math.isfinite(half) else None
-    return Number(key, filed, found, known, parameter.low, name in whole.at_bound)
+    return Number(effect.name, filed, found, known, parameter.low, name in whole.at_bound)
 
 
 def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:

@@ -80,6 +80,12 @@ SMOOTHING_LOST = 0.15  # at kinks of an input; a bench whose q̄ goes in ramps s
 HEALTHY_ALONE = 0.3  # chosen: relative scatter of a model's error where one record shows it
 HEALTHY_SIGMAS = 3.0  # chosen: of an effect's scatter there, within which it is as it was
 
+# Whether a machine changed (`changed`).
+CHANGE_CHANCE = 0.02  # of a false alarm by all features of a healthy record together
+CHANGE_SHOWN = 0.9  # probability with which the stated size of change is shown
+CHANGE_STILL = 0.1  # chosen: of the rms speed, under which there is no direction
+CHANGE_BIN = 0.02  # chosen: of a record's frames, fewer of which give no mean
+
 # What drives a machine (`drives`).
 HELD_JUMPS = 20  # chosen: fewer changes do not show that a signal comes in set points
 HELD_AT_MOST = 10  # chosen: frames between two changes, beyond which the machine paused
@@ -131,6 +137,7 @@ STIFFEST_AIR = 1e12  # frames⁴: a weight beyond which the banded equations los
 
 PLAYS = 40  # chosen: plays of a scan before an imposed motion's are fitted,
 PLAY_LEAST = 1e-5  # chosen: of the travel, from which on
+PLAYS_ALIKE = 0.1  # chosen: relative difference of two, below which one is enough
 JUMP_COUNTED = 0.2  # chosen: of a force's misfit within half a frame of a jump
 
 # Settings of the nominal rig (`case`).
@@ -143,6 +150,11 @@ SEARCHED_TO = 0.03  # chosen: down to such a step of its length
 YIELDED = 0.04  # chosen: of that, from which friction is read as yielding: 20 μm on a column
 CLOCK_s = 5e-4  # chosen: by which a recorder may stamp one channel late, or early, unnoticed
 SETTLE_FROM = 1.05  # chosen: gap from which a stage's settings are worth fitting
+
+# The scale of a machine (`scales`).
+COLUMN_FORCE_N, COLUMN_WAY = 20.0, {"m": 0.03, "rad": 0.3}  # chosen: rms of a column's, a wheel's
+OTHER_SCALE = 5.0  # chosen: times as large or small, from which starts and bounds are another's
+BOUND_SCALES = 3.0  # chosen: rms forces, within which no bound on a force lies
 
 # Fitting (`fit`).
 DIFFERENCE = 0.3  # floors by which a difference moves the residual: less falls between its jumps

@@ -14,21 +14,23 @@ Backlash lies between the imposed motion and the loader, which follows once the 
 While it is open the force is zero, and the loader moves by its own springs against its damping. A
 backlash with a contact stiffness also bends by F/stiffness.
 
-Rigid friction holds a still loader with any force up to its level, which the motion does not
-determine. It is given a presliding of 1e-4 of the travel, so that sensor noise at rest does not
-count as slip. The acceleration is the mean over a frame about the sample, since the impact at the
-end of a backlash lasts no time and a sampled force cannot contain it.
+Rigid friction holds a still loader, and one that turns, with any force up to its level, which the
+motion does not determine: the answer is an interval. It is given a presliding of 1e-4 of the
+travel, so that sensor noise at rest does not count as slip. The acceleration is the mean over a
+frame about the sample, since the impact at the end of a backlash lasts no time and a sampled force
+cannot contain it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from coupled.record.channels import ControlName
 from coupled.rig.compiled import entry, stage
@@ -48,18 +50,31 @@ from coupled.rig.springs import elastic, feel, relax
 
 Floats = NDArray[np.float64]
 RIGID = 1e-4  # of the travel, presliding of a rigid contact here
+REST_s = 0.25  # a loader that moves by less than that presliding within this time is at rest
+
+
+class Answer(NamedTuple):
+    """The reaction force in N at each frame to an imposed motion.
+
+    `jumps` marks the frames within half a frame of which a backlash closes or opens, where the
+    force jumps. At rest and within a frame of a turn rigid dry friction may hold any force from
+    `least` to `most`, N; elsewhere both are `force`.
+    """
+
+    force: Floats
+    jumps: NDArray[np.bool_]
+    least: Floats
+    most: Floats
 
 
 def answer_to(
     rig: Rig,
-    control: str,
+    control: ControlName,
     nodes: Floats,
     gradient: Floats,
     load_factor: Floats | None = None,
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return a control's reaction force at each frame to an imposed motion, N.
-
-    And whether a backlash closes or opens within half a frame of it, where the force jumps.
+) -> Answer:
+    """Return a control's reaction force to an imposed motion.
 
     `nodes` is the motion on the loader's nodes, d, `rig.substeps` for each frame and one more;
     `gradient` G_T in N/d at each frame, `load_factor` +1 in level flight. In an open backlash the
@@ -69,17 +84,39 @@ def answer_to(
     p, s = packed["parameters"].copy(), packed["state"].copy()
     frames, h = len(gradient), 1.0 / (rig.frame_rate * rig.substeps)
     level = np.ones(frames) if load_factor is None else load_factor
-    felt, mass = np.zeros((3, len(nodes))), np.zeros(frames)
+    felt, mass = np.zeros((6, len(nodes))), np.zeros(frames)
     _answer(p, s, nodes, np.stack((gradient, level)), rig.substeps, h, felt, mass)
-    # Of the substep that ends at node n: force without inertia, mean speed, whether in contact.
-    force, speed, touched = felt
+    # Of the substep that ends at node n: force without inertia, mean speed, whether in contact, by
+    # how much friction at rest may hold less and more, and the side to which it slips.
+    force, speed, touched, less, more, slips = felt
     half, last = max(1, rig.substeps // 2), len(nodes) - 1
     at = np.arange(frames) * rig.substeps
-    sampled = 0.5 * (force[np.maximum(at, 1)] + force[np.minimum(at + 1, last)])
-    before, after = np.maximum(at - half + 1, 1), np.minimum(at + half, last)
+    before, after = np.clip(at - half + 1, 1, last - 1), np.clip(at + half, 2, last)
     accelerated = (speed[after] - speed[before]) / ((after - before) * h)
-    share = 0.5 * (touched[np.maximum(at, 1)] + touched[np.minimum(at + 1, last)])
-    return sampled + share * mass * accelerated, touched[before] != touched[after]
+    share = _sampled(touched, at)
+    answer = _sampled(force, at) + share * mass * accelerated
+    turns = (slips[before] != slips[after]) | (slips[before] == 0.0)
+    still = maximum_filter1d(turns, 3)
+    still |= _at_rest(nodes[at], rig.frame_rate, RIGID * rig.controls[control].travel)
+    return Answer(
+        answer,
+        touched[before] != touched[after],
+        answer - still * share * _sampled(less, at),
+        answer + still * share * _sampled(more, at),
+    )
+
+
+def _sampled(felt: Floats, at: NDArray[np.intp]) -> Floats:
+    """Return the mean of the substeps before and after each frame."""
+    last = len(felt) - 1
+    return np.asarray(0.5 * (felt[np.maximum(at, 1)] + felt[np.minimum(at + 1, last)]))
+
+
+def _at_rest(way: Floats, rate_Hz: float, yields: float) -> NDArray[np.bool_]:
+    """Return the frames that lie in `REST_s` within which a motion in d changes by less, d."""
+    frames = 2 * max(1, round(0.5 * REST_s * rate_Hz)) + 1
+    still = maximum_filter1d(way, frames) - minimum_filter1d(way, frames) < yields
+    return np.asarray(maximum_filter1d(still, frames))
 
 
 def behind_linkage(
@@ -160,7 +197,10 @@ def _answer(
     felt: Floats,
     mass: Floats,
 ) -> None:
-    """Write force without inertia, N, speed and contact of each substep, and each frame's mass."""
+    """Write force without inertia, N, speed, contact, friction's range and slip of each substep.
+
+    And each frame's mass, kg.
+    """
     p, s = parameters[0], states[0]
     m, loader = s.modification, s.loader
     start_loader(p.loader, loader, 0.0)
@@ -189,3 +229,10 @@ def _answer(
                 felt[2, node] = 1.0
                 force = elastic(p.loader, m, loader, new) + loader.relaxed - loader.external
                 felt[0, node] = force + loader.damping * way / h + dry + breakout * sign(new)
+                if p.friction.rigid:
+                    holds = running_friction(p.friction, 0.0)
+                    felt[3, node] = holds + more_friction(p.friction, loader.load, -1.0) + dry
+                    felt[4, node] = holds + more_friction(p.friction, loader.load, 1.0) - dry
+                    slips = running_friction(p.friction, way / h)
+                    slips += more_friction(p.friction, loader.load, way / h)
+                    felt[5, node] = sign(dry) if abs(dry) >= slips else 0.0

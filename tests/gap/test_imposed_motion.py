@@ -70,3 +70,14 @@ def test_a_damper_without_mass_and_spring_is_as_well_a_gauge_that_is_off() -> No
     assert {"viscous_damping", "force_scale", "deflection_scale"} <= set(group)
     fitted = fit_nominal(damper_rig(damping=1000.0), {"r": record}, ["loader.damping_N_s_per_m"])
     assert fitted.numbers[0].found == pytest.approx(2000.0, rel=0.005)
+
+
+@pytest.mark.parametrize("damping", [2000.0, 900.0])
+def test_a_fit_finds_the_play_of_a_damper(damping: float) -> None:
+    record = damper(seconds=8.0, damping=damping)
+    fitted = fit_nominal(damper_rig(), {"r": record}, ["loader.play_m", "loader.damping_N_s_per_m"])
+    play, found = fitted.numbers
+    assert play.interval is not None
+    assert play.found == pytest.approx(1.5e-3, rel=0.05)
+    assert found.found == pytest.approx(damping, rel=0.02)
+    assert fitted.unknown == ()

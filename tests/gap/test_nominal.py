@@ -73,6 +73,57 @@ def test_motion_at_one_speed_does_not_tell_friction_from_damping() -> None:
     assert numbers["loader.mass_kg"] == pytest.approx(MASS_kg, rel=0.03)
 
 
+def imposed_with_rests(rest_N: float) -> Record:
+    """Return a damper's record with Coulomb friction, moved and at rest by turns.
+
+    At rest its friction holds `rest_N`.
+    """
+    rng = np.random.default_rng(5)
+    time = np.arange(round(24.0 * RATE_Hz)) / RATE_Hz
+    moves = time % 8.0 < 4.0
+    place = np.where(moves, 0.05 * np.sin(np.pi * time) * np.sin(1.5 * np.pi * time), 0.0)
+    speed = np.gradient(place) * RATE_Hz
+    rubbing = np.where(moves, 5.0 * np.sign(speed), rest_N)
+    pull = MASS_kg * np.gradient(speed) * RATE_Hz + DAMPING * speed + rubbing
+    noisy = (pull, 0.02), (place, 1e-7)
+    pull, place = (one + rng.normal(0.0, rms, len(time)) for one, rms in noisy)
+    names = ("time_s", "column_force_N", "column_deflection_m")
+    return Record(names, np.column_stack((time, pull, place)))
+
+
+@pytest.mark.parametrize("rest_N", [0.0, 1.5, -4.0])
+def test_a_rest_does_not_count_as_sliding(rest_N: float) -> None:
+    keys = ["loader.friction_N", "loader.damping_N_s_per_m"]
+    known = {"mass_kg": MASS_kg, "servo_frequency_Hz": 0.0}
+    start = slide().changed({f"controls.column.loader.{key}": v for key, v in known.items()})
+    fitted = fit_nominal(start, {"r": imposed_with_rests(rest_N)}, keys)
+    assert found(fitted) == pytest.approx(dict(zip(keys, (5.0, DAMPING), strict=True)), rel=0.03)
+
+
+def test_a_number_that_the_records_do_not_determine_stays_as_filed(tmp_path: Path) -> None:
+    """A mass of 8 kg in motion whose inertia is a ten-thousandth of the force."""
+    rng = np.random.default_rng(6)
+    time = np.arange(round(50.0 * RATE_Hz)) / RATE_Hz
+    rate = 2.0 * np.pi * 0.02
+    place, speed = 0.2 * np.sin(rate * time), 0.2 * rate * np.cos(rate * time)
+    pull = 300.0 * speed - MASS_kg * rate**2 * place + rng.normal(0.0, 10.0, len(time))
+    names = ("time_s", "column_force_N", "column_deflection_m")
+    record = Record(names, np.column_stack((time, pull, place + rng.normal(0, 1e-6, len(time)))))
+    absent = {"friction_N": 0.0, "servo_frequency_Hz": 0.0}
+    start = slide().changed({f"controls.column.loader.{key}": v for key, v in absent.items()})
+    fitted = fit_nominal(start, {"r": record}, KEYS[:2])
+    assert fitted.unknown == ("loader.mass_kg",)
+    mass, damping = fitted.numbers
+    assert (mass.found, mass.half) == (10.0, None)
+    assert damping.found == pytest.approx(300.0, rel=0.02)
+    assert set(fitted.rig.controls["column"].tolerance) == {"loader.damping_N_s_per_m"}
+    write_record(record, tmp_path / "r.csv")
+    (tmp_path / "start.toml").write_text(rig_text(start))
+    words = "fit r.csv --rig start.toml --free loader.mass_kg --free loader.damping_N_s_per_m"
+    said = coupled(tmp_path, *words.split()).stdout
+    assert "not determined by these records: loader.mass_kg; it stays as filed" in said
+
+
 @pytest.mark.slow
 def test_the_numbers_of_a_loader_and_a_servo_are_found_and_kept_for_a_diagnosis(
     tmp_path: Path,

@@ -7,7 +7,7 @@ import pytest
 
 from coupled.rig.imposed import answer_to
 from coupled.rig.nodes import on_nodes
-from tests.support.rigs import K_REPORT, bench, push
+from tests.support.rigs import BENCH, K_REPORT, bench, push
 
 RATE_Hz, FRAMES, G = 100.0, 400, 560.0
 TIME = np.arange(FRAMES) / RATE_Hz
@@ -19,7 +19,7 @@ MIDDLE = slice(5, -5)  # the acceleration's mean has one side alone at the ends
 
 def answered(changes: dict[str, float], way: np.ndarray = WAY) -> np.ndarray:
     rig = bench(changes)
-    return answer_to(rig, "column", on_nodes(rig, way), np.full(len(way), G))[0]
+    return answer_to(rig, "column", on_nodes(rig, way), np.full(len(way), G)).force
 
 
 def test_mass_spring_and_damper_answer_as_their_equation_says() -> None:
@@ -40,7 +40,7 @@ def test_in_its_play_a_damper_is_not_felt() -> None:
     play = 0.02
     damper = {"mass_kg": 1e-3, "basic_gradient_N_per_m": 0.0, "play_m": play}
     rig = bench({**damper, "controls.column.schedule.total_gradient_N_per_m": [0.0, 0.0]})
-    found = answer_to(rig, "column", on_nodes(rig, WAY), np.zeros(FRAMES))[0]
+    found = answer_to(rig, "column", on_nodes(rig, WAY), np.zeros(FRAMES)).force
     turned = np.maximum.accumulate(np.where(np.abs(np.diff(np.sign(SPEED), prepend=1)) > 1, 1, 0))
     after_top = (0.25 * 2 * np.pi / TURN < TIME) & (0.75 * 2 * np.pi / TURN > TIME)
     taken_up = SIZE - play > WAY
@@ -58,6 +58,34 @@ def test_the_force_of_an_imposed_motion_is_the_force_that_made_it() -> None:
 
     fine = push(rig, pull, 4.0)  # δc at 2 kHz
     nodes = fine[: (FRAMES - 1) * rig.substeps + 1]
-    found = answer_to(rig, "column", nodes, np.full(FRAMES, G))[0]
+    found = answer_to(rig, "column", nodes, np.full(FRAMES, G)).force
     assert found[MIDDLE] == pytest.approx(pull(TIME)[MIDDLE], abs=0.8)
     assert np.std(found[MIDDLE] - pull(TIME)[MIDDLE]) < 0.2
+
+
+def test_at_rest_friction_holds_any_force_up_to_its_level() -> None:
+    """Two seconds of a sine, then a rest at its end: there the force lies within ±6 N of 0."""
+    stop = FRAMES // 2
+    way = np.concatenate((WAY[:stop], np.full(FRAMES - stop, WAY[stop])))
+    rig = bench({"friction_N": 6.0, "mass_kg": 1e-3, "basic_gradient_N_per_m": 0.0})
+    answer = answer_to(rig, "column", on_nodes(rig, way), np.zeros(FRAMES))
+    rest, moving = slice(stop + 20, -5), np.abs(SPEED[: stop - 5]) > 0.3 * SPEED.max()
+    assert answer.least[rest] == pytest.approx(-6.0, abs=1e-6)
+    assert answer.most[rest] == pytest.approx(6.0, abs=1e-6)
+    least, most = answer.least[: stop - 5], answer.most[: stop - 5]
+    assert moving.sum() > 150
+    assert most[moving] - least[moving] == pytest.approx(0.0, abs=1e-9)
+    turning = np.flatnonzero(np.diff(np.sign(SPEED[: stop - 5])))
+    assert most[turning] - least[turning] == pytest.approx(12.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("frame_rate_Hz", [250.0, 500.0, 1000.0, 2000.0])
+def test_a_motion_is_answered_at_any_number_of_steps_a_frame(frame_rate_Hz: float) -> None:
+    time = np.arange(round(2.0 * frame_rate_Hz)) / frame_rate_Hz
+    way = SIZE * np.sin(TURN * time)
+    numbers = {"mass_kg": 4.0, "basic_gradient_N_per_m": 0.0}
+    rig = bench(numbers, {**BENCH, "frame_rate_Hz": frame_rate_Hz})
+    found = answer_to(rig, "column", on_nodes(rig, way), np.zeros(len(way))).force
+    wanted = -4.0 * TURN**2 * way + 75.0 * TURN * SIZE * np.cos(TURN * time)
+    assert np.isfinite(found).all()
+    assert found[9:-9] == pytest.approx(wanted[9:-9], abs=0.02 * np.ptp(wanted))

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from coupled.arguments import public
+from coupled.gap.findings.changed import Comparison
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
@@ -43,6 +44,7 @@ class Diagnosis(Findings):
     outputs: tuple[Output, ...] = field(repr=False, compare=False)
     choice: Choice = field(repr=False, compare=False)
     baseline: Baseline | None = field(default=None, repr=False, compare=False)
+    change: Comparison | None = field(default=None, repr=False, compare=False)
     # Channels whose logs were filtered, and the source of their noise floors.
     filtered: Mapping[str, str] = field(default_factory=dict)
     # What of live records is not judged, or judged with changes; a sentence each.
@@ -110,7 +112,10 @@ class Diagnosis(Findings):
         said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
         said += f" {CIRCLED}" if self.choice.circled else ""
         held = "" if self.baseline is None else self.baseline.words
-        return " ".join(words for words in (self.trim, held, said, *self.left_out) if words)
+        changed = "" if self.change is None else self.change.words
+        return " ".join(
+            words for words in (self.trim, held, changed, said, *self.left_out) if words
+        )
 
     @public
     def as_dict(self, with_power: bool = False) -> dict[str, Any]:
@@ -136,7 +141,8 @@ class Diagnosis(Findings):
         if self.trim:
             found["trim"] = self.trim
         if self.baseline is not None:
-            found["healthy"] = self.baseline.as_dict()
+            compared = {} if self.change is None else self.change.as_dict()
+            found["healthy"] = self.baseline.as_dict() | compared
         if self.closed_loop is not None:
             found["closed_loop"] = {again.channel: again.as_dict() for again in self.closed_loop}
         if self.in_flight is not None:

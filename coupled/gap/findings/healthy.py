@@ -7,6 +7,8 @@ the model error raises a stage's floor above a tenth of the stage's motion, the 
 and the rig should first be fitted to the healthy records. An effect of the healthy machine may
 imitate a model error whose size differs between records; the scatter of its parameter is therefore
 the parameter's tolerance.
+
+Whether the machine changed at all is tested without a model (`changed`).
 """
 
 from __future__ import annotations
@@ -20,11 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.display import unit_in
+from coupled.gap.effects.effect import Effect
+from coupled.gap.findings.changed import Comparison, compare
+from coupled.gap.findings.result import StageResult, Verdict
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
 from coupled.gap.signals.output import Hides, Output, Part
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
+from coupled.record.channels import ControlName
+from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
@@ -139,24 +146,45 @@ def _by_stretch(output: Output, left: Floats) -> Floats:
 class Baseline:
     """The healthy machine: its rig, the effects found in it, and the model errors.
 
-    `files` are the records, `effects` the effects found in them, `errors` by channel.
+    `records` are those by their files, with the `outputs` of the rig as filed, `nominal`. `had` are
+    the effects found in them, `errors` the model's by channel, `stages` the stage of each channel.
     """
 
-    files: tuple[str, ...]
+    records: Mapping[str, Record]
+    outputs: Sequence[Output]
+    control: ControlName
+    nominal: Rig
     rig: Rig
-    effects: tuple[str, ...]
+    had: tuple[Effect, ...]
     errors: Mapping[str, ModelError]
+    stages: Mapping[str, str]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The names of the records' files."""
+        return tuple(self.records)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The names of the effects found in the healthy records."""
+        return tuple(effect.name for effect in self.had)
 
     @classmethod
-    def of(cls, files: Sequence[str], case: Case, found: Fit) -> Baseline:
+    def of(cls, records: Mapping[str, Record], case: Case, found: Fit) -> Baseline:
         """Return the reference from records of the healthy machine and the fit to them."""
         wide = {**found.rig.controls[case.control].tolerance, **tolerances(case, found)}
         rig = found.rig.changed({f"controls.{case.control}.tolerance": wide})
-        effects = tuple(effect.name for effect in found.effects)
         names = dict.fromkeys(output.channel for output in case.outputs)
         each = {name: [one for one in case.outputs if one.channel == name] for name in names}
         errors = {name: ModelError.of(ours, rig) for name, ours in each.items()}
-        return cls(tuple(files), rig, effects, errors)
+        stages = {output.channel: output.stage for output in case.outputs}
+        given = (records, case.outputs, case.control, case.nominal)
+        return cls(*given, rig, found.effects, errors, stages)
+
+    def compared(self, records: Sequence[Record], outputs: Sequence[Output]) -> Comparison:
+        """Return records, with their outputs, tested against the healthy ones."""
+        well = (list(self.records.values()), self.outputs)
+        return compare(self.nominal, self.control, well, (records, outputs))
 
     def raised(self, outputs: Sequence[Output]) -> list[Output]:
         """Return outputs with the model error in their noise floors, where it is known."""
@@ -169,6 +197,12 @@ class Baseline:
     def missed(self) -> dict[str, ModelError]:
         """The channels in which the reference misses the healthy records by more than noise."""
         return {name: one for name, one in self.errors.items() if one.misses}
+
+    @property
+    def assumed(self) -> frozenset[str]:
+        """The stages in which the healthy records widen what counts as noise, or a tolerance."""
+        wide = {effect.stage for effect in self.had}
+        return frozenset(wide | {self.stages[name] for name in self.missed})
 
     @property
     def words(self) -> str:
@@ -196,3 +230,28 @@ class Baseline:
             for name, one in self.errors.items()
         }
         return {"records": list(self.files), "effects": list(self.effects), "errors": errors}
+
+
+def beside_healthy(
+    verdict: Verdict,
+    stages: tuple[StageResult, ...],
+    baseline: Baseline | None,
+    change: Comparison | None,
+) -> tuple[Verdict, tuple[StageResult, ...]]:
+    """Return the verdict and the stages with what a comparison with healthy records shows.
+
+    A stage that changed without an effect for it is faulty. A stage whose floor hides a gap is
+    judged by the comparison instead. Where no change of a tenth would have been shown, by the
+    comparison or by noise, no verdict is given.
+    """
+    if verdict not in ("no_gap", "ambiguous") or any(stage.guilty for stage in stages):
+        return verdict, stages
+    if baseline is None or change is None:
+        return verdict, stages
+    if change.changed:
+        faulty = set(change.stages[:1])
+        known = [replace(one, guilty=one.guilty or one.name in faulty) for one in stages]
+        return "unexplained", tuple(known)
+    hidden = {stage.name for stage in stages if stage.hidden is not None}
+    open_ones = (hidden | baseline.assumed) & change.blind | (hidden - change.shown.keys())
+    return "ambiguous" if open_ones else "no_gap", stages

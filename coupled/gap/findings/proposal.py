@@ -121,12 +121,15 @@ def _gain(
 def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:
     """Yield possible tests: forces up to the record's largest, at its q̄ and at others."""
     most = float(np.max(np.abs(record[channel(control, "force")])))
+    if most == 0.0:
+        return
+    written = f"{most:.0f}" if most >= 10.0 else f"{most:.2g}"
     rate = nominal.frame_rate
     time = np.arange(round(TEST_s * rate)) / rate
     settings = _pressures(nominal, record, control, len(time))
     for text, shape in _shapes(time):
         for where, pressure, rig in settings:
-            text_of = f"{text} of ±{most:.0f} N for {TEST_s:g} s {where}"
+            text_of = f"{text} of ±{written} N for {TEST_s:g} s {where}"
             yield Push(text_of, most * shape, pressure, rig)
 
 

@@ -30,7 +30,7 @@ class StageResult:
     `settled` is the gap with fitted nuisance parameters, `left` that with the effects found,
     `limit` the largest gap of noise alone. `shown_in` are the stages in which a fault of this one
     shows, if it has no residual of its own. `hidden`: it is not judged, since its noise floor
-    could hide a gap.
+    could hide a gap; it is `guilty` only if it changed since the healthy records.
     """
 
     name: str
@@ -82,6 +82,7 @@ class StageResult:
         if self.gap is None:
             found: dict[str, Any] = {"judged": False, "missing": list(self.missing)}
             found |= {"why": self.why} if self.why else {}
+            found |= {"guilty": True} if self.guilty else {}
             return found | ({} if self.hidden is None else {"floor_share": self.hidden.share})
         found = {"gap": self.gap}
         numbers = {"settled": self.settled, "limit": self.limit, "left": self.left}

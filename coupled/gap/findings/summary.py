@@ -14,7 +14,7 @@ from coupled.gap.findings.result import EffectResult, Findings, ParameterEstimat
 from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
-from coupled.gap.thresholds import FREE_LEAST
+from coupled.gap.thresholds import CERTAIN, FREE_LEAST
 
 OF_SIGNAL = {
     "computed": "the deflection",
@@ -55,6 +55,8 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
     return " ".join(said)
 
 
+MOST_CHANGE = 100.0  # % a minute, beyond which a rate is no drift of a machine
+FAST = "changes by more than its own size within a minute"
 NOISE = "noise"
 MISFIT = "no more than the model error of the healthy machine"
 
@@ -102,15 +104,16 @@ def _what(found: Findings, floor: str) -> str:
     if hidden and not found.guilty:
         why = "; ".join(f"the {stage.name} is not judged, as {stage.why}" for stage in hidden)
         return f"Whether the {found.control} has a gap cannot be decided: {why}."
-    budgets = {one.stage: one for one in found.budget}
-    if found.verdict == "unexplained":
-        named = "; ".join(_effect(effect) for effect in found.effects)
-        also = f" Found nevertheless: {named}." if named else ""
+    if found.verdict == "ambiguous" and not found.guilty:
         return (
-            f"A gap in the {', '.join(found.guilty)} that no effect of the library explains.{also}"
+            f"Whether the {found.control} has a gap cannot be said: the rig does not explain the"
+            " healthy records, and their scatter shows no change by a tenth."
         )
+    budgets = {one.stage: one for one in found.budget}
     stages = [found.stage(name) for name in found.guilty]
     acting = {stage.name: _acting(found, stage, budgets.get(stage.name)) for stage in stages}
+    if not any(acting.values()) and found.verdict == "unexplained":
+        return f"A gap in the {', '.join(found.guilty)} that no effect of the library explains."
     return " ".join(
         _explained(acting[stage.name], stage, budgets.get(stage.name), floor)
         for stage in sorted(stages, key=lambda one: not acting[one.name])
@@ -139,6 +142,10 @@ def _explained(
         for e in acting
     ]
     said = f"{_capital(' and '.join(shares))} of the {stage.name}'s gap"
+    over = stage.left is not None and stage.limit is not None and stage.left > stage.limit
+    if over and not stage.unexplained:
+        left = f"{_per_cent(budget.remains)} remains, {stage.left:.3g} floors"
+        return f"{said}; {left}, as the error of an effect's own physics may leave."
     if not stage.unexplained or stage.remains is None:
         return f"{said}; what remains is {floor}."
     near = stage.remains.reversals
@@ -231,15 +238,19 @@ def in_time(effect: EffectResult) -> str:
         p = effect.parameters[0]
         filed = p.filed or 0.0
         said.append(f"then {figure(filed + course.then * (p.found - filed))} {p.unit}".rstrip())
-    if rate is not None:
-        share = rate.times(60.0)
+    share = None if rate is None else rate.times(60.0)
+    if share is not None and share.low < 0.0 < share.high:
+        share = None  # the records do not show whether it grows or shrinks
+    if share is not None:
         first = effect.parameters[0]
         unit = " of them" if course.kind == "events" else f" {first.unit}".rstrip()
         if course.kind != "events" and (first.relative or first.name == "per_s"):
             share, unit = share.times(100.0), " %"
+            if abs(share.value) > MOST_CHANGE:
+                return f"{_capital(plain(effect.name))}: {', '.join([*said, FAST])}."
         ends = f"{share.low:.3g} to {share.high:.3g}"
         said.append(f"at {share.value:.3g}{unit} a minute ({ends})")
-    return f"{_capital(plain(effect.name))}: {', '.join(said)}."
+    return f"{_capital(plain(effect.name))}: {', '.join(said)}." if said else ""
 
 
 def _line(channel: str, line: SeenLine) -> str:
@@ -282,8 +293,13 @@ def _sure(found: Findings) -> str:
         groups = [[plain(name) for name in group] for group in found.rivals]
         pairs = "; ".join(f"{first} from {' and '.join(rest)}" for first, *rest in groups)
         return f"The record does not distinguish {pairs}."
-    if found.verdict == "unexplained" or not found.effects:
+    if not found.effects:
         return ""
+    if found.verdict == "unexplained":
+        most = max(effect.probability for effect in found.effects)
+        if most < CERTAIN:
+            return f"No effect is certain: their probability is {most:.2f} at most."
+        return "The effects that are certain hold less than half of the gap."
     return f"Probability {min(effect.probability for effect in found.effects):.2f}."
 
 

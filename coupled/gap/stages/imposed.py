@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import with_error
 from coupled.gap.signals.output import Floats, Output, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS
+from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS, PLAYS_ALIKE
 from coupled.record.channels import ControlName
 from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
@@ -62,13 +62,27 @@ class Imposed:
 
         def predicted(rig: Rig) -> Floats:
             data, true = rig.controls[reading.control], at_loader(rig)
-            force, jumps = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
+            answer = answer_to(rig, reading.control, true, self._gradient, self._load(rig))
             late_s = data.sensing.force_stamp - data.loader.delay
-            read = data.sensing.force_scale * force + data.sensing.force_zero
-            read = stamped(read, late_s * rig.frame_rate)
-            return self._within_jumps(read, jumps) if jumps.any() else read
+
+            def read(force: Floats) -> Floats:
+                gauged = data.sensing.force_scale * force + data.sensing.force_zero
+                return stamped(gauged, late_s * rig.frame_rate)
+
+            force = read(answer.force)
+            if (answer.most > answer.least).any():
+                force = self._within_rests(force, read(answer.least), read(answer.most))
+            return self._within_jumps(force, answer.jumps) if answer.jumps.any() else force
 
         return predicted
+
+    def _within_rests(self, predicted: Floats, least: Floats, most: Floats) -> Floats:
+        """Return a prediction that at rest is the force measured, if friction can hold it.
+
+        Beyond its noise: what friction cannot hold is a misfit.
+        """
+        held = np.clip(self._force.smooth, np.minimum(least, most), np.maximum(least, most))
+        return np.where(most != least, held, predicted)
 
     def _within_jumps(self, predicted: Floats, jumps: NDArray[np.bool_]) -> Floats:
         """Return a prediction with a small weight where the force jumps within a frame.
@@ -110,18 +124,36 @@ def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
 def _plays(
     number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
-    """Return the backlash with the least residual of the force, by two scans, as a fit's start.
+    """Return backlashes with the least residual of the force, as starts of a fit, by two scans each.
 
-    The cost has local minima, since the jumps of a backlash move from sample to sample.
+    The cost has local minima, since the jumps of a backlash move from sample to sample. The force
+    is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown
+    damping the prediction may be far off.
     """
     ours = [output for output in outputs if output.stage == "loader"]
     key = dotted(number.key_on(control), control)
     filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
 
-    def left(play: float) -> float:
+    @cache
+    def left(play: float) -> tuple[float, float]:
         other = rig.changed({key: number.entered(filed, play)})
-        return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
+        each = [(one.measured / one.floor, one.residual(other, wide=True)) for one in ours]
+        as_filed = sum(float(np.sum(misfit**2)) for _, misfit in each)
+        scaled = sum(_beside_factor(seen, seen - misfit) for seen, misfit in each)
+        return as_filed, scaled
 
-    best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
-    best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
-    return [{number.name: best}]
+    found = []
+    for i in range(2):
+        rough = np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist()
+        best = min(rough, key=lambda play: left(play)[i])
+        fine = (best * np.linspace(0.75, 1.3, PLAYS)).tolist()
+        found.append(min(fine, key=lambda play: left(play)[i]))
+    alike = abs(found[1] - found[0]) < PLAYS_ALIKE * found[0]
+    return [{number.name: play} for play in found[: 1 if alike else 2]]
+
+
+def _beside_factor(seen: Floats, predicted: Floats) -> float:
+    """Return the sum of squares that any positive factor and offset of a prediction leave."""
+    about, moves = seen - seen.mean(), predicted - predicted.mean()
+    power, shared = float(moves @ moves), float(moves @ about)
+    return float(about @ about) - (shared**2 / power if min(power, shared) > 0.0 else 0.0)

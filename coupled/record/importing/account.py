@@ -36,6 +36,11 @@ class ChannelAccount:
     doubts: tuple[str, ...]
     filled_cells: int
 
+    @classmethod
+    def constant(cls, value: float) -> ChannelAccount:
+        """Return the account of a channel that no log holds."""
+        return cls(f"value {value:g}", value, value, abs(value), 0.0, (), 0)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON."""
         table = asdict(self)

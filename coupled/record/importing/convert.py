@@ -23,6 +23,7 @@ from coupled.record.importing.mapping import (
     LogMap,
     as_table,
     factor_of,
+    own_unit,
     read_map,
 )
 from coupled.record.importing.reading import Log
@@ -53,6 +54,9 @@ def import_log(
         map_file = files[0]
     else:
         log_map = read_map(map_file)
+    whole_map, constants = log_map, _constants(log_map, map_file)
+    read = {name: one for name, one in log_map.channels.items() if name not in constants}
+    log_map = log_map.model_copy(update={"channels": read})
     logs = read_logs(files, log_map, map_file)
     main = next(iter(logs.values()))
     rate = rig.frame_rate if rig is not None else None
@@ -80,6 +84,8 @@ def import_log(
         if logged[name].size < 2:
             raise InputError(log.file, channel.source, "has fewer than two numbers in this span")
     judged = judge(record, logged, rig, main.file)
+    record |= {name: np.full(grid.frames, value) for name, value in constants.items()}
+    names = [name for name in CHANNELS if name in record]
     channels = {
         name: ChannelAccount(
             source=log_map.channels[name].source,
@@ -92,13 +98,14 @@ def import_log(
         )
         for name, found in judged.items()
     }
+    channels |= {name: ChannelAccount.constant(value) for name, value in constants.items()}
     account = ImportAccount(
         grid.account, channels, _unmapped(logs, log_map, map_file), tuple(warnings)
     )
     manifest = {
         "imported_from": files[0].name if len(files) == 1 else [path.name for path in files],
         "inputs_sha256": {path.name: sha256(path) for path in inputs},
-        "map": as_table(log_map),
+        "map": as_table(whole_map),
         "channels": [TIME, *names],
         "rows": grid.frames,
         "rig": rig.model_dump() if rig is not None else None,
@@ -108,8 +115,19 @@ def import_log(
             **{name: version(name) for name in ("coupled", "numpy", "scipy", "polars")},
         },
     }
-    data = np.column_stack([grid.frame_time_s, *record.values()])
+    data = np.column_stack([grid.frame_time_s, *(record[name] for name in names)])
     return Record((TIME, *names), data, manifest), account
+
+
+def _constants(log_map: LogMap, map_file: Path) -> dict[str, float]:
+    """Return the channels that no log holds, each in the unit that it ends in."""
+    return {
+        name: one.sign
+        * factor_of(name, one.unit or own_unit(name), map_file, one.radius)
+        * (one.scale * one.value + one.offset)
+        for name, one in log_map.channels.items()
+        if one.value is not None
+    }
 
 
 def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list[str]) -> Floats:
@@ -119,7 +137,7 @@ def _in_si(log: Log, name: str, channel: Channel, map_file: Path, warnings: list
     stated = log.units.get(channel.source, "")
     if not channel.unit and not stated:
         raise InputError(map_file, f"{key}.unit", "is missing; the log states none")
-    factor = factor_of(name, channel.unit or stated, map_file)
+    factor = factor_of(name, channel.unit or stated, map_file, channel.radius)
     if channel.unit and stated and parse_unit(stated) != parse_unit(channel.unit):
         warnings.append(f"{name}: the map says {channel.unit}, the log itself {stated}")
     si = channel.sign * factor * (channel.scale * values + channel.offset)

@@ -1,8 +1,9 @@
 """The map of a log: the column, unit, sign and time of each channel.
 
 A channel of the record is sign · unit · (scale · raw + offset), with `offset` in the log's unit; a
-sensor's delay `delay_s` is removed. With several logs, a channel names its own, and each log has
-its own stamps, all from one clock.
+torque is a force at a radius, and a channel may be a constant. A sensor's delay `delay_s` is
+removed. With several logs, a channel names its own, and each log has its own stamps, all from one
+clock.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ LOAD_FACTOR = "load_factor"
 class Layout(Section):
     """The layout of the log's file; `format` is by default that of the file's extension."""
 
-    format: Literal["csv", "parquet", "mat", "hdf5", "mdf", "tdms", "mcap", "ulog"] | None = None
+    format: (
+        Literal["csv", "parquet", "mat", "hdf5", "mdf", "tdms", "mcap", "ulog", "json"] | None
+    ) = None
     delimiter: str = quantity("", ",", min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."
     comment: str = ""
@@ -92,15 +95,17 @@ class OtherClock(Stamped):
 
 
 class Channel(Section):
-    """One channel of the record, from one column of a log."""
+    """One channel of the record, from one column of a log, or of one `value` throughout."""
 
-    source: str = named("from", min_length=1)
+    source: str = named("from", "")
+    value: float | None = None
     log: str = ""
     element: Annotated[int | str | None, BeforeValidator(_one_element)] = None
     sign_bit: int | None = quantity("", None, ge=1, le=52)
     wraps_at: float | None = quantity("", None, gt=0, le=2.0**53)
     unwrap: bool | None = None
     unit: str = ""
+    radius: float | None = quantity("m", None, gt=0, le=100)
     sign: Annotated[Literal[1, -1], BeforeValidator(_no_bool)] = 1
     scale: float = 1.0
     offset: float = 0.0
@@ -183,8 +188,30 @@ def _faults(found: LogMap, path: Path) -> list[InputError]:
             faults.append(InputError(path, f"channels.{name}.unwrap", problem))
         with collected(faults):
             if channel.unit:
-                factor_of(name, channel.unit, path)
+                factor_of(name, channel.unit, path, channel.radius)
+        with collected(faults):
+            _check_source(name, channel, path)
+    if all(channel.value is not None for channel in found.channels.values()):
+        problem = "are all constant: at least one needs from, the column that it is read from"
+        faults.append(InputError(path, "channels", problem))
     return faults
+
+
+def _check_source(name: str, channel: Channel, path: Path) -> None:
+    """Refuse a channel that is neither read from a column nor a constant, or that is both."""
+    key = f"channels.{name}"
+    if channel.value is None:
+        if not channel.source:
+            problem = "is missing: the column of the log; or give value, where it is constant"
+            raise InputError(path, f"{key}.from", problem)
+        return
+    if channel.source:
+        problem = "and from exclude each other: a constant, or a column"
+        raise InputError(path, f"{key}.value", problem)
+    for other in ("log", "element", "sign_bit", "wraps_at", "unwrap", "delay", "longest_gap"):
+        if getattr(channel, other):
+            keys = {field: name for name, field in file_keys(Channel, "m").items()}
+            raise InputError(path, f"{key}.{keys[other]}", "goes with from, not with value")
 
 
 def _check_clock(clock: Clock, path: Path) -> None:
@@ -253,12 +280,23 @@ def known_unit(text: str, file: object, key: str) -> Unit:
     return unit
 
 
-def factor_of(channel: str, text: str, file: object) -> float:
-    """Return the factor from a unit to that of a channel of the record."""
+def factor_of(channel: str, text: str, file: object, radius_m: float | None = None) -> float:
+    """Return the factor from a unit to that of a channel of the record.
+
+    A torque about an axis is a force at a radius, in m.
+    """
     key = f"channels.{channel}.unit"
     given, own = known_unit(text, file, key), _own(own_unit(channel))
     if channel == LOAD_FACTOR and given.dimension == _own("1").dimension:
         return given.factor
+    if given.dimension == _own("Nm").dimension and own.dimension == _own("N").dimension:
+        if radius_m is None:
+            problem = f"{text!r} is a torque: give radius_m, at which the force acts"
+            raise InputError(file, key, problem)
+        return given.factor / radius_m
+    if radius_m is not None:
+        problem = f"goes with a force that is logged as a torque, as Nm; {text!r} is {given.word}"
+        raise InputError(file, f"channels.{channel}.radius_m", problem)
     if given.dimension != own.dimension:
         fit = ", ".join(units_like(own))
         raise InputError(file, key, f"{text!r} is {given.word}, {channel} {own.word}: {fit}")

@@ -22,6 +22,7 @@ from coupled.files import read_bytes
 from coupled.record.csvfile import check_numeric, first_line, numbers
 from coupled.record.importing.cells import Place, element, labels_of, moments, signed
 from coupled.record.importing.formats.columns import Found
+from coupled.record.importing.jsonlog import read_json
 from coupled.record.importing.mapping import Channel, Layout, Stamped, known_unit
 from coupled.record.importing.separate import read_parquet_separately, read_separately
 from coupled.units import parse_unit
@@ -33,6 +34,7 @@ FORMATS = {
     **{".parquet": "parquet", ".mat": "mat", ".h5": "hdf5", ".hdf5": "hdf5", ".hdf": "hdf5"},
     **{".mf4": "mdf", ".mdf": "mdf", ".tdms": "tdms", ".mcap": "mcap"},
     **dict.fromkeys((".ulg", ".ulog"), "ulog"),
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), "json"),
 }
 LATEST_ns = 1e19  # a clock in ns since 1970 is larger than any quantity of a record
 
@@ -192,6 +194,9 @@ def read_log(path: Path, layout: Layout) -> Log:
     content = read_bytes(path)
     if kind == "csv":
         return _read_csv(path, content, layout)
+    if kind == "json":
+        columns, lines = read_json(path, _text(path, content, layout.encoding))
+        return Log(path, columns, lines=np.array(lines, dtype=np.int64), decimal=layout.decimal)
     if kind == "parquet":
         columns, notes = read_parquet_separately(path, content)
         return Log(path, columns, notes=notes)

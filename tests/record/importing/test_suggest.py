@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from scipy import io as scipy_io
 
 from coupled.errors import InputError
 from coupled.record.channels import record_channels
@@ -47,6 +48,7 @@ def proposed(path: Path, rig: str = "") -> tuple[Proposal, dict[str, Any]]:
         ("timestamp", "time", ""),
         ("Time (ms)", "time", "ms"),
         ("torque_Nm", "", ""),
+        ("cpuload.load", "", ""),
         ("Mode", "", ""),
         ("hand grip", "column_deflection_m", ""),
     ],
@@ -199,6 +201,28 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path: Path) -> None:
         (tmp_path / "log.csv").write_text(content)
         with pytest.raises(InputError, match=r"log.csv"):
             propose([tmp_path / "log.csv"])
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.mat"])
+def test_where_no_name_says_anything_all_is_asked(tmp_path: Path, name: str) -> None:
+    """A file without a header, and a MATLAB file of a, b and c."""
+    time = np.arange(60) / 50.0
+    columns = {"a": np.sin(time), "b": 40.0 * np.cos(time), "c": np.zeros(60)}
+    if name.endswith(".csv"):
+        rows = zip(*columns.values(), strict=True)
+        (tmp_path / name).write_text("\n".join(",".join(map(str, row)) for row in rows))
+    else:
+        scipy_io.savemat(tmp_path / name, columns)
+    proposal, table = proposed(tmp_path / name, "report-column")
+    force, place = (table["channels"][f"column_{q}"] for q in ("force_N", "computed_m"))
+    assert force == place == {"from": "?", "unit": "?"}
+    asked = next(one for one in proposal.questions if "which column is the force?" in one)
+    assert "(15.2 to 40)" in asked
+    assert '"c"' not in asked and '"3"' not in asked
+    assert any(one.startswith("clock.rate_Hz") for one in proposal.questions)
+    with pytest.raises(InputError):
+        (tmp_path / "map.toml").write_text(proposal.text)
+        import_log(tmp_path / name, tmp_path / "map.toml")
 
 
 def test_the_command_writes_a_map_and_asks(tmp_path: Path) -> None:

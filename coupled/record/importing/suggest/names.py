@@ -53,6 +53,10 @@ MOTION = {
 }
 TIME = _set("time t timestamp stamp clock utc date datetime elapsed sec seconds")
 TORQUE = _set("torque moment nm")
+# Words of names that have a load or a state but are no part of a control.
+COMPUTER = _set(
+    "cpu cpuload gpu ram memory mem bus network net disk battery thread task process queue"
+)
 # Usual spellings of units at the end of a name, and their symbols in this package.
 SUFFIXES = {
     **{
@@ -130,7 +134,7 @@ def _moved(words: list[str], unit: str, log_words: list[str]) -> Reading | None:
     """Return a control's channel, if the words name a control or one of its quantities."""
     present = _singular(words)
     controls = [control for control, names in CONTROLS.items() if present & names]
-    if is_torque(words) and not _is(unit, "N"):
+    if present & COMPUTER or (is_torque(words) and not _is(unit, "N")):
         return None
     quantities = [quantity for quantity, names in QUANTITIES.items() if present & names]
     quantities = quantities or [q for q, names in DEVICES.items() if present & names]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from coupled.errors import InputError
 from coupled.record.channels import CONTROL_NAMES
+from coupled.record.channels import channel as channel_name
 from coupled.record.importing.mapping import CHANNELS, Layout, own_unit
 from coupled.record.importing.plausible import move_oppositely
 from coupled.record.importing.reading import Log, read_log
@@ -32,6 +33,7 @@ from coupled.units import Unit, parse_unit, units_like
 
 Floats = NDArray[np.float64]
 Line = tuple[str, object, str]  # a key, its value, and a remark
+LISTED = 8  # columns that a question lists
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Proposal:
 def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     """Return a map for a log, or for several of one test; the first one makes the frames.
 
-    A `rig`'s travels reduce the possible units. Raises InputError for a file that is not a log.
+    A `rig`'s travels reduce the possible units. If no name tells what a column is, the map asks
+    which columns are force and deflection. Raises InputError for a file that is not a log.
     """
     layout = guess_layout(files[0])
     read = [read_log(file, layout) for file in files]
@@ -82,8 +85,7 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     left = [c for c in columns if (c.log, c.name) not in used and c.reading.channel != "time"]
     unmapped = tuple(_named(column, logs) for column in left)
     if not mapped:
-        problem = "none of its columns has the name of a force, a deflection or a motion: "
-        raise InputError(files[0], "", problem + ", ".join(unmapped)[:200])
+        sections += _skeleton([column for column in left if column.moves], rig, logs)
     questions = tuple(
         f"{section}.{key}: {remark}"
         for section, lines in sections
@@ -94,6 +96,34 @@ def propose(files: Sequence[Path], rig: Rig | None = None) -> Proposal:
     warnings += [f"{name}: {why}" for log in read for name, why in log.refused.items()]
     text = _text(sections, logs, unmapped)
     return Proposal(text, questions, mapped, unmapped, tuple(dict.fromkeys(warnings)))
+
+
+def _skeleton(
+    columns: Sequence[Column], rig: Rig | None, logs: Sequence[str]
+) -> list[tuple[str, list[Line]]]:
+    """Return the sections of a map that asks for all, where no name says what a column is.
+
+    Force and deflection are what the least diagnosis needs.
+    """
+    if not columns:
+        raise InputError(logs[0], "", "none of its columns holds numbers that change")
+    control = next(iter(rig.controls)) if rig is not None else CONTROL_NAMES[0]
+    listed = ", ".join(_with_range(column, logs) for column in columns[:LISTED])
+    more = len(columns) - LISTED
+    listed += f" and {more} more" if more > 0 else ""
+    found = []
+    for quantity, what in (("force", "force"), ("computed", "place")):
+        name = channel_name(control, quantity)
+        known = " or ".join(units_like(_own(name))[:4])
+        lines: list[Line] = [("from", "?", f"which column is the {what}? {listed}")]
+        found.append((f"channels.{name}", [*lines, ("unit", "?", known)]))
+    return found
+
+
+def _with_range(column: Column, logs: Sequence[str]) -> str:
+    """Return a column's name, and between which numbers it moves."""
+    ends = f"{np.nanmin(column.values):.3g} to {np.nanmax(column.values):.3g}"
+    return f"{json.dumps(_named(column, logs), ensure_ascii=False)} ({ends})"
 
 
 def _stamps_first(
@@ -287,5 +317,9 @@ def _text(
 
 
 def _left(name: str) -> str:
-    arm = "  (a torque: over its arm, as scale, it is a force)" if is_torque(words_of(name)) else ""
+    arm = (
+        "  (a torque: with its unit and radius_m, it is a force)"
+        if is_torque(words_of(name))
+        else ""
+    )
     return f"# {json.dumps(name, ensure_ascii=False)[1:-1]}{arm}"

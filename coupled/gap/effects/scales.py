@@ -1,0 +1,132 @@
+"""How large a machine's forces and motions are in its records: the scale of each number.
+
+A number in the unit Nᵃ·dᵇ·sᶜ has the scale Fᵃ·xᵇ·tᶜ, with the rms force F, the rms motion x about
+its mean, and the time t = x/v by the rms speed v; kg counts as N·s²/d. Friction of one scale is as
+large as the force, a damping of one scale takes all of it.
+
+The library's starts and bounds are those of a control column. For a machine that is another order
+of magnitude they are multiplied by Fᵃ·xᵇ over the column's, so that a record in other units has the
+same fits; and no bound on a force lies within what the record holds of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coupled.gap.effects.effect import Effect, Parameter
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.reading import Reading
+from coupled.gap.thresholds import BOUND_SCALES, COLUMN_FORCE_N, COLUMN_WAY, OTHER_SCALE
+from coupled.record.channels import ControlName, unit_of
+from coupled.rig.rig import Rig
+
+# Powers of force, motion and time by the name of a unit; a load factor is a bare number.
+POWERS = {
+    "N": (1, 0, 0),
+    "kg": (1, -1, 2),
+    "m": (0, 1, 0),
+    "rad": (0, 1, 0),
+    "s": (0, 0, 1),
+    "Hz": (0, 0, -1),
+    "g": (0, 0, 0),
+    "1": (0, 0, 0),
+}
+EXPONENTS = {"²": 2, "³": 3, "2": 2, "3": 3}
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The rms of a control's force in N and motion in d, and their time in s, over records."""
+
+    force_N: float
+    way: float
+    time_s: float
+
+    @classmethod
+    def of(cls, readings: Sequence[Reading]) -> Scales | None:
+        """Return the scales of records; None where they lack force or motion, or nothing moves."""
+        forces, ways, speeds = [], [], []
+        for reading in readings:
+            names = (reading.name_of(quantity) for quantity in ("computed", "deflection"))
+            moved = next((name for name in names if name in reading.record), None)
+            if moved is None or reading.name_of("force") not in reading.record:
+                continue
+            way = smoothed(reading.record[moved])
+            forces.append(reading.record[reading.name_of("force")])
+            ways.append(way - way.mean())
+            speeds.append(rate_of(way, reading.rig.frame_rate))
+        if not forces:
+            return None
+        force, way_d, speed = (
+            float(np.sqrt(np.mean(np.concatenate(each) ** 2))) for each in (forces, ways, speeds)
+        )
+        return cls(force, way_d, way_d / speed) if min(force, way_d, speed) > 0.0 else None
+
+    def size(self, unit: str) -> float | None:
+        """Return one scale of a number in a unit as N·s/m; None of another unit."""
+        powers = _powers(unit)
+        if powers is None or not any(powers):
+            return None
+        return float(np.prod(np.array((self.force_N, self.way, self.time_s)) ** powers))
+
+    def times_columns(self, unit: str, control: ControlName) -> float:
+        """Return by what a column's number in a unit is to be multiplied; 1 for a like machine."""
+        powers = _powers(unit)
+        if powers is None:
+            return 1.0
+        force, way = self.force_N / COLUMN_FORCE_N, self.way / COLUMN_WAY[unit_of(control)]
+        like = [1.0 if 1.0 / OTHER_SCALE < r < OTHER_SCALE else r for r in (force, way)]
+        return float(like[0] ** powers[0] * like[1] ** powers[1])
+
+
+def in_scale(
+    effects: Sequence[Effect], scales: Scales | None, rig: Rig, control: ControlName
+) -> list[Effect]:
+    """Return effects whose starts and bounds suit the size of a machine in its records."""
+    if scales is None:
+        return list(effects)
+    return [
+        replace(
+            effect, parameters=tuple(_scaled(p, scales, rig, control) for p in effect.parameters)
+        )
+        for effect in effects
+    ]
+
+
+def _scaled(p: Parameter, scales: Scales, rig: Rig, control: ControlName) -> Parameter:
+    """Return a parameter with starts and bounds in the scale of the records."""
+    if p.mode not in ("added", "value") or p.key.startswith("flight."):
+        return p
+    unit = p.unit(rig, control)
+    times, size = scales.times_columns(unit, control), scales.size(unit)
+    low, high = times * p.low, times * p.high
+    if unit == "N" and size is not None and not p.inverse:
+        high = max(high, BOUND_SCALES * size)
+        low = min(low, -BOUND_SCALES * size) if low < 0.0 else low
+    if (low, high, times) == (p.low, p.high, 1.0):
+        return p
+    return replace(p, low=low, high=high, starts=tuple(times * start for start in p.starts))
+
+
+def _powers(unit: str) -> tuple[float, float, float] | None:
+    """Return the powers of force, motion and time in a unit as N·s/m; None of another unit."""
+    over, _, under = unit.partition("/")
+    total = np.zeros(3)
+    for side, part in ((1, over), (-1, under)):
+        for token in filter(None, part.split("·")):
+            name, power = _split(token)
+            if name not in POWERS:
+                return None
+            total += side * power * np.array(POWERS[name])
+    force, way, time = total.tolist()
+    return force, way, time
+
+
+def _split(token: str) -> tuple[str, int]:
+    """Return the name and the power of a part of a unit: m³ is (m, 3)."""
+    found = re.fullmatch(r"([A-Za-z]+|1)([²³23]?)", token)
+    return (found[1], EXPONENTS.get(found[2], 1)) if found else ("", 1)

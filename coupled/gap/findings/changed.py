@@ -1,0 +1,322 @@
+"""Whether a machine changed since its healthy records: a test of simple features.
+
+A model that misses the healthy machine cannot judge by noise. What the model leaves of a signal,
+and the force itself, are therefore condensed to features of a whole record: the mean by direction,
+speed and position of the motion, the spread about these means, and the roughness, both as natural
+logarithms. One record gives one value of a feature, so the scatter between healthy records holds
+all that differs from day to day.
+
+A feature x of m records is tested against n healthy ones by a prediction interval for normal
+values (Hahn and Meeker, Statistical Intervals, 1991, ch. 4):
+
+    |x̄ − x̄_h| > t(1 − αw/2; n − 1)·s·√(1/m + 1/n) + e
+
+s is the standard deviation between healthy records. The weights w of all features add up to 1
+(Bonferroni), so that all tests together give a false alarm in at most a share α of healthy records:
+half of the weight is that of the means by direction alone, for which few healthy records suffice. e
+is what another motion may change, up to its square: twice the relative excess of the motion's rms
+place, mean place or rms speed over its own prediction interval, times the rms of the signal. The
+size of change that is shown with probability 0.9 follows from the noncentral t distribution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import nctdtrinc, stdtrit
+
+from coupled.display import unit_in
+from coupled.gap.noise.smooth import rate_of, smoothed
+from coupled.gap.signals.output import Output
+from coupled.gap.thresholds import (
+    CHANGE_BIN,
+    CHANGE_CHANCE,
+    CHANGE_SHOWN,
+    CHANGE_STILL,
+    FLOOR_SHARE,
+)
+from coupled.record.channels import ControlName, channel
+from coupled.record.record import Record
+from coupled.rig.rig import Rig
+
+Floats = NDArray[np.float64]
+SIDES = ((1, "positive"), (-1, "negative"))
+FIRST = tuple(f"mean in {direction} direction" for _, direction in SIDES)
+LEAST_SCATTER = 1e-6  # of a signal's rms: of records that repeat to the last digit
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A feature of some records against healthy ones: the difference of means, and its limits.
+
+    `scatter` is the standard deviation between healthy records, `limit` the difference that chance
+    exceeds with the probability of the test, `shown` the change that the test shows with
+    probability `CHANGE_SHOWN`; both infinite with fewer than two healthy records.
+    """
+
+    difference: float
+    scatter: float
+    limit: float
+    shown: float
+
+    @classmethod
+    def of(
+        cls, well: Floats, now: Floats, chance: float, unsure: float = 0.0, least: float = 0.0
+    ) -> Interval:
+        """Return the two-sided interval at a probability of a false alarm, `chance`.
+
+        `well` and `now` have one value a record; `unsure` is added to the limits; `least` is the
+        least standard deviation that is taken for the healthy ones.
+        """
+        n, m = len(well), len(now)
+        difference = float(now.mean() - well.mean())
+        if n < 2:
+            return cls(difference, math.inf, math.inf, math.inf)
+        scatter = max(float(np.std(well, ddof=1)), least)
+        error = scatter * math.sqrt(1.0 / m + 1.0 / n)
+        times = float(stdtrit(n - 1, 1.0 - 0.5 * chance))
+        noncentral = float(nctdtrinc(n - 1, 1.0 - CHANGE_SHOWN, times))
+        shown = noncentral * error + unsure if math.isfinite(noncentral) else math.inf
+        return cls(difference, scatter, times * error + unsure, shown)
+
+    @property
+    def changed(self) -> bool:
+        """Whether the difference is more than chance gives."""
+        return abs(self.difference) > self.limit
+
+
+@dataclass(frozen=True)
+class Change:
+    """A feature that was tested: of which signal and stage, and its interval."""
+
+    stage: str
+    signal: str
+    feature: str
+    interval: Interval
+
+    @property
+    def is_mean(self) -> bool:
+        """Whether the feature is a mean, in the unit of its signal."""
+        return self.feature.startswith("mean")
+
+    @property
+    def beyond(self) -> float:
+        """The difference over what chance gives."""
+        return abs(self.interval.difference) / self.interval.limit
+
+    @property
+    def words(self) -> str:
+        """What changed by how much."""
+        one = self.interval
+        sigmas = f"{abs(one.difference) / one.scatter:.3g} standard deviations"
+        if self.is_mean:
+            size = f"{one.difference:+.3g} {unit_in(self.signal.partition(' ')[0])}".rstrip()
+        else:
+            size = f"{100.0 * math.expm1(min(one.difference, 7.0)):+.3g} %"
+        return f"{self.signal}, {self.feature}: {size} ({sigmas} of the healthy records)"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        one = self.interval
+        return {
+            "stage": self.stage,
+            "signal": self.signal,
+            "feature": self.feature,
+            "difference": one.difference,
+            "scatter": one.scatter,
+            "limit": one.limit,
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All features of some records tested against healthy ones.
+
+    `shown` is the change of a mean in each stage, relative to the rms of its channel, that would
+    have been shown: of the signal and the part of its motion in which the test is most sensitive.
+    """
+
+    healthy: int
+    tested: tuple[Change, ...]
+    shown: Mapping[str, float]
+
+    @property
+    def changed(self) -> tuple[Change, ...]:
+        """The features that changed by more than chance gives: means first, then the clearest."""
+        found = [one for one in self.tested if one.interval.changed]
+        return tuple(sorted(found, key=lambda one: (not one.is_mean, -one.beyond)))
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages of the features that changed, the clearest first."""
+        return tuple(dict.fromkeys(one.stage for one in self.changed))
+
+    @property
+    def blind(self) -> frozenset[str]:
+        """The stages in which a change of a tenth of the signal would not have been shown."""
+        return frozenset(stage for stage, size in self.shown.items() if size > FLOOR_SHARE)
+
+    @property
+    def words(self) -> str:
+        """What changed, or what change would have been shown."""
+        if self.changed:
+            first, *more = self.changed
+            also = f", and {len(more)} more feature{'s' if len(more) > 1 else ''}" if more else ""
+            return f"Changed since the healthy records: {first.words}{also}."
+        seen = {name: size for name, size in self.shown.items() if math.isfinite(size)}
+        if not seen:
+            return (
+                "The scatter between healthy records is not known, and shows no change:"
+                " record more of them, of the same motion."
+            )
+        each = ", ".join(f"{100.0 * size:.2g} % in the {name}" for name, size in seen.items())
+        return (
+            f"By the scatter between {self.healthy} healthy records, these changes of a mean would"
+            f" have been shown, of the signal's rms: {each}."
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON."""
+        shown = {name: size if math.isfinite(size) else None for name, size in self.shown.items()}
+        return {"changes": [one.as_dict() for one in self.changed], "shown": shown}
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A motion in d, and its speed in d/s."""
+
+    place: Floats
+    speed: Floats
+
+    @property
+    def numbers(self) -> Floats:
+        """The motion's rms place about its mean, mean place and rms speed."""
+        return np.array([self.place.std(), self.place.mean(), np.sqrt(np.mean(self.speed**2))])
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """A signal of one record, with the motion beside it."""
+
+    stage: str
+    name: str
+    values: Floats
+    moved: _Moved
+    channel_rms: float  # of the channel that it is of
+
+
+Signals = Sequence[Mapping[str, _Signal]]
+
+
+def compare(
+    rig: Rig,
+    control: ControlName,
+    well: tuple[Sequence[Record], Sequence[Output]],
+    now: tuple[Sequence[Record], Sequence[Output]],
+) -> Comparison:
+    """Return records tested against healthy ones, each with the outputs that they let judge.
+
+    `rig` is the one whose predictions are taken off, and knows nothing of either.
+    """
+    healthy, tested = (_signals(rig, control, *each) for each in (well, now))
+    names = [name for name in healthy[0] if all(name in one for one in (*healthy, *tested))]
+    features = {name: _features(healthy, tested, name) for name in names}
+    every = [feature for each in features.values() for feature in each]
+    first = sum(feature in FIRST for feature in every)
+    chances = {True: 0.5 / max(first, 1), False: 0.5 / max(len(every) - first, 1)}
+    found, shown = [], dict[str, float]()
+    for name, each in features.items():
+        ours = [one[name] for one in healthy]
+        excess = _excess([one.moved for one in ours], [one[name].moved for one in tested])
+        size = float(np.sqrt(np.mean([np.mean(one.values**2) for one in ours])))
+        stage, channel_rms = ours[0].stage, float(np.mean([one.channel_rms for one in ours]))
+        for feature, values in each.items():
+            chance = CHANGE_CHANCE * chances[feature in FIRST]
+            mean = feature.startswith("mean")
+            own = size if mean else 1.0
+            more = 2.0 * (excess * own if mean else math.log1p(excess))
+            interval = Interval.of(*values, chance, more, LEAST_SCATTER * own)
+            found.append(Change(stage, name, feature, interval))
+            if mean and channel_rms > 0.0:
+                shown[stage] = min(shown.get(stage, math.inf), interval.shown / channel_rms)
+    return Comparison(len(healthy), tuple(found), shown)
+
+
+def _signals(
+    rig: Rig, control: ControlName, records: Sequence[Record], outputs: Sequence[Output]
+) -> Signals:
+    """Return each record's signals by name: the force, and what the rig leaves of each output."""
+    found = []
+    for number, record in enumerate(records):
+        names = (channel(control, quantity) for quantity in ("computed", "deflection"))
+        place = next((smoothed(record[name]) for name in names if name in record), None)
+        ours: dict[str, _Signal] = {}
+        if place is not None:
+            moved = _Moved(place, rate_of(place, rig.frame_rate))
+            force = channel(control, "force")
+            if force in record:
+                pull = record[force]
+                rms = float(np.sqrt(np.mean(pull**2)))
+                ours[force] = _Signal("loader", force, pull, moved, rms)
+            for one in (o for o in outputs if o.record == number and len(o.measured) == len(place)):
+                name = f"{one.channel} beside its prediction"
+                left, rms = one.residual(rig) * one.floor, float(np.std(one.measured))
+                ours[name] = _Signal(one.stage, name, left, moved, rms)
+        found.append(ours)
+    return found
+
+
+def _features(well: Signals, now: Signals, name: str) -> dict[str, tuple[Floats, Floats]]:
+    """Return a signal's features: of each healthy record, and of each tested one."""
+    pooled = [one[name].moved for one in well]
+    rates = np.abs(np.concatenate([one.speed for one in pooled]))
+    still = CHANGE_STILL * float(np.sqrt(np.mean(rates**2)))
+    fast = float(np.median(rates[rates > still])) if (rates > still).any() else still
+    middle = float(np.median(np.concatenate([one.place for one in pooled])))
+    each = [[_condensed(one[name], still, fast, middle) for one in ours] for ours in (well, now)]
+    kept = [key for key in each[0][0] if all(key in one for ours in each for one in ours)]
+    columns = [{key: np.array([one[key] for one in ours]) for key in kept} for ours in each]
+    return {key: (columns[0][key], columns[1][key]) for key in kept}
+
+
+def _condensed(signal: _Signal, still: float, fast: float, middle: float) -> dict[str, float]:
+    """Return the features of one signal; `still`, `fast` in d/s and `middle` in d part its bins."""
+    values, speed, high = signal.values, signal.moved.speed, signal.moved.place > middle
+    rates, found = np.abs(speed), dict[str, float]()
+    least = max(3, round(CHANGE_BIN * len(values)))
+    rough = np.abs(np.diff(values, 2, prepend=values[:2]))
+    for side, direction in SIDES:
+        moving = (side * speed > 0.0) & (rates > still)
+        about = np.zeros(len(values))
+        for pace, quick in (("slow", rates <= fast), ("fast", rates > fast)):
+            for half, there in (("lower", ~high), ("upper", high)):
+                rows = moving & quick & there
+                if rows.sum() >= least:
+                    mean = float(values[rows].mean())
+                    found[f"mean in {direction} direction, {pace}, {half} half"] = mean
+                    about[rows] = values[rows] - mean
+        if moving.sum() >= least:
+            found[f"mean in {direction} direction"] = float(values[moving].mean())
+            spread, roughness = (float(np.sqrt(np.mean(x[moving] ** 2))) for x in (about, rough))
+            found[f"spread in {direction} direction"] = math.log(max(spread, 1e-300))
+            found[f"roughness in {direction} direction"] = math.log(max(roughness, 1e-300))
+    return found
+
+
+def _excess(well: Sequence[_Moved], now: Sequence[_Moved]) -> float:
+    """Return by how much a motion differs, relative, beyond what healthy records' motions do."""
+    before, after = (np.array([one.numbers for one in each]) for each in (well, now))
+    sizes = before.mean(axis=0)
+    sizes[1] = sizes[0]  # a mean place counts by how far the motion goes
+    most = 0.0
+    for k in range(len(sizes)):
+        interval = Interval.of(before[:, k], after[:, k], CHANGE_CHANCE)
+        limit = interval.limit if math.isfinite(interval.limit) else 0.0
+        more = abs(interval.difference) - limit
+        most = max(most, more / max(float(sizes[k]), 1e-300))
+    return most

@@ -1,0 +1,107 @@
+"""Logs in JSON: a list of rows, a table of columns, or one row a line (JSON Lines).
+
+A row is an object; objects within it become columns named `outer.inner`. A cell may be a list, of
+which a map takes an `element`. A row that lacks a column has an empty cell there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from coupled.errors import InputError, shown
+
+DEEPEST = 8  # objects within objects
+WANTED = (
+    'a list of rows as [{"t": 0, "F": 1.5}], a table as {"t": [0], "F": [1.5]}, or a row a line'
+)
+
+
+def read_json(path: Path, text: str) -> tuple[dict[str, pl.Series], list[int]]:
+    """Return the columns of a JSON log by name, and the line of each row, from 1.
+
+    Rows of a list are numbered instead. Raises InputError, naming the line.
+    """
+    try:
+        whole = json.loads(text)
+    except RecursionError:
+        raise InputError(path, "", "nests too deeply to be a log") from None
+    except ValueError:
+        rows, lines = _by_lines(path, text)
+    else:
+        rows = _rows_of(path, whole)
+        lines = list(range(1, len(rows) + 1))
+    flat = [_flattened(path, number, row) for number, row in zip(lines, rows, strict=True)]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    if not names:
+        raise InputError(path, "", f"holds no rows; give {WANTED}")
+    return {name: _column(name, [row.get(name) for row in flat]) for name in names}, lines
+
+
+def _by_lines(path: Path, text: str) -> tuple[list[Any], list[int]]:
+    """Return the rows of JSON Lines, and where they stand."""
+    rows, lines = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            rows.append(json.loads(line))
+        except (ValueError, RecursionError):
+            problem = f"line {number} is no JSON: {shown(line.strip(), 40)!r}; give {WANTED}"
+            raise InputError(path, "", problem) from None
+        lines.append(number)
+    return rows, lines
+
+
+def _rows_of(path: Path, whole: Any) -> list[Any]:
+    """Return the rows of one JSON value: a list of them, a table of columns, or a single row."""
+    if isinstance(whole, list):
+        return whole
+    if isinstance(whole, dict) and whole and all(isinstance(v, list) for v in whole.values()):
+        lengths = {name: len(column) for name, column in whole.items()}
+        if len(set(lengths.values())) > 1:
+            each = ", ".join(f"{shown(name, 20)} {n}" for name, n in list(lengths.items())[:4])
+            raise InputError(path, "", f"has columns of different lengths: {each}")
+        return [dict(zip(whole, cells, strict=True)) for cells in zip(*whole.values(), strict=True)]
+    if isinstance(whole, dict):
+        return [whole]
+    raise InputError(path, "", f"is no table; give {WANTED}")
+
+
+def _flattened(
+    path: Path, number: int, row: Any, before: str = "", deep: int = 0
+) -> dict[str, Any]:
+    """Return a row with the cells of objects within it as its own, `outer.inner`."""
+    if not isinstance(row, Mapping) or deep > DEEPEST:
+        raise InputError(path, "", f"row {number} is no object of columns; give {WANTED}")
+    found: dict[str, Any] = {}
+    for name, cell in row.items():
+        if isinstance(cell, Mapping):
+            found |= _flattened(path, number, cell, f"{before}{name}.", deep + 1)
+        else:
+            found[f"{before}{name}"] = cell
+    return found
+
+
+def _column(name: str, cells: Sequence[Any]) -> pl.Series:
+    """Return cells as a column: of numbers, of lists of numbers, else of text."""
+    given = [cell for cell in cells if cell is not None]
+    if all(isinstance(cell, (int, float)) for cell in given):
+        whole = all(isinstance(cell, int) and abs(cell) < 2**63 for cell in given)
+        kind = pl.Int64 if whole and given else pl.Float64
+        return pl.Series(name, cells, dtype=kind, strict=False)
+    if all(isinstance(cell, list) and all(map(_is_number, cell)) for cell in given):
+        return pl.Series(name, cells, dtype=pl.List(pl.Float64), strict=False)
+    return pl.Series(name, [None if c is None else _text(c) for c in cells], dtype=pl.String)
+
+
+def _is_number(cell: Any) -> bool:
+    return isinstance(cell, (int, float)) and not isinstance(cell, bool)
+
+
+def _text(cell: Any) -> str:
+    return cell if isinstance(cell, str) else json.dumps(cell)

@@ -1,0 +1,80 @@
+"""The sentences of a diagnosis: what they say follows from its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from coupled.gap.findings.budget import Share, StageBudget
+from coupled.gap.findings.result import (
+    EffectResult,
+    Findings,
+    ParameterEstimate,
+    StageResult,
+    Verdict,
+)
+from coupled.gap.findings.shrink import ChannelShrink, Shrink
+from coupled.gap.findings.summary import in_time, summary
+from coupled.gap.search.course import Bounds, Course
+
+FRICTION = EffectResult(
+    "coulomb_friction",
+    "loader",
+    0.3,
+    (ParameterEstimate("friction_N", 4.0, 3.0, 5.0, "loader.friction_N", "N", 0.0, 4.0, 3.0, 5.0),),
+)
+LOADER = StageResult("loader", 400.0, 400.0, 1.2, 1.1, guilty=True)
+
+
+def share(name: str, value: float) -> Share:
+    return Share(name, value, value, value)
+
+
+def said(verdict: Verdict, left: float, explained: float, *effects: EffectResult) -> str:
+    shares = tuple(share(effect.name, explained / len(effects)) for effect in effects)
+    noise = 1.0 / 400.0**2
+    rest = share("unexplained", 1.0 - noise - explained)
+    budget = StageBudget("loader", shares, rest, share("noise", noise))
+    stage = replace(LOADER, left=left)
+    found = Findings("column", verdict, (stage,), effects, (), (), (budget,) if effects else ())
+    return summary(
+        found, Shrink(ChannelShrink("column_computed_m", 1.0, 0.1, 0.1, 4), ()), "", "", ""
+    )
+
+
+def test_the_first_sentence_of_an_unexplained_gap_has_the_shares_of_its_effects() -> None:
+    text = said("unexplained", 5.0, 0.995, FRICTION)
+    assert text.startswith("Coulomb friction, 0 → 4 N (+4), explains 99.5 %")
+    assert "no effect of the library explains" not in text
+    assert "No effect is certain: their probability is 0.30 at most." in text
+    sure = said("unexplained", 300.0, 0.4, replace(FRICTION, probability=0.8))
+    assert "The effects that are certain hold less than half of the gap." in sure
+
+
+def test_a_gap_without_effects_is_said_to_have_none() -> None:
+    text = said("unexplained", 400.0, 0.0)
+    assert text.startswith("A gap in the loader that no effect of the library explains.")
+
+
+@pytest.mark.parametrize(("left", "noise"), [(1.1, True), (7.8, False)])
+def test_what_remains_is_noise_only_within_the_limit_of_noise(left: float, noise: bool) -> None:
+    text = said("effect", left, 0.999, replace(FRICTION, probability=0.9))
+    assert ("what remains is noise" in text) is noise
+    assert ("7.8 floors" in text) is not noise
+
+
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [
+        ((0.001, 0.0005, 0.0015), "at 6 % a minute (3 to 9)"),
+        ((-0.0793, -0.09, -0.07), "changes by more than its own size within a minute"),
+        ((0.001, -0.001, 0.003), ""),
+    ],
+)
+def test_a_rate_is_checked_before_it_is_said(rate: tuple[float, float, float], words: str) -> None:
+    factor = replace(FRICTION.parameters[0], name="factor", relative=True)
+    course = Course("grows", rate_per_s=Bounds(*rate))
+    text = in_time(replace(FRICTION, parameters=(factor,), course=course))
+    assert words in text
+    assert bool(text) is bool(words)
