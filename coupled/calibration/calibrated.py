@@ -28,6 +28,7 @@ from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
+from coupled.rig.guesses import without_guesses
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
@@ -90,7 +91,7 @@ def with_calibration(
         whole[f"structure.assumed.{key}"] = estimate.value
         if hardware:
             whole[f"structure.{key}"] = estimate.value
-    return rig.changed(whole)
+    return rig.changed(whole | without_guesses(rig.controls, whole))
 
 
 def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:

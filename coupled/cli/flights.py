@@ -13,7 +13,7 @@ from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
 from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import say_stale
+from coupled.cli.rigs import say_doubts, say_stale
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
@@ -120,7 +120,7 @@ def fly(
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
     check_json(json_file, [*inputs, path, manifest_path(path)])
-    say_stale(manoeuvre.rig)
+    say_doubts(manoeuvre.rig)
     with progress() as advance:
         flight = fly_and_judge(
             manoeuvre,

@@ -11,7 +11,7 @@ from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import ControlOption
+from coupled.cli.rigs import ControlOption, say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
@@ -107,15 +107,16 @@ def diagnose(
     targets += check_report(report, [*inputs, *targets], plots)
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [])
+    note = say_guesses(whole.nominal, (name,))
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
     with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:
-            _draw(outputs.folder(plots), whole)
+            _draw(outputs.folder(plots), whole, note)
         keep_json(table, json_file, outputs)
-        _report(report, outputs, inputs, whole, power)
+        _report(report, outputs, inputs, (whole, power, note))
     if json_file != "-":
         if rig_file is None:
             say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
@@ -220,22 +221,26 @@ def _plot_targets(folder: Path | None) -> list[Path]:
 
 
 def _report(
-    path: Path | None, outputs: Outputs, inputs: list[Path], whole: Diagnosis, power: bool
+    path: Path | None, outputs: Outputs, inputs: list[Path], handed: tuple[Diagnosis, bool, str]
 ) -> None:
+    """Write a diagnosis's report; `handed` is it, whether with its power, and a note."""
+    whole, power, note = handed
     if path is None:
         return
     from coupled.reports.diagnosis import diagnosis_report
 
     title = ", ".join(shown(Path(name).name) for name in whole.records)
-    write_report(path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power))
+    write_report(
+        path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power), note
+    )
 
 
-def _draw(folder: Path, whole: Diagnosis) -> None:
+def _draw(folder: Path, whole: Diagnosis, note: str) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
     for file, figure in draw_diagnosis(whole).items():
-        save(figure, folder / file)
+        save(figure, folder / file, note)
 
 
 def _diagnose_folder(

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.rigs import say_stale
+from coupled.cli.rigs import say_doubts
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target
@@ -113,7 +113,7 @@ def live(
     flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)
     path = output or Path("out") / f"{flown.name}.csv"
     _check_targets(flown, path, json_file)
-    say_stale(flown.rig)
+    say_doubts(flown.rig)
     limits = Limits(_positive("--force-limit", force_limit), _positive("--rate-limit", rate_limit))
     warn = _Warner()
     with ExitStack() as ending:

@@ -81,7 +81,7 @@ class Loader(Section):
 class Schedule(Section):
     """Gradient against dynamic pressure, and what may be wrong with its use."""
 
-    dynamic_pressure: list[float] = quantity("Pa", min_length=2)
+    dynamic_pressure: list[float] = quantity("Pa", min_length=1)
     total_gradient: list[float] = quantity("N_per_{d}")
     second_gradient: list[float] | None = quantity("N_per_{d}", None)
     break_deflection: float = quantity("{d}", 0.0, ge=0)
@@ -242,6 +242,7 @@ class Control(Section):
     calibration: Calibration = Calibration()
     # How well the numbers above are known: half of a 95 % interval by their keys, in their units.
     tolerance: dict[str, float] = {}
+    guesses: list[str] = []  # keys of numbers that nobody measured
 
     @property
     def assumed_basic_gradient(self) -> float:
