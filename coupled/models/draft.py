@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from coupled.models.survey import Surveyed
 from coupled.record.channels import SURFACES, ControlName, unit_of
 
-_BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
-_RIM_m = 0.15  # a wheel's radius
+BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
+RIM_m = 0.15  # a wheel's radius
 _MOST_BENT = 0.3  # of the travel, at the stiffest gradient: K·G_T
 
 
@@ -131,9 +131,9 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
 def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str]:
     low, high = _pressure(found.slowest), _pressure(found.fastest)
     bend, origin = {
-        "column": (_BEND_m_per_N, "K of Cleveland's column"),
-        "wheel": (_BEND_m_per_N / _RIM_m, "K of Cleveland's column over the rim's radius"),
-        "pedals": (0.5 * _BEND_m_per_N, "half of K of Cleveland's column"),
+        "column": (BEND_m_per_N, "K of Cleveland's column"),
+        "wheel": (BEND_m_per_N / RIM_m, "K of Cleveland's column over the rim's radius"),
+        "pedals": (0.5 * BEND_m_per_N, "half of K of Cleveland's column"),
     }[control]
     stiffest = min(guess.full_force_N / guess.travel, _MOST_BENT / bend)
     softest = max(stiffest * low / high, 0.05 * stiffest)
@@ -170,7 +170,7 @@ def control_lines(
     guesses. `remarks` are comments by field, and "schedule" for one above its table.
     """
     d, at, said = unit_of(control), f"controls.{control}", remarks or {}
-    length = _RIM_m if d == "rad" else 0.6
+    length = RIM_m if d == "rad" else 0.6
     loader: list[tuple[str, str, float]] = [
         ("loader.mass", "mass_kg", hardware.mass),
         ("loader.damping", f"damping_N_s_per_{d}", hardware.damping),
@@ -194,10 +194,10 @@ def control_lines(
 
     def row(field: str, key: str, value: float) -> str:
         remark = f"  # {said[field]}" if field in said else ""
-        return f"{key} = {value:.4g}{remark}"
+        return f"{key} = {value:.5g}{remark}"
 
     def numbers(values: Sequence[float]) -> str:
-        return "[" + ", ".join(f"{value:.4g}" for value in values) + "]"
+        return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
 
     return [
         "",

@@ -20,7 +20,8 @@ from matplotlib.ticker import FixedLocator
 from coupled.errors import InputError, printable
 from coupled.files import write_whole
 
-_LETTERS_per_inch = 14.0  # of a note
+_NOTED = 10  # font size of a title with a note
+_LETTERS_per_inch = 10.0  # of a note
 FORMATS = (".png", ".pdf", ".svg")
 BOX = "□"  # in place of a letter that no font has
 # Fonts with the letters of languages that matplotlib's own font lacks, of the common systems.
@@ -87,18 +88,18 @@ def _letters(file: str) -> frozenset[str]:
 
 
 def with_note(figure: Figure, note: str) -> Figure:
-    """Return a figure with a line of text below its panels; as it is for an empty text."""
+    """Return a figure with a line of text below its title; as it is for an empty text."""
     if note:
         width = round(_LETTERS_per_inch * figure.get_size_inches()[0])
-        lines = [figure.get_supxlabel(), *textwrap.wrap(note, width)]
-        figure.supxlabel("\n".join(filter(None, lines)), fontsize=8)
+        lines = [figure.get_suptitle(), *textwrap.wrap(note, width)]
+        figure.suptitle("\n".join(filter(None, lines)), fontsize=_NOTED)
     return figure
 
 
 def save(figure: Figure, path: Path, note: str = "") -> None:
     """Write a figure, whole; the same figure gives the same bytes on the same machine.
 
-    The `note` is a line below its panels.
+    The `note` is a line below its title.
     """
     check_format(path)
     with_note(figure, note)
