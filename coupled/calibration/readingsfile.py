@@ -9,6 +9,8 @@ from: out, or in, after going further. Its deflection and force may be left empt
 on other controls of the same structure are further columns, force_on_wheel_N and the like, 0
 where nobody held it. Rows are
 numbered as a text editor does, the heads being row 1.
+
+S₁ and K need no v3, which may be left out; and v1_counts and v3_counts are a converter's.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.calibration.readings import Readings, readings_of
+from coupled.calibration.readings import Readings, Signal, readings_of
 from coupled.calibration.readingscolumns import (
     ANGLES,
     APPROACH,
@@ -34,6 +36,7 @@ from coupled.calibration.readingscolumns import (
     ON,
     after,
     on,
+    signal_of,
     units_of,
 )
 from coupled.errors import InputError, collected, together
@@ -69,7 +72,8 @@ def read_readings(path: Path, control: str) -> Readings:
     read = _read_rows(path, parsed, units, faults)
     if faults:
         raise together(faults)
-    return _assembled(read, [quantity for quantity in units if quantity.startswith(ON)])
+    others = [quantity for quantity in units if quantity.startswith(ON)]
+    return _assembled(read, others, signal_of(path, heads))
 
 
 def rows_of(path: Path) -> list[tuple[int, list[str]]]:
@@ -123,7 +127,7 @@ def _read_row(
     units: dict[str, tuple[str, float]],
     faults: list[InputError],
 ) -> _Row:
-    null = "v2" in units and cells["v2_V"] != ""
+    null = "v2" in units and cells[units["v2"][0]] != ""
     may_lack = {"v2", "deflection after", "force after"}
     if null:
         may_lack |= {"deflection", "force", *(name for name in units if name.startswith(ON))}
@@ -146,7 +150,7 @@ def _read_row(
     return _Row(number, cells[LABEL], value, side)
 
 
-def _assembled(rows: list[_Row], others: list[str]) -> Readings:
+def _assembled(rows: list[_Row], others: list[str], signal: Signal) -> Readings:
     taken: list[tuple[int, str, tuple[float, ...]]] = []
     nulls: list[tuple[int, tuple[float, ...]]] = []
     for row in rows:
@@ -156,7 +160,7 @@ def _assembled(rows: list[_Row], others: list[str]) -> Readings:
         if "deflection" in value and "force" in value:
             means = [_mean(value, quantity) for quantity in ("deflection", "force")]
             (delta, rise), (force, force_rise) = means
-            six = (delta, force, value["v1"], value["v3"], rise, force_rise)
+            six = (delta, force, value["v1"], value.get("v3", math.nan), rise, force_rise)
             held = tuple(value.get(quantity, 0.0) for quantity in others)
             taken.append((row.number, row.label, six + held))
     columns = np.array([one for *_, one in taken], float).reshape(-1, 6 + len(others)).T
@@ -168,6 +172,7 @@ def _assembled(rows: list[_Row], others: list[str]) -> Readings:
         [number for number, _ in nulls],
         np.array([four for _, four in nulls], float).reshape(-1, 4).T,
         crossed,
+        signal,
     )
 
 

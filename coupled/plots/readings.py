@@ -50,12 +50,12 @@ def draw_readings(found: CalibrationResult, source: str) -> Figure:
             shown += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
         top.plot(factor * d, readings.v1[ours], label=f"set {plain(label)}: {shown}", **style)
-        reach = np.array([0.0, d[np.argmax(np.abs(d))]])
+        reach = np.array([min(0.0, np.min(d)), max(0.0, np.max(d))])  # of a push and of a pull
         top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
         below.plot(factor * d, line.residual[ours], **style)
     below.axhline(0.0, color="black", linewidth=0.8)
-    top.set_ylabel("v₁, V")
-    below.set_ylabel("v₁ − fit, V")
+    top.set_ylabel(f"v₁, {readings.signal}")
+    below.set_ylabel(f"v₁ − fit, {readings.signal}")
     below.set_xlabel(f"deflection δ, {unit}")
     for axes in (top, below):
         axes.grid(alpha=0.25)
@@ -63,7 +63,7 @@ def draw_readings(found: CalibrationResult, source: str) -> Figure:
     figure.legend(handles, labels_shown, loc="outside lower center", ncols=3, fontsize=8)
     d_unit = unit_of(found.control)
     s1, bend = line.s1, line.bend
-    text = f"S₁ = {plus_minus(s1)} V/{d_unit}\nK = {plus_minus(bend)} {d_unit}/N"
+    text = f"S₁ = {plus_minus(s1)} {readings.signal}/{d_unit}\nK = {plus_minus(bend)} {d_unit}/N"
     if unit == "cm":
         inches = bend.scaled(POUND_N / INCH_m)
         text += f"\n   = {plus_minus(inches)} in/lb"

@@ -31,12 +31,13 @@ def calibration_report(
 
 
 def _verdict(found: CalibrationResult) -> Verdict:
+    v = found.readings.signal
     figures = {label: (value, ends) for label, value, _, ends in rows(found) if label[0] != " "}
     said = [
         f"{name} = {value} {unit} ({ends})"
         for label, (value, ends) in figures.items()
         for name, _, unit in [label.partition(", ")]
-        if unit in (f"V/{unit_of(found.control)}", f"{unit_of(found.control)}/N", "V/N")
+        if unit in (f"{v}/{unit_of(found.control)}", f"{unit_of(found.control)}/N", f"{v}/N")
     ]
     worth = [line for line in remarks(found) if line.startswith("compensated with these")]
     doubts = [f"{len(found.suspects)} readings are left out as mistyped."] if found.suspects else []
@@ -46,13 +47,18 @@ def _verdict(found: CalibrationResult) -> Verdict:
 
 def _readings(found: CalibrationResult) -> Table:
     d, read = unit_of(found.control), found.readings
-    heads = ("row", "gradient set", f"δ, {d}", "F, N", "v1, V", "v3, V", "residual of v1, V")
+    v = read.signal
+    volts = [f"v1, {v}", *([f"v3, {v}"] if read.gauge else []), f"residual of v1, {v}"]
+    heads = ("row", "gradient set", f"δ, {d}", "F, N", *volts)
     return Table(heads, tuple(_reading_rows(found)), f"{len(read.row)} readings, as fitted", 2)
 
 
 def _reading_rows(found: CalibrationResult) -> Iterator[tuple[str, ...]]:
     read = found.readings
-    columns = (read.deflection, read.force, read.v1, read.v3, found.line.residual)
+    columns = [read.deflection, read.force, read.v1, read.v3, found.line.residual]
+    shown = list(zip(columns, _DECIMALS, strict=True))
+    if not read.gauge:
+        del shown[3]
     for i, row in enumerate(read.row):
-        numbers = (f"{column[i]:.{n}f}" for column, n in zip(columns, _DECIMALS, strict=True))
+        numbers = (f"{column[i]:.{n}f}" for column, n in shown)
         yield str(int(row)), str(read.label[i]), *numbers
