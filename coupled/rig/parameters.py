@@ -159,6 +159,8 @@ class Rigging(Section):
 class Services(Section):
     """What the loader gives beside gradient and breakout; 0 leaves a service out (`services`)."""
 
+    trim_release_gradient: float = quantity("N_per_{d}", 0.0, ge=0)
+    trim_release_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
     autopilot_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     autopilot_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
     override: float = quantity("N", 0.0, ge=0)
