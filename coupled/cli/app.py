@@ -96,6 +96,8 @@ def _run() -> int:
         line = _lines_of(error)
     except TyperException as error:  # a word of the command line that it does not know
         words = " ".join(error.format_message().split()).replace("Value error, ", "")
+        if not words:  # a group without a command: its help has been printed
+            return 0
         line = shown(words, 400) + " (coupled --help shows what there is)"
     except (OSError, MemoryError) as error:
         line = said_of(error)

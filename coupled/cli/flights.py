@@ -19,7 +19,7 @@ from coupled.cli.terminal import check_json, err, give_json, keep_json, out, pri
 from coupled.errors import InputError, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
-from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
+from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs, shipped_sweeps
 from coupled.timing import timed
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def plot(
 
 @app.command()
 def runs(json_file: JsonOption = "") -> None:
-    """List the shipped run files, what each shows, and the shipped rigs."""
+    """List the shipped runs and sweeps, what each shows, and the shipped rigs."""
     from coupled.schema import load_toml
 
     check_json(json_file, [])
@@ -173,7 +173,8 @@ def runs(json_file: JsonOption = "") -> None:
         for name, card in cards.items():
             table.add_row(name, card["rig"], _sentence(card["card"]))
         print_whole(out, table)
-        out.print("\nrigs: " + ", ".join(shipped_rigs()))
+        out.print("\nsweeps: " + ", ".join(shipped_sweeps()))
+        out.print("rigs: " + ", ".join(shipped_rigs()))
     rows = [
         {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()
     ]

@@ -182,6 +182,15 @@ def _print(
         say(f"figure: {figure}")
 
 
+# Why a rig that is improved has a key that is no effect's number.
+_GOES_WITH = "which goes with what was found; it has no effect of its own"
+_BESIDE = {
+    "servo_damping_ratio": "since a file gives both numbers of a servo or none",
+    "model_folder": "whole, since this file may lie elsewhere",
+    "guesses": "without the numbers that are found now",
+}
+
+
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
 ) -> None:
@@ -208,6 +217,11 @@ def _write_improved(
     remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
     # The trim was taken from the record, and is no change of the rig file.
     changes = differences(trimmed(filed, records)[0], whole.improved)
+    said = remark
+    for key in changes:
+        dotted = ".".join(key)
+        if key[-1] not in said and dotted not in said:
+            remark += f"written beside these: {dotted}, {_BESIDE.get(key[-1], _GOES_WITH)}\n"
     write_text(path, edited(text, changes, remark))
 
 

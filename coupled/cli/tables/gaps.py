@@ -12,12 +12,12 @@ from rich.table import Table
 from coupled.cli.tables.whole import print_whole
 from coupled.display import System, in_system, split_unit
 from coupled.gap.batch import Row
-from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.budget import StageBudget, share_of
 from coupled.gap.findings.flown import ChannelAgain
 from coupled.gap.findings.inflight import EffectInFlight
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.findings.summary import change, figure, in_figures, labels, plain
+from coupled.gap.findings.summary import change, figure, in_figures, labels, plain, sentences
 
 if TYPE_CHECKING:
     from coupled.gap.findings.diagnosis import Diagnosis
@@ -53,11 +53,8 @@ def print_effects(
     table = Table("effect", "filed → found", box=None)
     for head in ("95 % interval", "share", "prob."):
         table.add_column(head, justify="right")
-    known = {one.stage: one for one in budget}
     for effect in effects:
-        shares = known[effect.stage].shares if effect.stage in known else ()
-        share = next((one for one in shares if one.name == effect.name), None)
-        explains = "" if share is None else f"{100 * share.value:.1f} %"
+        explains = share_of(budget, effect.stage, effect.name)
         first, *rest = [in_units(p, system) for p in effect.parameters] or (None,)
         sure = f"{effect.probability:.2f}"
         said, *others = labels(effect) or [""]
@@ -98,11 +95,16 @@ def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
 
 
 def in_words(whole: Diagnosis, system: System) -> str:
-    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit."""
+    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit.
+
+    Of two effects and more, a list of its sentences.
+    """
     text = whole.summary
     for parameter in (p for effect in whole.effects for p in effect.parameters):
         text = text.replace(change(parameter), change(in_units(parameter, system)))
-    return text
+    if len(whole.effects) < 2:
+        return text
+    return "\n".join(f"- {sentence}" for sentence in sentences(text))
 
 
 def print_closed_loop(
