@@ -61,6 +61,11 @@ UnitsOption = Annotated[
     ),
 ]
 
+WideOption = Annotated[
+    bool,
+    typer.Option("--wide", help="Tables with all columns, wider than the terminal if need be."),
+]
+
 
 def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""

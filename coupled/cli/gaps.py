@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
+from coupled.cli.app import JsonOption, UnitsOption, WideOption, app, check_cluster
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
@@ -83,6 +83,7 @@ def diagnose(
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
+    wide: WideOption = False,
 ) -> None:
     """Find where records depart from their rig, the effect behind it, and how much it explains."""
     name = control_named(control, records[0])
@@ -120,7 +121,8 @@ def diagnose(
     if json_file != "-":
         if rig_file is None:
             say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
-        _print(whole, power, (None if worse else improve, drawn), units)
+        with out.widened(wide):
+            _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")

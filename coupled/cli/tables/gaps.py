@@ -65,7 +65,7 @@ def print_effects(
         for left in (one.unexplained, one.noise):
             table.add_row(f"{one.stage}: {left.name}", "", "", f"{100 * left.value:.1f} %", "")
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("95 % interval", "prob."))
 
 
 def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
@@ -138,7 +138,7 @@ def print_in_flight(
             changed = in_system(unit, system).factor * by
             table.add_row(*first, word, f"{changed:.3g}", f"{100 * one.of_motion[name]:.3g} %")
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("changes by", "of its motion"))
 
 
 def _named(name: str, system: System) -> tuple[str, str]:
@@ -162,7 +162,7 @@ def print_power(console: Console, sizes: Sequence[EffectPower], system: System =
             least = ", ".join(each) or "it would show"
         table.add_row(one.name, one.stage, least)
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("stage",))
 
 
 def _sized(name: str, value: float, system: System) -> str:
@@ -177,4 +177,4 @@ def print_summary(console: Console, rows: Sequence[Row]) -> None:
         closed = "" if row.closed is None else f"{row.closed:.3f}"
         verdict = row.verdict + (f": {row.why}" if row.why else "")
         table.add_row(row.record, verdict, ", ".join(row.effects), ", ".join(row.guilty), closed)
-    print_whole(console, table)
+    print_whole(console, table, ("guilty", "closed"))
