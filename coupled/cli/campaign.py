@@ -169,13 +169,13 @@ def _show(
     with Outputs() as outputs:
         if found.indices:
             write_indices(found.indices, outputs.at(target / INDICES))
-        save(draw_result(found), outputs.at(path))
+        save(draw_result(found, units), outputs.at(path))
         keep_json(rows, json_file, outputs)
         if report is not None:
             from coupled.reports.sweep import sweep_report
 
             inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
-            write_report(report, outputs, inputs, lambda made: sweep_report(found, made))
+            write_report(report, outputs, inputs, lambda made: sweep_report(found, made, units))
     if json_file != "-":
         print_sweep(out, table, asked.keep, units)
         for sentence in found.remarks:

@@ -67,12 +67,14 @@ def compare(
             from coupled.plots.flights import draw_comparison
             from coupled.plots.saving import save
 
-            save(draw_comparison(flights), outputs.at(path))
+            save(draw_comparison(flights, units), outputs.at(path))
         keep_json(table, json_file, outputs)
         if report is not None:
             from coupled.reports.comparison import comparison_report
 
-            write_report(report, outputs, inputs, lambda made: comparison_report(flights, made))
+            write_report(
+                report, outputs, inputs, lambda made: comparison_report(flights, made, units)
+            )
     if json_file != "-":
         print_comparison(out, flights, units)
         if not no_figure:
