@@ -16,6 +16,7 @@ from coupled.cli.order import PANELS, name_of
 from coupled.plots.saving import save
 from coupled.record.channels import record_channels
 from coupled.record.record import read_record
+from coupled.resources import shipped_sweeps
 from tests.support.commands import ROOT, coupled, coupled_anew, files
 from tests.support.runs import SHORT
 
@@ -374,3 +375,17 @@ def test_a_narrow_terminal_cuts_no_number(folder: Path, columns: int) -> None:
     assert max(len(line) for line in shown.splitlines()) <= columns
     after = shown[shown.index("force needed") :]
     assert [word for word in after.split() if word in numbers][:2] == numbers
+
+
+@pytest.mark.parametrize("words", [(), ("new",)])
+def test_a_command_that_is_left_out_gets_the_help_alone(
+    folder: Path, words: tuple[str, ...]
+) -> None:
+    done = coupled(folder, *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Usage: coupled" in " ".join(done.stdout.split())
+
+
+def test_shipped_sweeps_are_listed_with_the_runs(folder: Path) -> None:
+    printed = coupled(folder, "runs").stdout
+    assert "sweeps: " + ", ".join(shipped_sweeps()) in " ".join(printed.split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,10 @@ from coupled.calibration.form import starting_form
 from coupled.calibration.readingsfile import read_readings
 from coupled.campaign.plan import read_plan
 from coupled.errors import InputError
+from coupled.flight.pilot import Step
+from coupled.flight.runfile import read_run
 from coupled.record.importing.mapping import CHANNELS, read_map
+from coupled.resources import shipped_rigs
 from tests.support.commands import coupled, files
 
 
@@ -21,6 +25,43 @@ def test_a_new_run_passes_its_own_expectations(tmp_path: Path) -> None:
     checked = coupled(tmp_path, "check", "./pull.toml")
     assert checked.returncode == 0, checked.stdout
     assert "4 of 4 expectations hold" in checked.stdout
+
+
+@pytest.mark.parametrize("rig", ["bench", pytest.param("c172p", marks=pytest.mark.slow)])
+def test_a_new_run_of_a_rig_passes_its_own_expectations(tmp_path: Path, rig: str) -> None:
+    made = coupled(tmp_path, "new", "run", "pull.toml", "--rig", rig)
+    assert made.returncode == 0, made.stderr
+    cases = read_run(str(tmp_path / "pull.toml"))
+    for case in cases:
+        column = case.rig.controls["column"]
+        pull = case.pilots["column"]
+        assert isinstance(pull, Step)
+        assert pull.force_N > column.loader.breakout + column.loader.friction
+    speeds = [case.rig.flight.calibrated_airspeed for case in cases if case.rig.flight]
+    assert len(speeds) == (0 if rig == "bench" else 3)
+    assert speeds == sorted(set(speeds))
+    checked = coupled(tmp_path, "check", "./pull.toml")
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_a_run_of_a_rig_names_it_from_the_runs_own_place(tmp_path: Path) -> None:
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "runs").mkdir()
+    shutil.copy(shipped_rigs()["bench"], tmp_path / "rigs" / "mine.toml")
+    words = ("new", "run", "runs/pull.toml", "--rig", "rigs/mine.toml")
+    assert coupled(tmp_path, *words).returncode == 0
+    (case,) = read_run(str(tmp_path / "runs" / "pull.toml"))
+    assert case.rig.name == "bench"
+
+
+def test_a_rig_that_no_run_suits_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    text = shipped_rigs()["bench"].read_text(encoding="utf-8")
+    setpoint = text.replace("travel_m", 'drive = "setpoint"\ntravel_m', 1)
+    (tmp_path / "mine.toml").write_text(setpoint, encoding="utf-8")
+    done = coupled(tmp_path, "new", "run", "pull.toml", "--rig", "./mine.toml")
+    assert done.returncode == 2
+    assert "controls.column.drive: a setpoint has no loader that a force moves" in done.stderr
+    assert files(tmp_path) == {"mine.toml"}
 
 
 def test_a_new_sweep_is_planned_as_its_comments_say(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from coupled.authority.held import dry_friction
 from coupled.display import System, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
+from coupled.rig.guesses import guess_note
 from coupled.units import DEGREE_rad, INCH_m
 
 if TYPE_CHECKING:
@@ -114,13 +115,25 @@ def named(flight: Flight) -> str:
 def remarks(flights: Sequence[Flight], system: System = "si") -> list[str]:
     """Return explanations of a comparison's figures, a sentence each; flights of all cases.
 
-    They cover a K̂ of 0, hand forces that move no loader, surfaces at their stops, and the loss of
-    authority under a force that moves the surface as far as on the rigid rig.
+    They cover a K̂ of 0, hand forces that move no loader, surfaces at their stops, the loss of
+    authority under a force that moves the surface as far as on the rigid rig, and the numbers of
+    the rig that are guesses.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     held = next(filter(None, (further(case, system) for case in cases)), "")
     said = [_without_correction(flights), *_resting(cases, system), *_saturated(cases), held]
+    said.append(_guessed(flights))
     return list(filter(None, said))
+
+
+def _guessed(flights: Sequence[Flight]) -> str:
+    """Return which numbers of the control that is looked at are guesses, and what rests on them."""
+    manoeuvre = flights[0].manoeuvre
+    given = manoeuvre.source.changes if manoeuvre.source is not None else {}
+    note = guess_note(manoeuvre.rig.controls, (manoeuvre.control,), given)
+    lost = [f.outcome.loss for f in flights if f.configuration != "rigid"]
+    most = max(filter(math.isfinite, lost), default=0.0)
+    return f"{note} The {100 * most:.0f} % lost depends on them." if note and most > 0.0 else note
 
 
 def _where(

@@ -38,6 +38,7 @@ Progress = Callable[[str, int, int], None]
 FELT: tuple[Configuration, ...] = ("rigid", "uncompensated", "compensated")
 _SEA_LEVEL_kg_per_m3 = 1.225
 _LEAST_PRESSURE_Pa = 200.0
+_CONSTANT_Pa = 1000.0  # the map's q̄ where a gradient is the same at any
 _PRESSURES, _DEFLECTIONS, _SPEEDS = 33, 65, 9
 _STEPS, _BEYOND_STOP = 401, 17  # along δc, and along δ beyond the loader's stop
 _STEP, _PULL_s = 0.01, 3.0  # size of the elevator command, in the linear range, and its duration
@@ -76,7 +77,8 @@ class Feel:
 def loss_maps(rig: Rig, control: ControlName) -> list[LossMap]:
     """Return the maps of one control in all configurations but the rigid one."""
     data = rig.controls[control]
-    pressures = np.linspace(0.0, max(data.schedule.dynamic_pressure), _PRESSURES)
+    most = max(data.schedule.dynamic_pressure)
+    pressures = np.linspace(0.0, most if most > 0.0 else _CONSTANT_Pa, _PRESSURES)
     deflections = data.travel * np.linspace(0.002, 1.0, _DEFLECTIONS)
     made = []
     for name in CONFIGURATIONS[1:]:

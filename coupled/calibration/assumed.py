@@ -62,10 +62,11 @@ def stale(control: Control) -> list[str]:
         for name, value in now.items()
         if not _same(getattr(then, name), value)
     ]
-    used = {"S1": (then.s1, control.sensing.s1), "S3": (then.s3, control.sensing.s3)}
-    used["K"] = (max(then.bend, 0.0), control.compensation.bend)
-    if then.s2 > 0.0:
-        used["S2"] = (then.s2, control.sensing.s2)
+    sensing, scales = control.sensing, {"S1": then.s1, "S2": then.s2, "S3": then.s3}
+    used = {"K": (max(then.bend, 0.0), control.compensation.bend)}
+    for name, value in scales.items():
+        if value > 0.0:
+            used[name] = (value, getattr(sensing, name.lower()))
     changes += [
         f"the host uses {name} = {value:.6g}, not the calibrated {found:.6g}"
         for name, (found, value) in used.items()

@@ -29,6 +29,7 @@ from coupled.rig.rigfile import read_rig
 
 Floats = NDArray[np.float64]
 DEFAULT_RIG = "report-column"
+_COUNT = 0.3  # of a count: least error of a converter's reading, beside its step
 EXTREME = 3.0  # standard deviations of the hand by which friction displaces a control
 
 
@@ -77,6 +78,9 @@ def calibrate_control(
 
     Raises InputError for insufficient readings: too few, all of one force, or of one gradient.
     """
+    if readings.signal == "counts":  # a meter's usual step is no converter's
+        own = max(instruments.meter, _COUNT)
+        instruments = replace(instruments, meter=own, meter_step=1.0)
     corrected, level, angles = _on_arc(readings, control, file)
     refuse_poor(corrected, control, name, instruments, file)
     suspects = find_suspects(corrected, instruments)
@@ -105,7 +109,7 @@ def calibrate_control(
         problem = "K is negative, and no structure bends against its force"
         raise InputError(file, "", f"{problem}; check v1, and the gradient set of each reading")
     there = f != 0.0
-    s2 = scales.s2_from_gains(fit.line.s1, fit.s3, control.gains)
+    s2 = scales.s2_from_gains(fit.line.s1, fit.s3 if used.gauge else None, control.gains)
     loader, sides = control.loader, used.null_side
     rubs = max(loader.friction, loader.breakaway) > 0.0
     one_sided = rubs and len(sides) >= 2 and not scales.both_sides(sides)
@@ -119,10 +123,12 @@ def calibrate_control(
         plain,
         normal_equations(d, f, used.v1),
         condition(d, f),
-        scales.s3_by_ratios(f[there], used.v3[there]),
+        scales.s3_by_ratios(f[there], used.v3[there]) if used.gauge else None,
         s2,
         one_sided,
-        expected(fit, next(reversed(s2.values()), None), control, list(s2)[-1:] == [scales.BY_S1]),
+        expected(fit, next(reversed(s2.values()), None), control, list(s2)[-1:] == [scales.BY_S1])
+        if used.gauge
+        else None,
         tuple(suspects),
         used,
         level,

@@ -27,6 +27,7 @@ from coupled.calibration.estimate import Estimate
 from coupled.calibration.result import CalibrationResult
 from coupled.errors import InputError
 from coupled.record.channels import ControlName, unit_of
+from coupled.rig.guesses import without_guesses
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig
 
@@ -50,25 +51,16 @@ def with_calibration(
     """
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing
-    s1, s2, s3, bend = found.line.s1, found.s2_chosen, found.s3, found.line.bend
+    bend = found.line.bend
     real, reading = real_scales(data), sensing.deflection_scale
-    figures = {"s1": s1, "s2": s2, "s3": s3}
+    figures = _in_volts(found)
     kept = {name: not hardware and _is_filed(data, name, each) for name, each in figures.items()}
+    s1, s2, s3 = figures["s1"], figures["s2"], figures["s3"]
     used = max(bend.value, 0.0)  # no structure bends against its force
-    computed = (real.s1 / s1.value if kept["s1"] else 1.0) / reading
     changes: dict[str, Any] = {
-        f"sensing.s1_V_per_{d}": s1.value,
-        "sensing.s3_V_per_N": s3.value,
-        "sensing.computed_scale": 1.0 if hardware else computed,
-        "sensing.deflection_scale": 1.0 if hardware else reading,
-        "sensing.force_scale": real.s3 / s3.value if kept["s3"] else 1.0,
         f"compensation.bend_{d}_per_N": used,
         "calibration.readings": found.count,
         "calibration.date": date,
-        f"calibration.s1_V_per_{d}": s1.value,
-        f"calibration.s1_error_V_per_{d}": _error(s1),
-        "calibration.s3_V_per_N": s3.value,
-        "calibration.s3_error_V_per_N": _error(s3),
         f"calibration.bend_{d}_per_N": bend.value,
         f"calibration.bend_error_{d}_per_N": _error(bend),
         "calibration.length_m": data.length,
@@ -76,6 +68,22 @@ def with_calibration(
     for name, unit in GAINS.items():
         key = f"{name}_{unit.format(d=d)}" if unit else name
         changes[f"calibration.{key}"] = getattr(data.gains, name)
+    if s1 is not None:
+        computed = (real.s1 / s1.value if kept["s1"] else 1.0) / reading
+        changes |= {
+            f"sensing.s1_V_per_{d}": s1.value,
+            "sensing.computed_scale": 1.0 if hardware else computed,
+            "sensing.deflection_scale": 1.0 if hardware else reading,
+            f"calibration.s1_V_per_{d}": s1.value,
+            f"calibration.s1_error_V_per_{d}": _error(s1),
+        }
+    if s3 is not None:
+        changes |= {
+            "sensing.s3_V_per_N": s3.value,
+            "sensing.force_scale": real.s3 / s3.value if kept["s3"] else 1.0,
+            "calibration.s3_V_per_N": s3.value,
+            "calibration.s3_error_V_per_N": _error(s3),
+        }
     if s2 is not None:
         changes["sensing.s2_V_per_N"] = s2.value
         changes["sensing.modifying_scale"] = real.s2 / s2.value if kept["s2"] else 1.0
@@ -89,7 +97,14 @@ def with_calibration(
         whole[f"structure.assumed.{key}"] = estimate.value
         if hardware:
             whole[f"structure.{key}"] = estimate.value
-    return rig.changed(whole)
+    return rig.changed(whole | without_guesses(rig.controls, whole))
+
+
+def _in_volts(found: CalibrationResult) -> dict[str, Estimate | None]:
+    """Return S₁, S₂ and S₃ by name; of a converter's counts, no rig file has a scale."""
+    if found.readings.signal == "counts":
+        return dict.fromkeys(("s1", "s2", "s3"))
+    return {"s1": found.line.s1, "s2": found.s2_chosen, "s3": found.s3}
 
 
 def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
@@ -105,7 +120,7 @@ def _is_filed(control: Control, name: str, found: Estimate | None) -> bool:
 
 def unstated_scales(control: Control, found: CalibrationResult) -> list[str]:
     """Return the keys of the scales found that the rig file does not state."""
-    scales = (("s1", found.line.s1), ("s2", found.s2_chosen), ("s3", found.s3))
+    scales = _in_volts(found).items()
     units = {"s1": f"V_per_{unit_of(found.control)}"}
     missing = [name for name, each in scales if not _is_filed(control, name, each)]
     return [f"{name}_{units.get(name, 'V_per_N')}" for name in missing]
@@ -152,7 +167,7 @@ def _contradictions(filed: Control, found: CalibrationResult) -> str:
         figures.append(("S1", found.line.s1, real.s1, f"V/{d}"))
     if sensing.s2 and found.s2_chosen is not None:
         figures.append(("S2", found.s2_chosen, real.s2, "V/N"))
-    if sensing.s3:
+    if sensing.s3 and found.s3 is not None:
         figures.append(("S3", found.s3, real.s3, "V/N"))
     far = [
         f"{name} is {estimate.value:.4g} {unit} by the readings and {value:.4g} by the file"

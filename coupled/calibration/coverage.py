@@ -137,7 +137,7 @@ def _trial(bench: CalibrationBench, seed: int) -> Trial:
         {
             "K": found.line.bend.holds(bend),
             "S1": found.line.s1.holds(true.s1),
-            "S3": found.s3.holds(true.s3),
+            "S3": found.fit.s3.holds(true.s3),
             "S2": None if s2 is None else s2.holds(true.s2),
             **{f"K by {name}": one.holds(terms[name]) for name, one in found.fit.others.items()},
         },
@@ -153,7 +153,7 @@ def _most_off(found: CalibrationResult, data: Control) -> tuple[float, float]:
     """Return the largest relative errors of δ̂ and of the felt gradient."""
     true, bend = real_scales(data), data.loader.bend
     k, s2 = found.line.bend.value, found.s2_chosen
-    assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.s3.value)
+    assumed = Scales(found.line.s1.value, true.s2 if s2 is None else s2.value, found.fit.s3.value)
     table, basic = data.schedule.total_gradient, data.loader.basic_gradient
     gradients = [float(g) for g in np.linspace(min(table), max(table), 3)]
     made = made_of_asked(assumed, true)

@@ -30,6 +30,7 @@ from coupled.calibration.sandwich import Sandwich, sandwich
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 100
+BLIND = 1e6  # of the greatest force: standard deviation of a v3 that nobody read
 FINEST = 1e-6  # of the largest voltage: least error of a meter, which keeps W regular
 
 
@@ -132,11 +133,14 @@ def reading_variances(readings: Readings, instruments: Instruments) -> Floats:
     """Return the variances of δ, F, v₁ and v₃ as read, shape (n, 4)."""
     volts = np.column_stack((readings.v1, readings.v3))
     finest = (FINEST * np.max(np.abs(volts), axis=0)) ** 2
+    own = np.maximum(instruments.voltage_variance(volts), finest)
+    if not readings.gauge:
+        own[:, 1] = (BLIND * np.max(np.abs(volts[:, 1]))) ** 2
     return np.column_stack(
         (
             instruments.deflection_variance(readings.deflection, readings.deflection_looks),
             instruments.force_variance(readings.force, readings.force_looks),
-            np.maximum(instruments.voltage_variance(volts), finest),
+            own,
         )
     )
 

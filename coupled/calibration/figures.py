@@ -29,7 +29,8 @@ def rows(found: CalibrationResult, system: System = "si") -> Iterator[Row]:
     K is given in in/lb (°/lb) as well, the unit of its printed formulas.
     """
     d, bend = unit_of(found.control), found.line.bend
-    s1, s3, own = (in_system(text, system) for text in (f"V/{d}", "V/N", f"{d}/N"))
+    v = found.readings.signal
+    s1, s3, own = (in_system(text, system) for text in (f"{v}/{d}", f"{v}/N", f"{d}/N"))
     unit, factor = ("in/lb", 1.0 / INCH_PER_POUND_m_per_N)
     if d == "rad":
         unit, factor = ("°/lb", POUND_N / DEGREE_rad)
@@ -46,8 +47,9 @@ def rows(found: CalibrationResult, system: System = "si") -> Iterator[Row]:
     yield ("  normal equations, appendix A", written(-b / a * factor, plain.error), "", "")
     for name, estimate in found.fit.others.items():
         yield _row(f"K by {name}, {own.unit}", estimate.scaled(own.factor))
-    yield _row(f"S3, {s3.unit}", found.s3.scaled(s3.factor))
-    yield _row("  mean of v3/F, eq. (13)", found.s3_mean.scaled(s3.factor))
+    if found.s3 is not None and found.s3_mean is not None:
+        yield _row(f"S3, {s3.unit}", found.s3.scaled(s3.factor))
+        yield _row("  mean of v3/F, eq. (13)", found.s3_mean.scaled(s3.factor))
     for i, (way, estimate) in enumerate(found.s2.items()):
         yield _row(f"{'  ' if i else f'S2, {s3.unit}, '}by {way}", estimate.scaled(s3.factor))
 
@@ -77,12 +79,12 @@ def written(value: float, error: float) -> str:
 
 def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
     """Return remarks on residuals, the choice of the fit, excluded readings and accuracy."""
-    line, plain = found.line, found.plain
+    line, plain, v = found.line, found.plain, found.readings.signal
     size = np.abs(line.residual)
     row = found.readings.row[int(np.argmax(size))]
     lines = [
-        f"residuals of v1: {float(np.sqrt(np.mean(size**2))):.3g} V rms,"
-        f" largest {size.max():.3g} V in row {row}",
+        f"residuals of v1: {float(np.sqrt(np.mean(size**2))):.3g} {v} rms,"
+        f" largest {size.max():.3g} {v} in row {row}",
         f"condition number {found.condition:.3g}; errors of S1 and K correlate by"
         f" {line.correlation:+.2f}",
     ]
@@ -99,6 +101,8 @@ def remarks(found: CalibrationResult, system: System = "si") -> list[str]:
             f" {off:+.2f} standard errors off. Use the fit with errors in all variables;"
             " the ordinary one only if the voltmeter alone errs, or to compare with an old fit."
         )
+    if found.s3 is None:
+        lines.append("v3 was not read: S3 stays as in the rig file.")
     for s in found.suspects:
         lines.append(
             f"row {s.row} is excluded: {s.columns} is {s.deviations:.0f} standard deviations"

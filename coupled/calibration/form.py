@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from coupled.calibration.plan import Station
+from coupled.display import System, in_system
 from coupled.record.channels import ControlName, unit_of
 
 
@@ -13,24 +14,33 @@ def form(
     control: str,
     looks: int = 2,
     crossed: Mapping[ControlName, Sequence[float]] | None = None,
+    system: System = "si",
 ) -> str:
     """Return a plan as a CSV to be filled in: what to hold, and empty cells.
 
-    `crossed` is what to hold on other controls, N, by reading.
+    `crossed` is what to hold on other controls, N, by reading. A form in `us` takes inches (degrees
+    of a wheel) and pounds.
     """
     others = dict(crossed or {})
-    unit = unit_of(control)
-    heads = [f"gradient_set,deflection_{unit},force_N,v1_V,v3_V"]
-    heads += [f"force_after_N,deflection_after_{unit}"] if looks == 2 else []
-    heads += [f"force_on_{name}_N" for name in others]
+    moved, force, pressure = (in_system(unit, system) for unit in (unit_of(control), "N", "Pa"))
+    unit = "deg" if moved.unit == "°" else moved.unit
+    heads = [f"gradient_set,deflection_{unit},force_{force.unit},v1_V,v3_V"]
+    heads += [f"force_after_{force.unit},deflection_after_{unit}"] if looks == 2 else []
+    heads += [f"force_on_{name}_{force.unit}" for name in others]
     lines = [",".join([*heads, "v2_V,approach,remark"])]
     empty = "," * (7 + 2 * (looks == 2) + len(others))
     for station, count in chosen:
-        where = f"hold at {station.deflection:.4g} {unit} and about {station.force:.3g} N"
-        where += f" with {station.pressure_Pa:.5g} Pa given to the host"
+        where = f"hold at {moved.written(station.deflection)} {unit}"
+        where += f" and about {force.written(station.force, 3)} {force.unit}"
+        where += (
+            f" with {pressure.written(station.pressure_Pa, 5)} {pressure.unit} given to the host"
+        )
         for _ in range(count):
             at = len(lines) - 1
-            held = [f" and {forces[at]:g} N on the {name}" for name, forces in others.items()]
+            held = [
+                f" and {force.written(forces[at])} {force.unit} on the {name}"
+                for name, forces in others.items()
+            ]
             lines.append(f"{station.label}{empty}{where}{''.join(held)}")
     return "\n".join(lines) + "\n"
 

@@ -25,6 +25,7 @@ from coupled.campaign.tolerances import (
 )
 from coupled.record.channels import CONTROL_NAMES, ControlName, unit_of
 from coupled.rig.equations import specified_gradient
+from coupled.rig.guesses import guess_note
 from coupled.units import POUND_N, DEGREE_rad, KNOT_m_per_s
 
 NOT_GIVEN = "not given"
@@ -76,8 +77,10 @@ def written(number: float) -> str:
 def cover_rows(documents: Sequence[Documentation], issue: Issue, version: str) -> Rows:
     """Return the content of a document's cover, in rows of name and value."""
     rig = documents[0].rig
+    note = guess_note(rig.controls, [found.control for found in documents])
     return (
         ("rig", rig.name),
+        *((("guesses", note),) if note else ()),
         ("rig file", issue.rig_file),
         ("SHA-256 of the rig file", issue.rig_sha256),
         ("aircraft model", "none, on the bench" if rig.flight is None else rig.flight.model),

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Signal = Literal["V", "counts"]
+_WHOLE = ("label", "other_names", "gauge", "signal")  # fields that are no column of numbers
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,9 @@ class Readings:
     restored v1, and `null_side`, +1 for an outward approach and −1 for an inward one. `others` are
     the forces held on other controls of the same structure, N, shape (readings,
     len(`other_names`)), each read once.
+
+    Without a `gauge` there is no v3: F stands in its place with no weight. `signal` is the unit of
+    v1, v2 and v3: volts, or counts of a converter.
     """
 
     row: NDArray[np.int64]
@@ -38,6 +44,8 @@ class Readings:
     null_side: Floats
     other_names: tuple[str, ...]
     others: Floats
+    gauge: bool = True
+    signal: Signal = "V"
 
     @property
     def deflection_looks(self) -> Floats:
@@ -55,10 +63,11 @@ class Readings:
         kept = {
             name: values[null if name.startswith("null_") else keep]
             for name, values in self.__dict__.items()
-            if name not in ("label", "other_names")
+            if name not in _WHOLE
         }
         label = tuple(name for name, ours in zip(self.label, keep, strict=True) if ours)
-        return Readings(label=label, other_names=self.other_names, **kept)
+        own = {name: getattr(self, name) for name in _WHOLE if name != "label"}
+        return Readings(label=label, **own, **kept)
 
 
 def readings_of(
@@ -68,14 +77,17 @@ def readings_of(
     null_rows: Sequence[int],
     null: Floats,
     others: Mapping[str, Floats] | None = None,
+    signal: Signal = "V",
 ) -> Readings:
     """Return readings from their columns in SI.
 
     `columns`: δ, F, v₁, v₃ and both rises, shape (6, readings); `null`: v₁, v₂, v₃ and the
-    side, shape (4, nulls). `others`: {another control: the force held on it in N}.
+    side, shape (4, nulls). `others`: {another control: the force held on it in N}. v₃ is NaN
+    in every reading where there is no gauge.
     """
     held = others or {}
     deflection, force, v1, v3, deflection_rise, force_rise = columns
+    gauge = not (v3.size and np.isnan(v3).all())
     null_v1, null_v2, null_v3, null_side = null
     return Readings(
         row=np.array(rows, np.int64),
@@ -83,7 +95,7 @@ def readings_of(
         deflection=deflection,
         force=force,
         v1=v1,
-        v3=v3,
+        v3=v3 if gauge else force,
         deflection_rise=deflection_rise,
         force_rise=force_rise,
         null_row=np.array(null_rows, np.int64),
@@ -93,4 +105,6 @@ def readings_of(
         null_side=null_side,
         other_names=tuple(held),
         others=np.array(list(held.values()), float).reshape(len(held), len(rows)).T,
+        gauge=gauge,
+        signal=signal,
     )

@@ -8,6 +8,8 @@ the supply's voltage that restored v1, `approach` the side of the approach: out,
 beyond. Its deflection and force may be empty. Forces held on other controls of the same structure
 are further columns, force_on_wheel_N and the like, 0 if not held. Rows are numbered as in a text
 editor, the heads being row 1.
+
+S₁ and K need no v3, whose column may be left out. v1_counts and v3_counts are a converter's.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.calibration.readings import Readings, readings_of
+from coupled.calibration.readings import Readings, Signal, readings_of
 from coupled.errors import InputError, collected, nearest, together
 from coupled.files import read_text, write_text
 from coupled.record.channels import CONTROL_NAMES
@@ -37,6 +39,7 @@ LABEL, APPROACH, REMARK = "gradient_set", "approach", "remark"
 LENGTHS = {"deflection_m": 1.0, "deflection_mm": 1e-3, "deflection_in": INCH_m}
 ANGLES = {"deflection_rad": 1.0, "deflection_deg": DEGREE_rad}
 ON = "on "  # before the name of another control that a force is held on
+SIGNALS = tuple(f"{name}_{unit}" for unit in ("V", "counts") for name in ("v1", "v2", "v3"))
 FORCES = {"force_N": 1.0, "force_lb": POUND_N}
 SIDES = {"out": 1.0, "in": -1.0}
 
@@ -64,7 +67,8 @@ def read_readings(path: Path, control: str) -> Readings:
     read = _read_rows(path, parsed, units, faults)
     if faults:
         raise together(faults)
-    return _assembled(read, [quantity for quantity in units if quantity.startswith(ON)])
+    others = [quantity for quantity in units if quantity.startswith(ON)]
+    return _assembled(read, others, signal_of(path, heads))
 
 
 def rows_of(path: Path) -> list[tuple[int, list[str]]]:
@@ -118,7 +122,7 @@ def _read_row(
     units: dict[str, tuple[str, float]],
     faults: list[InputError],
 ) -> _Row:
-    null = "v2" in units and cells["v2_V"] != ""
+    null = "v2" in units and cells[units["v2"][0]] != ""
     may_lack = {"v2", "deflection after", "force after"}
     if null:
         may_lack |= {"deflection", "force", *(name for name in units if name.startswith(ON))}
@@ -141,7 +145,7 @@ def _read_row(
     return _Row(number, cells[LABEL], value, side)
 
 
-def _assembled(rows: list[_Row], others: list[str]) -> Readings:
+def _assembled(rows: list[_Row], others: list[str], signal: Signal) -> Readings:
     taken: list[tuple[int, str, tuple[float, ...]]] = []
     nulls: list[tuple[int, tuple[float, ...]]] = []
     for row in rows:
@@ -151,7 +155,7 @@ def _assembled(rows: list[_Row], others: list[str]) -> Readings:
         if "deflection" in value and "force" in value:
             means = [_mean(value, quantity) for quantity in ("deflection", "force")]
             (delta, rise), (force, force_rise) = means
-            six = (delta, force, value["v1"], value["v3"], rise, force_rise)
+            six = (delta, force, value["v1"], value.get("v3", math.nan), rise, force_rise)
             held = tuple(value.get(quantity, 0.0) for quantity in others)
             taken.append((row.number, row.label, six + held))
     columns = np.array([one for *_, one in taken], float).reshape(-1, 6 + len(others)).T
@@ -163,6 +167,7 @@ def _assembled(rows: list[_Row], others: list[str]) -> Readings:
         [number for number, _ in nulls],
         np.array([four for _, four in nulls], float).reshape(-1, 4).T,
         crossed,
+        signal,
     )
 
 
@@ -236,7 +241,7 @@ def _shown(number: float) -> str:
 def units_of(path: Path, heads: list[str], control: str) -> dict[str, tuple[str, float]]:
     """Return {quantity: (column, factor to SI)} once the columns are known and of one system."""
     ours, other = (ANGLES, LENGTHS) if control == "wheel" else (LENGTHS, ANGLES)
-    known = [LABEL, APPROACH, REMARK, *ours, *FORCES, "v1_V", "v2_V", "v3_V"]
+    known = [LABEL, APPROACH, REMARK, *ours, *FORCES, *SIGNALS]
     known += [after(head) for head in [*ours, *FORCES]]
     crossed = {on(name, head): name for name in CONTROL_NAMES if name != control for head in FORCES}
     known += crossed
@@ -252,7 +257,7 @@ def units_of(path: Path, heads: list[str], control: str) -> dict[str, tuple[str,
                 else nearest(head, known)
             )
             raise InputError(path, f"row 1: {head}", f"is no column of readings; {hint}")
-    found = {"v1": ("v1_V", 1.0), "v3": ("v3_V", 1.0)}
+    found = _voltages(path, heads)
     for quantity, choices in (("deflection", ours), ("force", FORCES)):
         present = [head for head in heads if head in choices]
         if len(present) > 1:
@@ -274,9 +279,26 @@ def units_of(path: Path, heads: list[str], control: str) -> dict[str, tuple[str,
         problem = f"mixes units: {found['deflection'][0]} with {found['force'][0]}"
         raise InputError(path, "row 1", f"{problem}; give inches and pounds, or metres and newtons")
     found |= _crossed(path, heads, crossed)
-    if "v2_V" in heads:
-        found["v2"] = ("v2_V", 1.0)
     return found
+
+
+def _voltages(path: Path, heads: list[str]) -> dict[str, tuple[str, float]]:
+    """Return {quantity: (column, 1)} of v1, and of v2 and v3 where they are there."""
+    signal = signal_of(path, heads)
+    there = {name: f"{name}_{signal}" for name in ("v1", "v3", "v2")}
+    if there["v2"] in heads and there["v3"] not in heads:
+        problem = f"{there['v2']} is of the null of S2, which needs {there['v3']} as well"
+        raise InputError(path, "row 1", problem)
+    return {n: (column, 1.0) for n, column in there.items() if n == "v1" or column in heads}
+
+
+def signal_of(path: Path, heads: list[str]) -> Signal:
+    """Return the unit of the voltages: volts, or counts of a converter. Raises for both."""
+    counts = [head for head in heads if head in SIGNALS and head.endswith("_counts")]
+    volts = [head for head in heads if head in SIGNALS and head.endswith("_V")]
+    if counts and volts:
+        raise InputError(path, "row 1", f"mixes units: {volts[0]} with {counts[0]}; give one unit")
+    return "counts" if counts else "V"
 
 
 def _crossed(

@@ -36,7 +36,7 @@ class CalibrationResult:
     plain: LineFit
     printed: tuple[float, float]
     condition: float
-    s3_mean: Estimate
+    s3_mean: Estimate | None
     s2: dict[str, Estimate]
     one_sided: bool
     accuracy: Accuracy | None
@@ -52,9 +52,9 @@ class CalibrationResult:
         return self.fit.line
 
     @property
-    def s3(self) -> Estimate:
-        """S₃ in V/N with errors in all variables."""
-        return self.fit.s3
+    def s3(self) -> Estimate | None:
+        """S₃ in V/N with errors in all variables; None where v₃ was not read."""
+        return self.fit.s3 if self.readings.gauge else None
 
     @property
     def count(self) -> int:
@@ -75,31 +75,32 @@ class CalibrationResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON, with units in the names."""
-        d = unit_of(self.control)
+        d, signal = unit_of(self.control), self.readings.signal
         fits = {"errors_in_variables": self.line, "ordinary_least_squares": self.plain}
         table: dict[str, Any] = {"control": self.control, "readings": self.count}
         for name, fit in fits.items():
             table[name] = {
-                f"s1_V_per_{d}": fit.s1.as_dict(),
+                f"s1_{signal}_per_{d}": fit.s1.as_dict(),
                 f"bend_{d}_per_N": fit.bend.as_dict(),
                 "correlation": fit.correlation,
                 "residuals_over_instruments": None if np.isnan(fit.excess) else fit.excess,
-                "residual_V": fit.residual.tolist(),
+                f"residual_{signal}": fit.residual.tolist(),
             }
         a, b = self.printed
-        table["normal_equations"] = {f"a_V_per_{d}": a, "b_V_per_N": b}
+        table["normal_equations"] = {f"a_{signal}_per_{d}": a, f"b_{signal}_per_N": b}
         table["condition"] = self.condition
         if self.fit.others:
             table["bend_by_others"] = {
                 f"{self.control}_by_{name}_{d}_per_N": one.as_dict()
                 for name, one in self.fit.others.items()
             }
-        table["s3_V_per_N"] = {
-            "eq_13": self.s3_mean.as_dict(),
-            "errors_in_variables": self.s3.as_dict(),
-        }
+        if self.s3 is not None and self.s3_mean is not None:
+            table[f"s3_{signal}_per_N"] = {
+                "eq_13": self.s3_mean.as_dict(),
+                "errors_in_variables": self.s3.as_dict(),
+            }
         table["correlation_of_s1_bend_s3"] = self.fit.correlation.tolist()
-        table["s2_V_per_N"] = {way: estimate.as_dict() for way, estimate in self.s2.items()}
+        table[f"s2_{signal}_per_N"] = {way: estimate.as_dict() for way, estimate in self.s2.items()}
         if self.accuracy is not None:
             table["outcome"] = self.accuracy.as_dict(d)
         table["rows"] = self.readings.row.tolist()

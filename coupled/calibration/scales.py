@@ -17,12 +17,12 @@ def s3_by_ratios(force: Floats, v3: Floats) -> Estimate:
     return mean_of(v3 / force)
 
 
-def s2_from_gains(s1: Estimate, s3: Estimate, gains: Gains) -> dict[str, Estimate]:
+def s2_from_gains(s1: Estimate, s3: Estimate | None, gains: Gains) -> dict[str, Estimate]:
     """Return S₂ in V/N from each known internal gain: S₁/(S₁/S₂) and S₃/(S₃/S₂)."""
     found = {}
     if gains.s1_over_s2 > 0.0:
         found[BY_S1] = s1.scaled(1.0 / gains.s1_over_s2)
-    if gains.s3_over_s2 > 0.0:
+    if gains.s3_over_s2 > 0.0 and s3 is not None:
         found["S3 and the gain S3/S2"] = s3.scaled(1.0 / gains.s3_over_s2)
     return found
 

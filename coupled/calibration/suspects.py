@@ -43,12 +43,14 @@ def find_suspects(readings: Readings, instruments: Instruments) -> list[Suspect]
     suspects = []
     if len(readings.row) >= FEWEST:
         line = _off_the_line(readings, instruments)
-        ratio = _off_the_ratio(
-            readings.v3,
-            readings.force,
-            instruments.voltage_variance(readings.v3),
-            instruments.force_variance(readings.force, readings.force_looks),
-        )
+        ratio = np.zeros(len(readings.row))
+        if readings.gauge:
+            ratio = _off_the_ratio(
+                readings.v3,
+                readings.force,
+                instruments.voltage_variance(readings.v3),
+                instruments.force_variance(readings.force, readings.force_looks),
+            )
         for row, one, two in zip(readings.row, line, ratio, strict=True):
             if max(one, two) > TOO_FAR:
                 where = "force" if min(one, two) > TOO_FAR else "deflection or v1"

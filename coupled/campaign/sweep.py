@@ -22,6 +22,7 @@ from coupled.errors import InputError
 from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
+from coupled.rig.guesses import guess_note
 
 Progress = Callable[[str, int, int], None]
 TABLE = "table.parquet"
@@ -48,15 +49,18 @@ class SweepResult:
 
     @property
     def remarks(self) -> list[str]:
-        """Explanations of the losses, a sentence each, from the first flight's rig."""
+        """Explanations of the losses, and guesses of the rig, by the first flight's rig."""
         asked = self.plan.sweep
-        if not {"loss", "loss_closed_form"} & set(asked.keep):
-            return []
         first = planned_flights(self.plan)[0]
         try:
-            return sweep_remarks(self.plan.scenario(first.changes), asked.configurations)
+            flown = self.plan.scenario(first.changes)
         except InputError:  # a flight that cannot be flown, as the table says
             return []
+        keys = [key for one in asked.vary for key in (one.key, *one.also)]
+        note = guess_note(flown.rig.controls, (), [key.removeprefix("rig.") for key in keys])
+        losses = {"loss", "loss_closed_form"} & set(asked.keep)
+        said = sweep_remarks(flown, asked.configurations) if losses else []
+        return [*said, *([note] if note else [])]
 
     @property
     def numeric_keys(self) -> list[str]:

@@ -61,6 +61,11 @@ UnitsOption = Annotated[
     ),
 ]
 
+WideOption = Annotated[
+    bool,
+    typer.Option("--wide", help="Tables with all columns, wider than the terminal if need be."),
+]
+
 
 def main() -> None:
     """Run the command line; every fault of input is one line and exit code 2."""
@@ -96,6 +101,8 @@ def _run() -> int:
         line = _lines_of(error)
     except TyperException as error:  # a word of the command line that it does not know
         words = " ".join(error.format_message().split()).replace("Value error, ", "")
+        if not words:  # a group without a command: its help has been printed
+            return 0
         line = shown(words, 400) + " (coupled --help shows what there is)"
     except (OSError, MemoryError) as error:
         line = said_of(error)

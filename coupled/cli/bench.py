@@ -20,7 +20,7 @@ from coupled.cli.rigs import (
     StrongestOption,
     instruments,
     rig_and_control,
-    say_stale,
+    say_doubts,
 )
 from coupled.cli.terminal import check_json, give_json, keep_json, out, print_json, say, say_note
 from coupled.errors import InputError
@@ -80,7 +80,7 @@ def bench(
     if not repeat:
         check_target(path, [file])
     check_json(json_file, [file, path])
-    say_stale(data)
+    say_doubts(data)
     tools = instruments(name, error)
     grid = stations(data, name, gradients, deflections, strongest)
     if precision is not None:

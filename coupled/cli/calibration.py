@@ -149,7 +149,7 @@ def _calibrate(
             from coupled.plots.readings import draw_readings
             from coupled.plots.saving import save
 
-            save(draw_readings(found, shown(path.name)), outputs.at(figure))
+            save(draw_readings(found, shown(path.name), units), outputs.at(figure))
         keep_json(found.as_dict(), json_file, outputs)
         if report is not None:
             from coupled.reports.calibration import calibration_report
@@ -157,7 +157,7 @@ def _calibrate(
             names = (data.name, shown(path.name), date)
             inputs = [path, file]
             write_report(
-                report, outputs, inputs, lambda made: calibration_report(found, *names, made)
+                report, outputs, inputs, lambda made: calibration_report(found, *names, made, units)
             )
     if json_file != "-":
         print_calibration(out, found, units)
@@ -219,7 +219,7 @@ def _plan(
         table["bend_by_others_half_width"] = terms
     with Outputs() as outputs:
         if write is not None:
-            write_text(outputs.at(write), form(chosen, control, looks, held))
+            write_text(outputs.at(write), form(chosen, control, looks, held, units))
         keep_json(table, json_file, outputs)
     if json_file != "-":
         print_plan(out, control, grids, chosen, reached, needs, units)

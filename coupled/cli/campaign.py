@@ -11,6 +11,7 @@ from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
 from coupled.cli.process import asked_to_stop
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
+from coupled.cli.rigs import say_guesses
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target, write_text
@@ -50,6 +51,7 @@ def check(
         check_target(junit, inputs)
     own = [*inputs, *([junit] if junit else [])]
     check_json(json_file, [*own, *check_report(report, own)])
+    notes = [say_guesses(rig) for rig in {s.rig.name: s.rig for s, *_ in found}.values()]
     with progress() as advance:
         checked = check_runs(found, advance)
     if asked_to_stop():  # what was flown of the last run says nothing of it
@@ -62,7 +64,8 @@ def check(
         if report is not None:
             from coupled.reports.check import check_report as reported
 
-            write_report(report, outputs, inputs, lambda made: reported(checked, made))
+            note = " ".join(dict.fromkeys(filter(None, notes)))
+            write_report(report, outputs, inputs, lambda made: reported(checked, made), note)
     if json_file != "-":
         print_verdicts(out, checked.verdicts, units)
         if junit is not None:
@@ -166,13 +169,13 @@ def _show(
     with Outputs() as outputs:
         if found.indices:
             write_indices(found.indices, outputs.at(target / INDICES))
-        save(draw_result(found), outputs.at(path))
+        save(draw_result(found, units), outputs.at(path))
         keep_json(rows, json_file, outputs)
         if report is not None:
             from coupled.reports.sweep import sweep_report
 
             inputs = [found.plan.file, found.plan.run_file, *sorted(found.plan.files)]
-            write_report(report, outputs, inputs, lambda made: sweep_report(found, made))
+            write_report(report, outputs, inputs, lambda made: sweep_report(found, made, units))
     if json_file != "-":
         print_sweep(out, table, asked.keep, units)
         for sentence in found.remarks:

@@ -12,7 +12,7 @@ import typer
 from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_stale
+from coupled.cli.rigs import DEFAULT_RIG, instruments, rig_and_control, say_doubts
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, sha256, write_text
@@ -88,7 +88,7 @@ def document(
     check_target(pdf, inputs, made=folder)
     own = [*inputs, pdf, *([write] if write else [])]
     check_json(json_file, [*own, *check_report(report, own, folder)])
-    say_stale(data)
+    say_doubts(data)
     text = ""
     if write is not None:
         data, text = _remedied(data, chosen, file, write, [*inputs, pdf])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, app
+from coupled.cli.app import JsonOption, WideOption, app
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.rigs import ControlOption
@@ -46,6 +46,7 @@ def fit(
         typer.Option("--output", "-o", metavar="NEW.toml", help="Write the fitted rig there."),
     ] = None,
     json_file: JsonOption = "",
+    wide: WideOption = False,
 ) -> None:
     """Fit a nominal rig to records of a healthy machine, and say what they do not determine."""
     from coupled.gap.nominal import fit_nominal
@@ -65,7 +66,8 @@ def fit(
             write_text(outputs.at(output), text)
         keep_json(fitted.as_dict(), json_file, outputs)
     if json_file != "-":
-        _print(fitted)
+        with out.widened(wide):
+            _print(fitted)
         if output is not None:
             say(f"fitted rig: {output}")
     print_json(fitted.as_dict(), json_file)

@@ -13,13 +13,13 @@ from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
 from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import say_stale
+from coupled.cli.rigs import say_doubts, say_stale
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
-from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs
+from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs, shipped_sweeps
 from coupled.timing import timed
 
 if TYPE_CHECKING:
@@ -67,12 +67,14 @@ def compare(
             from coupled.plots.flights import draw_comparison
             from coupled.plots.saving import save
 
-            save(draw_comparison(flights), outputs.at(path))
+            save(draw_comparison(flights, units), outputs.at(path))
         keep_json(table, json_file, outputs)
         if report is not None:
             from coupled.reports.comparison import comparison_report
 
-            write_report(report, outputs, inputs, lambda made: comparison_report(flights, made))
+            write_report(
+                report, outputs, inputs, lambda made: comparison_report(flights, made, units)
+            )
     if json_file != "-":
         print_comparison(out, flights, units)
         if not no_figure:
@@ -120,7 +122,7 @@ def fly(
     for target in (path, manifest_path(path)):
         check_target(target, inputs)
     check_json(json_file, [*inputs, path, manifest_path(path)])
-    say_stale(manoeuvre.rig)
+    say_doubts(manoeuvre.rig)
     with progress() as advance:
         flight = fly_and_judge(
             manoeuvre,
@@ -163,7 +165,7 @@ def plot(
 
 @app.command()
 def runs(json_file: JsonOption = "") -> None:
-    """List the shipped run files, what each shows, and the shipped rigs."""
+    """List the shipped runs and sweeps, what each shows, and the shipped rigs."""
     from coupled.schema import load_toml
 
     check_json(json_file, [])
@@ -173,7 +175,8 @@ def runs(json_file: JsonOption = "") -> None:
         for name, card in cards.items():
             table.add_row(name, card["rig"], _sentence(card["card"]))
         print_whole(out, table)
-        out.print("\nrigs: " + ", ".join(shipped_rigs()))
+        out.print("\nsweeps: " + ", ".join(shipped_sweeps()))
+        out.print("rigs: " + ", ".join(shipped_rigs()))
     rows = [
         {"run": n, "rig": c["rig"], "card": " ".join(c["card"].split())} for n, c in cards.items()
     ]

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coupled.cli.app import JsonOption, UnitsOption, app, check_cluster
+from coupled.cli.app import JsonOption, UnitsOption, WideOption, app, check_cluster
 from coupled.cli.held import RECORDS, check_rig_target, files_read, read_each
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
-from coupled.cli.rigs import ControlOption
+from coupled.cli.rigs import ControlOption, say_guesses
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say
 from coupled.errors import InputError, shown
 from coupled.files import check_target, check_targets, write_text
@@ -83,6 +83,7 @@ def diagnose(
     json_file: JsonOption = "",
     report: ReportOption = None,
     units: UnitsOption = "si",
+    wide: WideOption = False,
 ) -> None:
     """Find where records depart from their rig, the effect behind it, and how much it explains."""
     name = control_named(control, records[0])
@@ -107,19 +108,21 @@ def diagnose(
     targets += check_report(report, [*inputs, *targets], plots)
     check_json(json_file, [*inputs, *targets])
     whole, read = _diagnose(records, rig_file, name, healthy or [])
+    note = say_guesses(whole.nominal, (name,))
     worse = improve is not None and not whole.improves
     table = whole.as_dict(power) if json_file else {}
     with progress("drawing and writing"), Outputs() as outputs:
         if improve is not None and not worse:
             _write_improved(outputs.at(improve), whole, rig_file, read)
         if plots is not None:
-            _draw(outputs.folder(plots), whole)
+            _draw(outputs.folder(plots), whole, note)
         keep_json(table, json_file, outputs)
-        _report(report, outputs, inputs, whole, power)
+        _report(report, outputs, inputs, (whole, power, note))
     if json_file != "-":
         if rig_file is None:
             say(f"rig: {whole.nominal.name}, of the manifest of {shown(records[0].name)}")
-        _print(whole, power, (None if worse else improve, drawn), units)
+        with out.widened(wide):
+            _print(whole, power, (None if worse else improve, drawn), units)
         say_report(report)
         if worse:
             say(f"not written: {improve}. With it the flight stays further from the record")
@@ -181,6 +184,15 @@ def _print(
         say(f"figure: {figure}")
 
 
+# Why a rig that is improved has a key that is no effect's number.
+_GOES_WITH = "which goes with what was found; it has no effect of its own"
+_BESIDE = {
+    "servo_damping_ratio": "since a file gives both numbers of a servo or none",
+    "model_folder": "whole, since this file may lie elsewhere",
+    "guesses": "without the numbers that are found now",
+}
+
+
 def _write_improved(
     path: Path, whole: Diagnosis, rig_file: Path | None, records: dict[str, Record]
 ) -> None:
@@ -207,6 +219,11 @@ def _write_improved(
     remark += "".join(f"{sentence}\n" for sentence in outdated_bends(filed, whole.improved))
     # The trim was taken from the record, and is no change of the rig file.
     changes = differences(trimmed(filed, records)[0], whole.improved)
+    said = remark
+    for key in changes:
+        dotted = ".".join(key)
+        if key[-1] not in said and dotted not in said:
+            remark += f"written beside these: {dotted}, {_BESIDE.get(key[-1], _GOES_WITH)}\n"
     write_text(path, edited(text, changes, remark))
 
 
@@ -220,22 +237,26 @@ def _plot_targets(folder: Path | None) -> list[Path]:
 
 
 def _report(
-    path: Path | None, outputs: Outputs, inputs: list[Path], whole: Diagnosis, power: bool
+    path: Path | None, outputs: Outputs, inputs: list[Path], handed: tuple[Diagnosis, bool, str]
 ) -> None:
+    """Write a diagnosis's report; `handed` is it, whether with its power, and a note."""
+    whole, power, note = handed
     if path is None:
         return
     from coupled.reports.diagnosis import diagnosis_report
 
     title = ", ".join(shown(Path(name).name) for name in whole.records)
-    write_report(path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power))
+    write_report(
+        path, outputs, inputs, lambda made: diagnosis_report(whole, title, made, power), note
+    )
 
 
-def _draw(folder: Path, whole: Diagnosis) -> None:
+def _draw(folder: Path, whole: Diagnosis, note: str) -> None:
     from coupled.plots.gaps import draw_diagnosis
     from coupled.plots.saving import save
 
     for file, figure in draw_diagnosis(whole).items():
-        save(figure, folder / file)
+        save(figure, folder / file, note)
 
 
 def _diagnose_folder(

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from coupled.cli.app import JsonOption, app
-from coupled.cli.rigs import say_stale
+from coupled.cli.rigs import say_doubts
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError
 from coupled.files import check_target
@@ -36,7 +36,10 @@ def live(
     rig: Annotated[str, typer.Option(help="A rig to fly without a run, until it is stopped.")] = "",
     case: Annotated[str, typer.Option(help="Case of the run, by its label; else the first.")] = "",
     duration: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="How long; else as the run, or 7200.")
+        float | None,
+        typer.Option(
+            metavar="SECONDS", help="How long; then the page closes. (default: as the run, or 7200)"
+        ),
     ] = None,
     loader: Annotated[
         str, typer.Option(metavar="URL", help="sim, udp://HOST:PORT or cls2sim://HOST:PORT.")
@@ -113,7 +116,7 @@ def live(
     flown = run_live(run, case, duration, who) if run else rig_live(rig, duration)
     path = output or Path("out") / f"{flown.name}.csv"
     _check_targets(flown, path, json_file)
-    say_stale(flown.rig)
+    say_doubts(flown.rig)
     limits = Limits(_positive("--force-limit", force_limit), _positive("--rate-limit", rate_limit))
     warn = _Warner()
     with ExitStack() as ending:
@@ -142,7 +145,7 @@ def live(
             _print(flight, path)
         print_json(flight.record.manifest["live"], json_file)
         if page is not None:
-            _finish(page, flight, path)
+            _finish(page, flight, path, stays=duration is None)
     if flight.record.ended_early:
         err.print(f"[yellow]ended early:[/] {flight.record.ended_early}; the record is kept")
         raise typer.Exit(1)
@@ -222,12 +225,14 @@ def _wishes(who: str, loader: str, axes: str, page: Page | None) -> Wishes | Non
     return page
 
 
-def _finish(page: Page, flight: LiveFlight, path: Path) -> None:
-    """Show on the page what was flown, held against its rig, until its user leaves."""
+def _finish(page: Page, flight: LiveFlight, path: Path, stays: bool) -> None:
+    """Show on the page what was flown, held against its rig; until it is left, where it `stays`."""
     from coupled.live.verdict import diagnosed
 
     page.finish(phase="diagnosing", record=str(path))
     page.finish(phase="done", diagnosis=diagnosed(flight))
+    if not stays:
+        return
     say("the page stays open until it is closed there, or by Ctrl-C")
     with suppress(KeyboardInterrupt):
         page.wait()

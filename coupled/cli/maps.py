@@ -9,7 +9,7 @@ import typer
 
 from coupled.cli.app import UnitsOption, app
 from coupled.cli.progress import progress
-from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.cli.rigs import DEFAULT_RIG, say_doubts
 from coupled.cli.terminal import say
 from coupled.errors import InputError
 from coupled.files import check_targets
@@ -55,7 +55,7 @@ def draw_map(
     for given, flight in zip(record or [], records, strict=True):
         if "dynamic_pressure_Pa" not in flight:
             raise InputError(given, "dynamic_pressure_Pa", "no such column")
-    say_stale(data)
+    note = say_doubts(data)
     with progress() as advance:
         if not record:
             records = shipped_flights(data, advance)
@@ -66,11 +66,11 @@ def draw_map(
             maps[name] = loss_maps(data, name)
     flown = {name: envelope(records, name) for name in data.controls}
     with progress("drawing the maps"), Outputs() as outputs:
-        save(draw_losses(data.name, maps, flown, units), outputs.at(written[0]))
+        save(draw_losses(data.name, maps, flown, units), outputs.at(written[0]), note)
         losses = (loss_map for of_control in maps.values() for loss_map in of_control)
         write_losses(losses, outputs.at(written[1]))
         if felt is not None:
-            save(draw_feel(data.name, felt, units), outputs.at(written[2]))
+            save(draw_feel(data.name, felt, units), outputs.at(written[2]), note)
             write_feel(felt, outputs.at(written[3]))
     if felt is None:
         say("no level trim of a column: no stick force per g or per knot")

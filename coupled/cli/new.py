@@ -2,27 +2,48 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from coupled.cli.app import app
+from coupled.cli.progress import progress
+from coupled.cli.rigs import ControlOption, rig_and_control
 from coupled.cli.terminal import say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target, read_text, write_text
 from coupled.record.channels import CONTROL_NAMES
-from coupled.resources import starter
+from coupled.resources import shipped_rigs, starter
 
 new = typer.Typer(no_args_is_help=True, help="Write a commented file to start from.")
 app.add_typer(new, name="new")
 
 
-@new.command(epilog="[dim]Example: coupled new run pull.toml, then coupled compare ./pull.toml[/]")
+@new.command(
+    epilog="[dim]Examples: coupled new run pull.toml, then coupled compare ./pull.toml"
+    " · coupled new run pull.toml --rig my-rig.toml[/]"
+)
 def run(
     file: Annotated[Path, typer.Argument(help="The new file.")] = Path("my-run.toml"),
+    rig: Annotated[
+        str,
+        typer.Option(
+            metavar="RIG",
+            help="A rig file, or a shipped one: cases that it flies, at speeds and forces of its"
+            " own. (default: the T-37's)",
+        ),
+    ] = "",
+    control: ControlOption = "column",
 ) -> None:
-    """Write a run: a rig, a pilot, two cases, what is measured and expected."""
+    """Write a run: a rig, a pilot, its cases, what is measured and expected."""
+    if rig:
+        check_new(file, ".toml")
+        write_new(file, _run_for(rig, control, file), ".toml", f"coupled compare {_word(file)}")
+        return
+    if control != "column":
+        raise InputError("new run", "--control", "goes with --rig; the starter pulls the column")
     write_new(file, _text("run.toml"), ".toml", f"coupled compare {_word(file)}")
 
 
@@ -66,16 +87,32 @@ def readings(
     write_new(file, starting_form(control, inches), ".csv", f"fill it in, then: {then}")
 
 
-def write_new(file: Path, text: str, suffix: str, then: str) -> None:
-    """Write a starter where no file is yet, and say what to do with it next.
+def _run_for(rig: str, control: str, file: Path) -> str:
+    """Return the text of a run of a rig's own, after its cases have been flown."""
+    from coupled.authority.firstrun import first_run
 
-    Raises InputError for another ending than `suffix`, and where a file is there already.
-    """
+    rig_file, data, name = rig_and_control(rig, control)
+    shipped = shipped_rigs().get(rig) == rig_file
+    word = rig if shipped else Path(os.path.relpath(rig_file, file.resolve().parent)).as_posix()
+    with progress() as advance:
+        return first_run(data, name, word, file.stem, advance)
+
+
+def check_new(file: Path, suffix: str) -> None:
+    """Raise InputError for another ending than `suffix`, and where a file is there already."""
     if file.suffix.lower() != suffix:
         raise InputError(file, "", f"give a name that ends in {suffix}")
     check_target(file)
     if file.exists():
         raise InputError(file, "", "is there already; give the name of a new file")
+
+
+def write_new(file: Path, text: str, suffix: str, then: str) -> None:
+    """Write a starter where no file is yet, and say what to do with it next.
+
+    Raises InputError for another ending than `suffix`, and where a file is there already.
+    """
+    check_new(file, suffix)
     write_text(file, text)
     say(f"written: {file}")
     say(f"next: {then}")

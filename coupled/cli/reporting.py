@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -42,14 +43,25 @@ def check_report(path: Path | None, others: Iterable[Path], made: Path | None = 
 
 
 def write_report(
-    path: Path, outputs: Outputs, inputs: Iterable[Path], report: Callable[[Made], Report]
+    path: Path,
+    outputs: Outputs,
+    inputs: Iterable[Path],
+    report: Callable[[Made], Report],
+    note: str = "",
 ) -> None:
-    """Write a command's report with its other files; `inputs` are the files that it read."""
+    """Write a command's report with its other files; `inputs` are the files that it read.
+
+    The `note` is a sentence below its verdict.
+    """
     from coupled.reports.made import made_by
     from coupled.reports.page import render
 
     command = shlex.join(["coupled", *map(printable, sys.argv[1:])])
-    write_text(outputs.at(path), render(report(made_by(command, inputs))))
+    made = report(made_by(command, inputs))
+    if note:
+        verdict = replace(made.verdict, remarks=(*made.verdict.remarks, note))
+        made = replace(made, verdict=verdict)
+    write_text(outputs.at(path), render(made))
 
 
 def say_report(path: Path | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coupled.cli.terminal import err
+from coupled.cli.terminal import err, say_note
 from coupled.errors import InputError, nearest
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.resources import find, shipped_rigs
@@ -62,6 +62,25 @@ def rig_and_control(name: str, control: str) -> tuple[Path, Rig, ControlName]:
         if known == control and known in rig.controls:
             return file, rig, known
     raise InputError(file, "--control", f"no {control!r}; {nearest(control, rig.controls)}")
+
+
+def say_doubts(rig: Rig) -> str:
+    """Say what has changed since a rig's calibrations, and what `say_guesses` does."""
+    say_stale(rig)
+    return say_guesses(rig)
+
+
+def say_guesses(rig: Rig, controls: Collection[str] = ()) -> str:
+    """Say on the terminal's error side which numbers of a rig are guesses.
+
+    Return the sentence, for figures and reports.
+    """
+    from coupled.rig.guesses import guess_note
+
+    note = guess_note(rig.controls, controls)
+    if note:
+        say_note(note)
+    return note
 
 
 def say_stale(rig: Rig) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from coupled.cli.app import JsonOption, UnitsOption, app
 from coupled.cli.progress import progress
-from coupled.cli.rigs import DEFAULT_RIG, say_stale
+from coupled.cli.rigs import DEFAULT_RIG, say_doubts
 from coupled.cli.terminal import check_json, err, keep_json, out, print_json, say
 from coupled.errors import InputError, nearest
 from coupled.files import check_target
@@ -64,7 +64,7 @@ def stability(
     for target in (path, table):
         check_target(target, [file])
     check_json(json_file, [file, path, table])
-    say_stale(data)
+    note = say_doubts(data)
     asked = [(name, kind) for name in bent for kind in kinds_of(data.controls[name])]
     every = []
     err.print(
@@ -85,7 +85,7 @@ def stability(
         "limits_without_theory": apart.alone,
     }
     with progress("drawing the maps"), Outputs() as outputs:
-        save(draw_stability(data, planes), outputs.at(path))
+        save(draw_stability(data, planes), outputs.at(path), note)
         write_planes(data, every, outputs.at(table))
         keep_json(listed, json_file, outputs)
     if json_file != "-":

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from coupled.errors import InputError, printable
 from coupled.files import check_target, finite, json_text, write_text
 from coupled.outputs import Outputs
 
+WIDEST = 400  # columns of a table that is not fitted to the terminal
 LONGEST_WORD = 1000  # characters of a word, a name or a path that is printed
 _LONG_WORD = re.compile(rf"(\S{{{LONGEST_WORD}}})\S+")
 
@@ -45,6 +47,17 @@ class SafeConsole(Console):
     def render_str(self, text: str, **how: Any) -> Text:
         """Return a word as text, cut where it has no end."""
         return super().render_str(_LONG_WORD.sub(r"\1…", text), **how)
+
+    @contextmanager
+    def widened(self, wide: bool) -> Iterator[None]:
+        """Print lines and tables at their own width where asked to, whatever the terminal's."""
+        before = self.width
+        if wide:
+            self.width = WIDEST
+        try:
+            yield
+        finally:
+            self.width = before
 
     def on_broken_pipe(self) -> None:
         """Leave it to the command line, which ends in silence."""

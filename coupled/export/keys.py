@@ -87,7 +87,10 @@ WITHOUT_EFFECT: Mapping[type[Section], Mapping[str, str]] = {
         "loader_rate": "the export chooses the loader's rate itself",
         "noise": "noise of the record; the export's channels have none",
     },
-    Loader: {"tolerance": "how well the numbers are known; nothing in flight depends on it"},
+    Control: {
+        **{"tolerance": "how well the numbers are known; nothing in flight depends on it"},
+        **{"guesses": "the same"},
+    },
     Gains: dict.fromkeys(
         ("mechanical_advantage", "s1_over_s2", "s3_over_s2", "low_gradient"),
         "a note of the bench; nothing in flight depends on it",

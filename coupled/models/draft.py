@@ -1,4 +1,4 @@
-"""A first rig for a model: a commented rig file, in which every guess is marked as one.
+"""A first rig for a model: a commented rig file that lists every guess as one.
 
 What is known is found: where the model trims, which controls a rig can lead, how fast and how slow
 it flies. The rest are guesses of three classes by the empty mass, taken from the shipped rigs of a
@@ -9,14 +9,21 @@ control's does, up to a greatest force at full travel; K is that of Cleveland's 
 from __future__ import annotations
 
 import json
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from coupled.models.survey import Surveyed
 from coupled.record.channels import SURFACES, ControlName, unit_of
 
-_BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
-_RIM_m = 0.15  # a wheel's radius
+BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
+RIM_m = 0.15  # a wheel's radius
 _MOST_BENT = 0.3  # of the travel, at the stiffest gradient: K·G_T
+
+
+HOW_TO_SETTLE = (
+    "# Put your own numbers in their place, and take their keys out of `guesses`: tables and",
+    "# figures name what is still in it.",
+)
 
 
 @dataclass(frozen=True)
@@ -89,9 +96,9 @@ def draft(found: Surveyed, name: str, folder: str = "") -> str:
     lines = [
         f"# {found.model}: a first rig, written by `coupled new rig`.",
         "#",
-        "# Found: where it trims, which controls move it. Guessed: all that is marked `guess`, as",
+        "# Found: where it trims, which controls move it. Guessed: all that `guesses` lists, as",
         f"# for {kind.name} (by {said}).",
-        "# Put your own numbers in their place.",
+        *HOW_TO_SETTLE,
     ]
     lines += ["", f'name = "{name}"', "frame_rate_Hz = 120.0", *_flight(found, folder)]
     for control in found.controls:
@@ -122,39 +129,91 @@ def _flight(found: Surveyed, folder: str) -> list[str]:
 
 
 def _control(control: ControlName, guess: Hardware, found: Surveyed) -> list[str]:
-    d, low, high = unit_of(control), _pressure(found.slowest), _pressure(found.fastest)
+    low, high = _pressure(found.slowest), _pressure(found.fastest)
     bend, origin = {
-        "column": (_BEND_m_per_N, "K of Cleveland's column"),
-        "wheel": (_BEND_m_per_N / _RIM_m, "K of Cleveland's column over the rim's radius"),
-        "pedals": (0.5 * _BEND_m_per_N, "half of K of Cleveland's column"),
+        "column": (BEND_m_per_N, "K of Cleveland's column"),
+        "wheel": (BEND_m_per_N / RIM_m, "K of Cleveland's column over the rim's radius"),
+        "pedals": (0.5 * BEND_m_per_N, "half of K of Cleveland's column"),
     }[control]
     stiffest = min(guess.full_force_N / guess.travel, _MOST_BENT / bend)
     softest = max(stiffest * low / high, 0.05 * stiffest)
     rows = (low, high) if high > 1.05 * low else (0.0, high)
     gradients = (softest, stiffest) if high > 1.05 * low else (stiffest, stiffest)
-    at = f"controls.{control}"
+    return control_lines(
+        control,
+        guess,
+        gradients=gradients,
+        pressures=rows,
+        bend=bend,
+        remarks={
+            "loader.basic_gradient": "the softest of the schedule",
+            "loader.bend": origin,
+            "schedule": "q̄ at the slowest and the fastest trim; gradients in proportion to it",
+        },
+    )
+
+
+def control_lines(
+    control: ControlName,
+    hardware: Hardware,
+    *,
+    gradients: Sequence[float],
+    pressures: Sequence[float],
+    bend: float,
+    servo: bool = True,
+    known: Collection[str] = (),
+    remarks: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Return the lines of a control of a rig file: SI, at the grip.
+
+    `known` are the fields, as `loader.mass`, that were measured: all others are listed as
+    guesses. `remarks` are comments by field, and "schedule" for one above its table.
+    """
+    d, at, said = unit_of(control), f"controls.{control}", remarks or {}
+    length = RIM_m if d == "rad" else 0.6
+    loader: list[tuple[str, str, float]] = [
+        ("loader.mass", "mass_kg", hardware.mass),
+        ("loader.damping", f"damping_N_s_per_{d}", hardware.damping),
+        ("loader.basic_gradient", f"basic_gradient_N_per_{d}", gradients[0]),
+        ("loader.breakout", "breakout_N", hardware.breakout_N),
+        ("loader.friction", "friction_N", hardware.friction_N),
+    ]
+    if servo:
+        loader += [
+            ("loader.servo_frequency", "servo_frequency_Hz", 18.0),
+            ("loader.servo_damping_ratio", "servo_damping_ratio", 0.7),
+        ]
+    loader.append(("loader.bend", f"bend_{d}_per_N", bend))
+    own = [("travel", f"travel_{d}", hardware.travel), ("length", "length_m", length)]
+    schedule = ("schedule.total_gradient", f"total_gradient_N_per_{d}")
+    keys = {field: key for field, key, _ in own}
+    keys |= {field: f"loader.{key}" for field, key, _ in loader}
+    keys[schedule[0]] = f"schedule.{schedule[1]}"
+    keys["compensation.bend"] = f"compensation.bend_{d}_per_N"
+    guesses = [f'    "{key}",' for field, key in keys.items() if field not in known]
+
+    def row(field: str, key: str, value: float) -> str:
+        remark = f"  # {said[field]}" if field in said else ""
+        return f"{key} = {value:.5g}{remark}"
+
+    def numbers(values: Sequence[float]) -> str:
+        return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
+
     return [
         "",
         f"[{at}]",
         f'surface = "{SURFACES[control]}"',
-        f"travel_{d} = {guess.travel:g}  # guess",
-        f"length_m = {_RIM_m if d == 'rad' else 0.6:g}  # guess",
+        *(row(*each) for each in own),
+        *(["guesses = [", *guesses, "]"] if guesses else []),
         "",
         f"[{at}.loader]",
-        f"mass_kg = {guess.mass:g}  # guess",
-        f"damping_N_s_per_{d} = {guess.damping:g}  # guess",
-        f"basic_gradient_N_per_{d} = {gradients[0]:.4g}  # guess: the softest of the schedule",
-        f"breakout_N = {guess.breakout_N:g}  # guess",
-        f"friction_N = {guess.friction_N:g}  # guess",
         'multiplier = "hybrid"',
-        "servo_frequency_Hz = 18.0  # guess",
-        "servo_damping_ratio = 0.7  # guess",
-        f"bend_{d}_per_N = {bend:.4g}  # guess: {origin}",
+        *(row(*each) for each in loader),
         "",
         f"[{at}.schedule]",
-        "# q̄ at the slowest and the fastest trim, found; gradients in proportion to it, a guess",
-        f"dynamic_pressure_Pa = [{rows[0]:.0f}.0, {rows[1]:.0f}.0]",
-        f"total_gradient_N_per_{d} = [{gradients[0]:.4g}, {gradients[1]:.4g}]",
+        *([f"# {said['schedule']}"] if "schedule" in said else []),
+        f"dynamic_pressure_Pa = [{', '.join(f'{pressure:.0f}.0' for pressure in pressures)}]",
+        f"{schedule[1]} = {numbers(gradients)}",
         "",
         f"[{at}.compensation]",
         "deflection = true",

@@ -124,7 +124,7 @@ def survey(model: str, home: Path, *, speeds: bool = False) -> Surveyed:
     flight = flight.model_copy(update={"direct_controls": direct})
     slowest = fastest = flight.calibrated_airspeed
     if speeds and controls:
-        slowest, fastest = (_furthest(flight, home, controls, step) for step in (0.9, 1.1))
+        slowest, fastest = speed_range(flight, home, controls)
     return Surveyed(
         *(model, flight, holds, "", controls, direct, lacking),
         *(slowest, fastest, mass, rigs),
@@ -206,6 +206,18 @@ def _controls(flight: Flight, home: Path) -> tuple[tuple[ControlName, ...], bool
         if "column" in led:
             return tuple(led), direct, tuple(lacking)
     return (), False, tuple(lacking)
+
+
+def speed_range(
+    flight: Flight, home: Path, controls: tuple[ControlName, ...]
+) -> tuple[float, float]:
+    """Return the slowest and the fastest calibrated airspeed, m/s, at which a model flies.
+
+    At each it trims and answers each of the controls. Sought from the flight's own by steps of
+    a tenth; `home` is the folder of all models.
+    """
+    slowest, fastest = (_furthest(flight, home, controls, step) for step in (0.9, 1.1))
+    return slowest, fastest
 
 
 def _furthest(flight: Flight, home: Path, controls: tuple[ControlName, ...], step: float) -> float:

@@ -10,7 +10,7 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from coupled.campaign.entry import AS_FILED
-from coupled.display import parameter_label
+from coupled.display import System, parameter_label
 from coupled.plots.grids import draw_grid, is_grid
 from coupled.plots.sweepview import Shown, mark_ended, place_of, titled, varying
 
@@ -24,6 +24,7 @@ def draw_sweep(
     figures: Sequence[str],
     title: str = "",
     remarks: Sequence[str] = (),
+    system: System = "si",
 ) -> Figure:
     """Draw up to four figures, a row each; those that do not vary are named in the title.
 
@@ -34,18 +35,19 @@ def draw_sweep(
     for the next parameter's value. The flights that ended early are crosses on the lower edge.
     """
     numeric = [key for key in keys if found[key].dtype.is_numeric()][:_MOST_COLUMNS] or ["flight"]
-    figures, still = varying(found, figures)
+    figures, still = varying(found, figures, system)
     remark = " ".join((f"{still}." if still and remarks else still, *remarks)).strip()
     if is_grid(found, keys, numeric):
-        return draw_grid(found, (numeric[0], numeric[1]), figures, (title, remark))
+        return draw_grid(found, (numeric[0], numeric[1]), figures, (title, remark), system)
     width, height = max(1.5 + 3.6 * len(numeric), 5.5), 1.1 + 2.3 * len(figures)
     drawn = Figure(figsize=(width, height), layout="constrained")
     drawn.suptitle(titled(title, remark, width), fontsize=11)
     panels = drawn.subplots(len(figures), len(numeric), squeeze=False, sharex="col", sharey="row")
     for row, name in enumerate(figures):
+        shown = Shown.of(name, system)
         for column, key in enumerate(numeric):
-            _panel(panels[row, column], found, keys, key, _other(numeric, column), Shown.of(name))
-        panels[row, 0].set_ylabel(Shown.of(name).label)
+            _panel(panels[row, column], found, keys, key, _other(numeric, column), shown)
+        panels[row, 0].set_ylabel(shown.label)
     for column, key in enumerate(numeric):
         place_of(panels[-1, column], key, found[key])
         _add_colours(drawn, panels[:, column], _other(numeric, column))

@@ -30,6 +30,7 @@ from coupled.plots.pages import (
 from coupled.plots.readings import draw_readings
 from coupled.plots.saving import save
 from coupled.record.channels import ControlName
+from coupled.rig.guesses import guess_note
 from coupled.units import POUND_N, INCH_m
 
 if TYPE_CHECKING:
@@ -158,7 +159,11 @@ def draw_pages(
         pages |= {folder / f"{found.control}-{name}.png": page for name, page in drawn.items()}
     for number, (path, page) in enumerate(pages.items(), 1):
         page.suptitle(f"Figure {number}. {page.get_suptitle()}", fontsize=12)
-        save(page, path)
+        save(
+            page,
+            path,
+            guess_note(documents[0].rig.controls, [found.control for found in documents]),
+        )
     before = [draw_cover(documents, issue), *draw_check_table(documents, issue, numbers)]
     save_pages([*before, *pages.values()], pdf)
     return list(pages)

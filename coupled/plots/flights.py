@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,10 @@ from matplotlib.figure import Figure
 
 from coupled.authority.figures import corrects_nothing, named, remarks
 from coupled.authority.held import true_deflection
-from coupled.display import parameter_label
+from coupled.display import Shown, System, in_system, parameter_label
 from coupled.plots.histories import legend_above, plain
-from coupled.record.channels import RATE, channel, unit_of
+from coupled.plots.pages import scale
+from coupled.record.channels import RATE, channel
 from coupled.rig.equations import specified_force
 from coupled.rig.packing import COMMAND_SIGN
 from coupled.units import DEGREE_rad
@@ -35,17 +37,21 @@ _FELT = 0.01  # of the force: a step below that is felt by no hand
 _SHORT = ("rigid", "uncomp.", "defl. only", "grad. only", "comp.", "cal. low")
 
 
-def draw_comparison(flights: Sequence[Flight]) -> Figure:
+def draw_comparison(flights: Sequence[Flight], system: System = "si") -> Figure:
     """Draw a comparison: a column a case; surface, motion, force, and what is lost.
+
+    Deflections and forces are in the units of a system.
 
     Where each case is flown in one configuration only, and the hand feels the modifying force
     step, draw a panel a case, of these steps.
     """
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     if len(cases) > 1 and all(len(case) == 1 for case in cases) and _steps_are_felt(flights):
-        return _draw_step_panels(cases)
+        return _draw_step_panels(cases, system)
     flown = flights[0].manoeuvre.rig.flight is not None
-    rows = [_draw_surface, *([_draw_motion] if flown else []), _draw_force, _draw_loss]
+    force = partial(_draw_force, system=system)
+    rows: list[Callable[[Any, Sequence[Flight]], None]]
+    rows = [_draw_surface, *([_draw_motion] if flown else []), force, _draw_loss]
     columns, height = (len(cases), len(rows)) if len(cases) > 1 else (2, 2)
     figure = Figure(figsize=(1.2 + 3.9 * columns, 0.9 + 2.6 * height), layout="constrained")
     grid = figure.subplots(height, columns, squeeze=False)
@@ -62,7 +68,11 @@ def draw_comparison(flights: Sequence[Flight]) -> Figure:
         if len(cases) > 1:
             grid[0, i].set_title(_wrapped(case[0].outcome.case), fontsize=10)
     _share_limits(grid[-1])
-    said = [line for each in remarks(flights) for line in _wrapped(each, 65 * columns).split("\n")]
+    said = [
+        line
+        for each in remarks(flights, system)
+        for line in _wrapped(each, 65 * columns).split("\n")
+    ]
     figure.suptitle("\n".join([_title(flights[0]), *said]), fontsize=9 if said else 12)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     wide = max(map(len, labels)) > _WIDE or len(labels) > _IN_A_ROW
@@ -76,19 +86,20 @@ def _steps_are_felt(flights: Sequence[Flight]) -> bool:
     return any(f.outcome.force_step_N > _FELT * f.outcome.force_N for f in flights)
 
 
-def _draw_step_panels(cases: Sequence[Sequence[Flight]]) -> Figure:
+def _draw_step_panels(cases: Sequence[Sequence[Flight]], system: System) -> Figure:
+    unit = in_system("N", system)
     columns = min(3, len(cases))
     rows = -(-len(cases) // columns)
     figure = Figure(figsize=(1.0 + 3.4 * columns, 0.7 + 2.7 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, case in zip(grid.flat, cases, strict=False):
-        _draw_steps(axes, case)
+        _draw_steps(axes, case, unit)
         axes.grid(alpha=0.25)
         axes.set_title(_wrapped(case[0].outcome.case), fontsize=10)
         axes.label_outer()
     for axes in list(grid.flat)[len(cases) :]:
         axes.set_visible(False)
-    figure.supylabel("step of the modifying force at each frame, N", fontsize=10)
+    figure.supylabel(f"step of the modifying force at each frame, {unit.unit}", fontsize=10)
     figure.suptitle(_title(cases[0][0]), fontsize=12)
     return figure
 
@@ -164,23 +175,23 @@ def _draw_motion(axes: Any, case: Sequence[Flight]) -> None:
     axes.set_ylabel(f"{name.removesuffix('_rad_per_s').replace('_', ' ')}, °/s")
 
 
-def _draw_force(axes: Any, case: Sequence[Flight]) -> None:
+def _draw_force(axes: Any, case: Sequence[Flight], system: System) -> None:
     """Force against true deflection, with what was specified."""
     control = case[0].manoeuvre.control
-    scale, unit = (100.0, "cm") if unit_of(control) == "m" else (1.0 / DEGREE_rad, "°")
+    (size, unit), newtons = scale(control, system), in_system("N", system)
     for flight in case:
         deflection = true_deflection(flight.manoeuvre.rig, control, flight.record)
         force = flight.record[channel(control, "hand_force")]
-        axes.plot(scale * deflection, force, **_line(flight))
+        axes.plot(size * deflection, newtons.factor * force, **_line(flight))
     record = case[0].record
     deflection = true_deflection(case[0].manoeuvre.rig, control, record)
     peak = int(np.argmax(np.abs(deflection)))
     line = np.linspace(0.0, deflection[peak], 50)
     pressure = float(record["dynamic_pressure_Pa"][peak])
     wanted = specified_force(case[0].manoeuvre.rig, control, pressure, line)
-    axes.plot(scale * line, wanted, color="0.65", linewidth=4.5, zorder=0)
+    axes.plot(size * line, newtons.factor * wanted, color="0.65", linewidth=4.5, zorder=0)
     axes.set_xlabel(f"true deflection of the {control}, {unit}")
-    axes.set_ylabel("pilot's force, N")
+    axes.set_ylabel(f"pilot's force, {newtons.unit}")
 
 
 def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
@@ -219,13 +230,13 @@ def _draw_loss(axes: Any, case: Sequence[Flight]) -> None:
     legend_above(axes, 2)
 
 
-def _draw_steps(axes: Any, case: Sequence[Flight]) -> None:
+def _draw_steps(axes: Any, case: Sequence[Flight], unit: Shown) -> None:
     """Jumps of the modifying force from frame to frame, which the hand feels."""
     flight = case[0]
-    step = flight.record[channel(flight.manoeuvre.control, "force_step")]
+    step = unit.factor * flight.record[channel(flight.manoeuvre.control, "force_step")]
     axes.vlines(flight.record.time_s, 0.0, step, color="#d55e00", linewidth=0.8)
     axes.annotate(
-        f"largest {flight.outcome.force_step_N:.2f} N",
+        f"largest {unit.factor * flight.outcome.force_step_N:.2f} {unit.unit}",
         (0.97, 0.95),
         xycoords="axes fraction",
         ha="right",

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from coupled.campaign.entry import AS_FILED
-from coupled.display import parameter_label
+from coupled.display import System, parameter_label
 from coupled.plots.histories import plain
 from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
 
@@ -29,7 +29,11 @@ def is_grid(found: pl.DataFrame, keys: Sequence[str], numeric: Sequence[str]) ->
 
 
 def draw_grid(
-    found: pl.DataFrame, keys: tuple[str, str], figures: Sequence[str], heading: tuple[str, str]
+    found: pl.DataFrame,
+    keys: tuple[str, str],
+    figures: Sequence[str],
+    heading: tuple[str, str],
+    system: System = "si",
 ) -> Figure:
     """Draw a row a figure, a column a configuration; the longer parameter along the bottom.
 
@@ -47,7 +51,7 @@ def draw_grid(
         len(figures), len(configurations), squeeze=False, sharex=True, sharey="row"
     )
     for row, name in zip(panels, figures, strict=True):
-        shown = Shown.of(name)
+        shown = Shown.of(name, system)
         if as_lines:
             for axes, configuration in zip(row, configurations, strict=True):
                 rows = found.filter(pl.col("configuration") == configuration)

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from coupled.display import Shown, System, in_system
 from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, panels, scale, with_legend
-from coupled.record.channels import ControlName, unit_of
+from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
 
 if TYPE_CHECKING:
@@ -35,10 +35,7 @@ def draw_losses(
     figure, grid = panels(len(maps), 4, 2.9)
     pressure = _pressure(system)
     for row, (control, of_control) in zip(grid, maps.items(), strict=True):
-        factor, unit = scale(control)
-        if system == "us":
-            moved = in_system(unit_of(control), system)
-            factor, unit = moved.factor, moved.unit
+        factor, unit = scale(control, system)
         losses = np.concatenate([m.loss[np.isfinite(m.loss)] for m in of_control])
         least = float(np.min(losses, initial=0.0))
         most = 100.0 * max(0.01, float(np.max(losses, initial=0.0)), -least)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from coupled.display import System, in_system
 from coupled.plots.pages import plain, scale
 from coupled.record.channels import unit_of
 from coupled.units import POUND_N, INCH_m
@@ -32,9 +33,9 @@ def plus_minus(found: Estimate) -> str:
     return f"({text})·10{str(power).translate(_RAISED)}" if power else text
 
 
-def draw_readings(found: CalibrationResult, source: str) -> Figure:
+def draw_readings(found: CalibrationResult, source: str, system: System = "si") -> Figure:
     """Draw the report's figure 4: readings at each gradient with the fit, and what is left."""
-    factor, unit = scale(found.control)
+    factor, unit = scale(found.control, system)
     figure = Figure(figsize=(8.2, 6.8), layout="constrained")
     top, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
     readings, line = found.readings, found.line
@@ -45,25 +46,28 @@ def draw_readings(found: CalibrationResult, source: str) -> Figure:
         d, f = readings.deflection[ours], readings.force[ours]
         color, mark = _SETS[i % len(_SETS)], _MARKS[i % len(_MARKS)]
         gradient = float(f @ d / (d @ d))
-        shown = f"{gradient:.4g} N/{unit_of(found.control)}"
+        own = in_system(f"N/{unit_of(found.control)}", system)
+        shown = f"{own.written(gradient)} {own.unit}"
         if unit == "cm":
             shown += f" ({gradient * INCH_m / POUND_N:.3g} lb/in)"
         style: dict[str, Any] = {"color": color, "marker": mark, "linestyle": "none"}
         top.plot(factor * d, readings.v1[ours], label=f"set {plain(label)}: {shown}", **style)
-        reach = np.array([0.0, d[np.argmax(np.abs(d))]])
+        reach = np.array([min(0.0, np.min(d)), max(0.0, np.max(d))])  # of a push and of a pull
         top.plot(factor * reach, (a + b * gradient) * reach, color=color, linewidth=0.9)
         below.plot(factor * d, line.residual[ours], **style)
     below.axhline(0.0, color="black", linewidth=0.8)
-    top.set_ylabel("v₁, V")
-    below.set_ylabel("v₁ − fit, V")
+    top.set_ylabel(f"v₁, {readings.signal}")
+    below.set_ylabel(f"v₁ − fit, {readings.signal}")
     below.set_xlabel(f"deflection δ, {unit}")
     for axes in (top, below):
         axes.grid(alpha=0.25)
     handles, labels_shown = top.get_legend_handles_labels()
     figure.legend(handles, labels_shown, loc="outside lower center", ncols=3, fontsize=8)
     d_unit = unit_of(found.control)
-    s1, bend = line.s1, line.bend
-    text = f"S₁ = {plus_minus(s1)} V/{d_unit}\nK = {plus_minus(bend)} {d_unit}/N"
+    bend = line.bend
+    per, soft = (in_system(text, system) for text in (f"{readings.signal}/{d_unit}", f"{d_unit}/N"))
+    text = f"S₁ = {plus_minus(line.s1.scaled(per.factor))} {per.unit}"
+    text += f"\nK = {plus_minus(bend.scaled(soft.factor))} {soft.unit}"
     if unit == "cm":
         inches = bend.scaled(POUND_N / INCH_m)
         text += f"\n   = {plus_minus(inches)} in/lb"

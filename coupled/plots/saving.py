@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from functools import lru_cache
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -19,6 +20,8 @@ from matplotlib.ticker import FixedLocator
 from coupled.errors import InputError, printable
 from coupled.files import write_whole
 
+_NOTED = 10  # font size of a title with a note
+_LETTERS_per_inch = 10.0  # of a note
 FORMATS = (".png", ".pdf", ".svg")
 BOX = "□"  # in place of a letter that no font has
 # Fonts with the letters of languages that matplotlib's own font lacks, of the common systems.
@@ -84,9 +87,22 @@ def _letters(file: str) -> frozenset[str]:
     return frozenset(map(chr, get_font(file).get_charmap()))
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure, whole; the same figure gives the same bytes on the same machine."""
+def with_note(figure: Figure, note: str) -> Figure:
+    """Return a figure with a line of text below its title; as it is for an empty text."""
+    if note:
+        width = round(_LETTERS_per_inch * figure.get_size_inches()[0])
+        lines = [figure.get_suptitle(), *textwrap.wrap(note, width)]
+        figure.suptitle("\n".join(filter(None, lines)), fontsize=_NOTED)
+    return figure
+
+
+def save(figure: Figure, path: Path, note: str = "") -> None:
+    """Write a figure, whole; the same figure gives the same bytes on the same machine.
+
+    The `note` is a line below its title.
+    """
     check_format(path)
+    with_note(figure, note)
     make_drawable(figure)
     FigureCanvasAgg(figure)
     kind = path.suffix.lower()[1:]

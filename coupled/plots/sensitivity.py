@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from coupled.campaign.sensitivity import SobolIndex
 from coupled.display import parameter_label
 from coupled.plots.pages import BLUE, GRAY, ORANGE, plain
-from coupled.plots.sweepview import LABELS
+from coupled.plots.sweepview import WORDS
 
 _LONGEST = 44  # letters of a parameter
 
@@ -41,7 +41,7 @@ def draw_sensitivity(indices: Sequence[SobolIndex]) -> Figure:
                 if (index.figure, index.configuration) == (figure, configuration)
             }
             _panel(axes, [here[key] for key in keys])
-            name = LABELS[figure][0].partition(",")[0]  # a share of variance has not its unit
+            name = WORDS[figure]  # a share of variance has not its unit
             axes.set_title(f"{name}: {plain(configuration)}", fontsize=10)
             axes.set_yticks(range(len(keys)), [_label(key) for key in keys], fontsize=8)
     for axes in grid[-1]:

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from coupled.display import parameter_label
+from coupled.display import System, parameter_label, shown
 from coupled.plots.histories import plain
 
 Floats = NDArray[np.float64]
@@ -20,19 +20,19 @@ _LETTERS_PER_INCH = 12.0  # of a title in 11 points, at the least
 _STILL = 1e-9  # what a figure spreads by where it does not vary: the arithmetic's own
 _EVEN = 1e-3  # of a step, by which steps differ that are taken as even
 _WIDE = 10.0  # greatest over least value of an axis that may be logarithmic
-LABELS = {
-    "asked_norm": ("surface asked, % of travel", 100.0),
-    "reached_norm": ("surface reached, % of travel", 100.0),
-    "loss": ("authority lost, %", 100.0),
-    "loss_closed_form": ("loss by closed form, %", 100.0),
-    "felt_ratio": ("felt over specified", 1.0),
-    "felt_ratio_closed_form": ("felt by closed form", 1.0),
-    "force_N": ("force needed, N", 1.0),
-    "force_step_N": ("force step, N", 1.0),
-    "peak_rate_rad_per_s": ("peak rate, rad/s", 1.0),
-    "peak_load_factor": ("peak load factor", 1.0),
-    "time_to_attitude_s": ("time to attitude, s", 1.0),
-    "surface_stop_norm": ("surface at its stop, % of travel", 100.0),
+WORDS = {
+    "asked_norm": "surface asked",
+    "reached_norm": "surface reached",
+    "loss": "authority lost",
+    "loss_closed_form": "loss by closed form",
+    "felt_ratio": "felt over specified",
+    "felt_ratio_closed_form": "felt by closed form",
+    "force_N": "force needed",
+    "force_step_N": "force step",
+    "peak_rate_rad_per_s": "peak rate",
+    "peak_load_factor": "peak load factor",
+    "time_to_attitude_s": "time to attitude",
+    "surface_stop_norm": "surface at its stop",
 }
 
 
@@ -45,17 +45,23 @@ class Shown:
     factor: float
 
     @classmethod
-    def of(cls, name: str) -> Shown:
-        """Return a figure by its column's name."""
-        label, factor = LABELS.get(name, (parameter_label(name), 1.0))
-        return cls(name, label, factor)
+    def of(cls, name: str, system: System = "si") -> Shown:
+        """Return a figure by its column's name, in the unit that a terminal's table has."""
+        if name not in WORDS:
+            return cls(name, parameter_label(name), 1.0)
+        unit = shown(name, system)
+        of_travel = " of travel" if unit.unit == "%" and name.endswith("_norm") else ""
+        label = f"{WORDS[name]}, {unit.unit}{of_travel}" if unit.unit else WORDS[name]
+        return cls(name, label, unit.factor)
 
     def of_rows(self, rows: pl.DataFrame) -> Floats:
         """Return the figure of each row in the label's unit; NaN where there is none."""
         return self.factor * rows[self.name].cast(pl.Float64).fill_null(np.nan).to_numpy()
 
 
-def varying(found: pl.DataFrame, figures: Sequence[str]) -> tuple[list[str], str]:
+def varying(
+    found: pl.DataFrame, figures: Sequence[str], system: System = "si"
+) -> tuple[list[str], str]:
     """Return the first figures that vary, and a remark on those that do not.
 
     All of them where none does: a figure of nothing says less than a level line.
@@ -66,9 +72,9 @@ def varying(found: pl.DataFrame, figures: Sequence[str]) -> tuple[list[str], str
         values = flown[name].drop_nulls().cast(pl.Float64).to_numpy()
         size = float(np.max(np.abs(values), initial=0.0))
         if values.size and np.ptp(values) <= _STILL * max(size, 1.0):
-            shown = Shown.of(name)
-            level = shown.factor * float(np.median(values))
-            still.append(f"{shown.label}: {0.0 if abs(level) < _STILL else level:.4g}")
+            each = Shown.of(name, system)
+            level = each.factor * float(np.median(values))
+            still.append(f"{each.label}: {0.0 if abs(level) < _STILL else level:.4g}")
         else:
             drawn.append(name)
     if not drawn:

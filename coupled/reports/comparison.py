@@ -8,6 +8,7 @@ from itertools import groupby
 
 from coupled.authority.compare import Flight
 from coupled.authority.figures import named, remarks, rows
+from coupled.display import System
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.plots.flights import draw_comparison
 from coupled.plots.saving import svg_text
@@ -19,7 +20,7 @@ _SHOWN = (
 _STEPS = "Steps of the modifying force from frame to frame, which the hand feels."
 
 
-def comparison_report(flights: Sequence[Flight], made: Made) -> Report:
+def comparison_report(flights: Sequence[Flight], made: Made, system: System = "si") -> Report:
     """Return the report: a table and a figure a case, or one of all where each is flown once."""
     cases = [list(group) for _, group in groupby(flights, key=lambda f: f.outcome.case)]
     once = len(cases) > 1 and all(len(case) == 1 for case in cases)
@@ -28,24 +29,32 @@ def comparison_report(flights: Sequence[Flight], made: Made) -> Report:
     sections = [
         Section(
             "All cases" if once else case[0].outcome.case,
-            (_table(case, by_case=once), Drawing(svg_text(draw_comparison(case)), shown)),
+            (
+                _table(case, once, system),
+                Drawing(svg_text(draw_comparison(case, system)), shown),
+            ),
             own_page=i > 0,
         )
         for i, case in enumerate(groups)
         for shown in [_STEPS if once else _SHOWN]
     ]
     return Report(
-        "Comparison", run.name, _verdict(flights), tuple(sections), tuple(_settings(run)), made
+        "Comparison",
+        run.name,
+        _verdict(flights, system),
+        tuple(sections),
+        tuple(_settings(run)),
+        made,
     )
 
 
-def _table(case: Sequence[Flight], by_case: bool) -> Table:
+def _table(case: Sequence[Flight], by_case: bool, system: System) -> Table:
     heads = [f.outcome.case if by_case else named(f) for f in case]
-    body = tuple((label, *cells) for label, cells in rows(case))
+    body = tuple((label, *cells) for label, cells in rows(case, system))
     return Table(("", *heads), body)
 
 
-def _verdict(flights: Sequence[Flight]) -> Verdict:
+def _verdict(flights: Sequence[Flight], system: System) -> Verdict:
     """Return what each configuration loses over the cases, and what the hand feels."""
     lost, felt = [], []
     for configuration in dict.fromkeys(f.configuration for f in flights):
@@ -58,7 +67,7 @@ def _verdict(flights: Sequence[Flight]) -> Verdict:
     run = flights[0].manoeuvre
     said_beside = [
         f"Felt of the specified gradient: {', '.join(felt)}.",
-        *remarks(flights),
+        *remarks(flights, system),
         " ".join(run.card.split()),
     ]
     ended = [

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from coupled.gap.findings.budget import share_of
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink
-from coupled.gap.findings.summary import figure, in_figures, plain
+from coupled.gap.findings.summary import figure, in_figures, plain, sentences
 from coupled.plots.gaps import draw_diagnosis
 from coupled.plots.gapview import channel_label, unit_shown
 from coupled.plots.saving import svg_text
@@ -21,7 +21,6 @@ _CAPTIONS = {
     "stages.png": "Each stage of the chain: its residual over what noise alone leaves.",
     "signature.png": "The law of what was found, as measured, as filed, and as found.",
 }
-_SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 
 
 def diagnosis_report(whole: Diagnosis, title: str, made: Made, with_power: bool = False) -> Report:
@@ -48,7 +47,7 @@ def _seconds(whole: Diagnosis) -> float:
 
 
 def _verdict(whole: Diagnosis) -> Verdict:
-    first, *rest = _SENTENCE.split(whole.summary)
+    first, *rest = sentences(whole.summary)
     return Verdict(first, _TONES.get(whole.verdict, "plain"), tuple(rest))
 
 
@@ -62,8 +61,7 @@ def _effects(whole: Diagnosis) -> tuple[str, Table] | None:
 
 def _effect_rows(effect: EffectResult, whole: Diagnosis) -> Iterator[tuple[str, ...]]:
     """Yield a row a parameter; the effect's own share and probability are on the first."""
-    share = next((b.of(effect.name) for b in whole.budget if b.stage == effect.stage), None)
-    sure = ("" if share is None else f"{100 * share:.1f} %", f"{effect.probability:.2f}")
+    sure = (share_of(whole.budget, effect.stage, effect.name), f"{effect.probability:.2f}")
     for i, p in enumerate(effect.parameters):
         names = ("", "") if i else (plain(effect.name), effect.stage)
         yield (*names, p.key, p.unit, *_numbers(p), *(("", "") if i else sure))

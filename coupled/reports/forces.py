@@ -9,6 +9,7 @@ from coupled import __version__
 from coupled.calibration.checks import ControlCheck
 from coupled.calibration.documentation import Documentation
 from coupled.calibration.qualification import FeelTest, Issue, cover_rows, feel_tests, written
+from coupled.calibration.reasons import reasons
 from coupled.calibration.result import CalibrationResult
 from coupled.plots.checks import draw_releases, draw_static_checks
 from coupled.plots.documentation import draw_deflections, draw_forces
@@ -45,7 +46,11 @@ def force_report(
     rig = documents[0].rig
     cover = Cover(cover_rows(documents, issue, __version__), _SIGNED)
     settings = (("rig", rig.name), ("frame rate", f"{rig.frame_rate:g} Hz"))
+    why = [
+        f"{d.control}: {each}" for d in documents for each in reasons(d.rig, d.control, d.checks)
+    ]
     verdict = _verdict([test for _, test in tests])
+    verdict = replace(verdict, remarks=(*verdict.remarks, *why))
     return Report("Force documentation", rig.name, verdict, tuple(sections), settings, made, cover)
 
 

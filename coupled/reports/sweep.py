@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coupled.campaign.sensitivity import SobolIndex, VarianceShare
 from coupled.campaign.sweep import SweepResult
-from coupled.display import parameter_label
+from coupled.display import System, parameter_label
 from coupled.plots.results import draw_result
 from coupled.plots.saving import svg_text
 from coupled.plots.sweepview import Shown
@@ -23,13 +23,13 @@ _STRONGEST = 6  # parameters of a figure
 _LISTED = 20  # flights that ended early
 
 
-def sweep_report(found: SweepResult, made: Made) -> Report:
+def sweep_report(found: SweepResult, made: Made, system: System = "si") -> Report:
     """Return the report: figure, distribution, indices or boundaries, and what ended early."""
     asked = found.plan.sweep
     sections = [
         Section("Varied", (_varied(found),)),
-        Section("How the figures lie over the flights", (_spread(found),)),
-        Section("Figure", (Drawing(svg_text(draw_result(found)), _caption(found)),)),
+        Section("How the figures lie over the flights", (_spread(found, system),)),
+        Section("Figure", (Drawing(svg_text(draw_result(found, system)), _caption(found)),)),
     ]
     if found.limits:
         sections.insert(0, Section("What is survived", (_limits(found),)))
@@ -40,10 +40,12 @@ def sweep_report(found: SweepResult, made: Made) -> Report:
         sections.append(Section("Flights that ended early", (_ended(ended),)))
     settings = [("sweep", asked.name), ("run", asked.run), ("method", asked.method)]
     settings += [("seed", str(asked.seed)), ("flights", str(len(found.table)))]
-    return Report("Sweep", asked.name, _verdict(found), tuple(sections), tuple(settings), made)
+    return Report(
+        "Sweep", asked.name, _verdict(found, system), tuple(sections), tuple(settings), made
+    )
 
 
-def _verdict(found: SweepResult) -> Verdict:
+def _verdict(found: SweepResult, system: System) -> Verdict:
     ended = int((found.table["ended_early"] != "").sum())
     keys = len(found.plan.keys)
     over = f"{keys} parameters" if keys > 1 else "one parameter"
@@ -53,7 +55,7 @@ def _verdict(found: SweepResult) -> Verdict:
         where = "" if limit.boundary is None else f", the boundary at {limit.boundary:.4g}"
         text = f"{limit.survived} of {limit.flights} survived{where}"
         remarks.append(f"{limit.configuration}: {text}.")
-    first = Shown.of(found.plan.sweep.keep[0])
+    first = Shown.of(found.plan.sweep.keep[0], system)
     for configuration, values in _values(found, first):
         if len(values):
             low, middle, high = np.quantile(values, [0.0, 0.5, 1.0])
@@ -83,10 +85,10 @@ def _varied(found: SweepResult) -> Table:
     return Table(("parameter", "key", "from, to", "values"), tuple(rows), words=2)
 
 
-def _spread(found: SweepResult) -> Table:
+def _spread(found: SweepResult, system: System) -> Table:
     rows = []
     for name in found.plan.sweep.keep:
-        shown = Shown.of(name)
+        shown = Shown.of(name, system)
         for configuration, values in _values(found, shown):
             cells = ["–"] * len(_SHARES)
             if len(values):

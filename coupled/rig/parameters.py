@@ -80,7 +80,7 @@ class Loader(Section):
 class Schedule(Section):
     """Gradient over dynamic pressure, and faults of its use."""
 
-    dynamic_pressure: list[float] = quantity("Pa", min_length=2)
+    dynamic_pressure: list[float] = quantity("Pa", min_length=1)
     total_gradient: list[float] = quantity("N_per_{d}")
     second_gradient: list[float] | None = quantity("N_per_{d}", None)
     break_deflection: float = quantity("{d}", 0.0, ge=0)
@@ -158,6 +158,8 @@ class Rigging(Section):
 class Services(Section):
     """Services of the loader; 0 leaves a service out (`services`)."""
 
+    trim_release_gradient: float = quantity("N_per_{d}", 0.0, ge=0)
+    trim_release_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
     autopilot_stiffness: float = quantity("N_per_{d}", 0.0, ge=0)
     autopilot_damping: float = quantity("N_s_per_{d}", 0.0, ge=0)
     override: float = quantity("N", 0.0, ge=0)
@@ -241,6 +243,7 @@ class Control(Section):
     calibration: Calibration = Calibration()
     # Tolerances of the numbers above: half a 95 % interval by key, in the key's unit.
     tolerance: dict[str, float] = {}
+    guesses: list[str] = []  # keys of numbers that nobody measured
 
     @property
     def assumed_basic_gradient(self) -> float:

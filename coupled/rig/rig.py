@@ -23,6 +23,7 @@ from coupled.record.channels import (
     noisy_channels,
     unit_of,
 )
+from coupled.rig.guesses import check_guesses
 from coupled.rig.parameters import (
     DELAY_SLOTS,
     GAUGE_SLOTS,
@@ -186,6 +187,7 @@ def _check_control(rig: Rig, name: str, control: Control, file: object) -> None:
     _check_schedule(control, file, path, d)
     _check_converters(control, file, path, d)
     _check_tolerance(control, file, path, d)
+    check_guesses(control, file, path, d)
 
 
 def _check_tolerance(control: Control, file: object, path: str, d: str) -> None:

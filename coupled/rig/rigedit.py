@@ -30,7 +30,10 @@ def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") 
 
 
 def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
-    """Return the values that differ between two rigs of the same controls, by their keys."""
+    """Return the values that differ between two rigs of the same controls, by their keys.
+
+    A number that differs is no longer a guess.
+    """
     found = dict(_within((), old, new, "m"))
     if old.flight is not None and new.flight is not None:
         found |= _within(("flight",), old.flight, new.flight, "m")
@@ -44,6 +47,10 @@ def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
         if added:  # a file has both numbers of a servo, or none
             ratio = control.loader.servo_damping_ratio
             found[(*path, "loader", "servo_damping_ratio")] = ratio
+        settled = [".".join(key[2:]) for key in found if key[:2] == path]
+        kept = [key for key in control.guesses if key not in settled]
+        if kept != old.controls[name].guesses:
+            found[(*path, "guesses")] = kept
     return found
 
 

@@ -1,6 +1,7 @@
 """Services: functions of a control loader beside gradient and breakout, and their failures.
 
-    trim         springs and F_mod act about x₀, set by force trim; a trim release sets x₀ = δc
+    trim         springs and F_mod act about x₀, set by force trim; a trim release sets x₀ = δc,
+                 and keeps −k_r·(δc − x_r) − c_r·δc', x_r being x₀ as the release begins
     autopilot    F_a = k·(x_a − δc) − c·δc', within ±override: the backdrive of a hand's override
     other side   m₂·y'' + c₂·y' + G₂·(y − x₀) = F₂ + F_l,    F_l = k_l·(δc − y) + c_l·(δc' − y'),
                  until it is disconnected; it moves a share of the surface by y
@@ -56,6 +57,8 @@ class ServicesParameters(Protocol):
     present: int  # the rig file has some
     frame: float  # s
     travel: float  # d
+    trim_release_gradient: float  # k_r, N/d
+    trim_release_damping: float  # c_r, N·s/d
     autopilot_stiffness: float  # N/d
     autopilot_damping: float  # N·s/d
     override: float  # largest force of the backdrive, N
@@ -99,6 +102,8 @@ class ServicesState(Protocol):
     pusher: float
     feel_lost: float  # share of G_T
     other_force: float  # F₂, N
+    released: int  # the trim has been released
+    released_at: float  # x_r, d
     started: int
     alpha: float  # α₀, rad
     base: float  # the loader's own external force, N
@@ -173,6 +178,20 @@ def set_base(s: ServicesState, loader: LoaderState) -> None:
     """Store the loader's own external force of a frame, and add the host's to it."""
     s.base = loader.external
     loader.external = s.base + s.slow
+
+
+@stage
+def _release(p: ServicesParameters, s: ServicesState, loader: LoaderState) -> float:
+    """Let the neutral follow the control while the trim is released; return what is kept, N."""
+    x, loader.loose = loader.computed, s.trim_release > 0.5
+    if not loader.loose:
+        s.released = 0
+        return 0.0
+    if s.released == 0:
+        s.released, s.released_at = 1, loader.neutral
+    loader.neutral = x
+    kept = p.trim_release_gradient * (x - s.released_at)
+    return -kept - p.trim_release_damping * loader.rate
 
 
 @stage
@@ -260,10 +279,8 @@ def serve(
     `hand` is the pilot's force at the substep's end, N, `ends` the range without services.
     """
     x, v = loader.computed, loader.rate
-    loader.loose = s.trim_release > 0.5
-    if loader.loose:
-        loader.neutral = x
-    s.force = s.slow + _backdrive(p, s, x, v, hand, h) + _soft_stop(p, x, v)
+    s.force = _release(p, s, loader)
+    s.force += s.slow + _backdrive(p, s, x, v, hand, h) + _soft_stop(p, x, v)
     if s.shaking:
         s.force += p.shaker * math.sin(2.0 * math.pi * p.shaker_frequency * s.time)
         s.time += h

@@ -162,3 +162,16 @@ def test_an_impossible_duration_is_refused() -> None:
         run_live("capture", "", None, "foot")
     with pytest.raises(InputError, match="--case"):
         run_live("capture", "no such", None, "pilot")
+
+
+def test_a_trim_released_live_keeps_its_spring_and_damper_as_in_a_run() -> None:
+    kept = {"trim_release_gradient_N_per_m": 200.0, "trim_release_damping_N_s_per_m": 60.0}
+    plain = rig_live("report-column", 3.0)
+    rig = plain.rig.changed({f"controls.column.services.{key}": to for key, to in kept.items()})
+    plain = replace(plain, rig=rig, pilots={"column": Step(force_N=30.0, start_s=0.2)})
+    released = Event(service="trim_release", control="column", at=1.0, to=1.0)
+    batch = fly(replace(plain, conditions=Conditions(event={"release": released})))
+    word = Request("lead", "trim_release", "column", 1.0)
+    live = fly_live(plain, Plan(paced=False, watchers=[Looker((1.0, word))])).record
+    assert np.array_equal(live.data, batch.data)
+    assert live["column_service_force_N"][-1] < -10.0

@@ -159,3 +159,9 @@ def test_requests_of_another_origin_are_refused(tmp_path: Path) -> None:
         assert status(f"/ws?{place.query}", **upgrade) == 403
         assert status("/ws?token=wrong", Origin=own, **upgrade) == 403
         assert status(f"/ws?{place.query}", Origin=own, **upgrade) == 101
+
+
+def test_a_flight_of_a_given_length_ends_with_its_page_open(tmp_path: Path) -> None:
+    with flown(tmp_path, "--rig", "report-column", "--duration", "0.5") as (process, _):
+        assert process.wait(240.0) == 0
+    assert (tmp_path / "out" / "report-column-live.csv").is_file()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from coupled.rig.rigfile import read_rig
 from tests.support.commands import coupled, files
 
 MODELS = known_models()
+SECTIONS = ("loader", "schedule", "compensation")
 
 
 def test_a_model_that_trims_is_found_with_its_controls_and_rigs() -> None:
@@ -67,13 +69,22 @@ def test_a_first_rig_flies(tmp_path: Path) -> None:
     fly_first_rig(survey("F80C", MODELS["F80C"], speeds=True), tmp_path)
 
 
-def test_every_guess_of_a_first_rig_is_marked_as_one() -> None:
+def test_every_guess_of_a_first_rig_is_listed_as_one(tmp_path: Path) -> None:
     found = survey("J3Cub", MODELS["J3Cub"])
     text = draft(found, "cub")
     assert kind_of(found.mass_kg).name in text
-    for key in ("travel_m", "mass_kg", "damping_N_s_per_m", "friction_N", "bend_m_per_N"):
-        line = next(line for line in text.splitlines() if line.startswith(key))
-        assert "# guess" in line, line
+    file = tmp_path / "cub.toml"
+    file.write_text(text, encoding="utf-8")
+    read_rig(file)
+    for control in tomllib.loads(text)["controls"].values():
+        tables = {"": control} | {f"{name}.": control[name] for name in SECTIONS}
+        numbers = {
+            f"{section}{key}"
+            for section, table in tables.items()
+            for key, value in table.items()
+            if type(value) in (float, int, list)
+        }
+        assert set(control["guesses"]) == numbers - {"guesses", "schedule.dynamic_pressure_Pa"}
     for key in ("altitude_m", "calibrated_airspeed_m_per_s"):
         line = next(line for line in text.splitlines() if line.startswith(key))
         assert "trims" in line, line

@@ -117,6 +117,43 @@ def test_a_trim_release_leaves_the_control_free_and_keeps_where_it_ends() -> Non
     assert at(record, "computed_m", 3.9) == pytest.approx(there + 2.0 / G, rel=2e-3)
 
 
+RELEASED = {"press": {"service": "trim_release", "at_s": 0.2}}
+
+
+def test_a_released_trim_keeps_its_damper() -> None:
+    """m·v' + (c + c_r)·v = F: the speed is F/(c + c_r)."""
+    record = flown({"trim_release_damping_N_s_per_m": 250.0}, RELEASED, 5.0, 2.0)
+    speed = (at(record, "computed_m", 1.8) - at(record, "computed_m", 1.4)) / 0.4
+    assert speed == pytest.approx(5.0 / 400.0, rel=1e-3)
+
+
+def test_a_released_trim_keeps_a_spring_about_the_old_neutral() -> None:
+    """x = x_r + F/k_r, and x₀ = δc; let go of the release, x₀ stays there."""
+    events = {
+        "trim": {"service": "trim_m", "to": 0.02, "at_s": 0.05},
+        **RELEASED,
+        "let go": {"service": "trim_release", "at_s": 6.0, "to": 0.0},
+    }
+    kept = {"trim_release_gradient_N_per_m": 300.0}
+    record = flown(kept, events, 3.0, 9.0)
+    begun = at(record, "trim_m", 0.2)
+    assert at(record, "computed_m", 5.9) == pytest.approx(begun + 3.0 / 300.0, rel=1e-2)
+    assert at(record, "trim_m", 5.9) == pytest.approx(at(record, "computed_m", 5.9), abs=1e-5)
+    assert at(record, "service_force_N", 5.9) == pytest.approx(-3.0, rel=1e-2)
+    assert at(record, "trim_m", 8.9) == pytest.approx(at(record, "computed_m", 6.0), abs=1e-4)
+
+
+def test_each_release_keeps_its_spring_about_its_own_neutral() -> None:
+    events = {
+        **RELEASED,
+        "let go": {"service": "trim_release", "at_s": 4.0, "to": 0.0},
+        "again": {"service": "trim_release", "at_s": 5.0},
+    }
+    record = flown({"trim_release_gradient_N_per_m": 200.0}, events, 3.0, 10.0)
+    second = at(record, "trim_m", 4.99)
+    assert at(record, "computed_m", 9.9) == pytest.approx(second + 3.0 / 200.0, rel=1e-2)
+
+
 DRIVEN = {
     "autopilot_stiffness_N_per_m": 4000.0,
     "autopilot_damping_N_s_per_m": 200.0,

@@ -22,7 +22,7 @@ def print_numbers(console: Console, fitted: NominalFit) -> None:
         if one.interval is not None:
             ends = " to ".join(figure(end) for end in one.interval)
         table.add_row(one.key, figure(one.filed), figure(one.found), ends)
-    print_whole(console, table)
+    print_whole(console, table, ("filed",))
 
 
 def print_channels(console: Console, channels: Sequence[ChannelFit]) -> None:
@@ -34,4 +34,4 @@ def print_channels(console: Console, channels: Sequence[ChannelFit]) -> None:
         numbers = (one.before, one.after, one.floor, one.moves)
         table.add_row(one.channel, *(f"{number:.3g}" for number in numbers))
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("noise alone", "it moves by"))

@@ -12,12 +12,12 @@ from rich.table import Table
 from coupled.cli.tables.whole import print_whole
 from coupled.display import System, in_system, split_unit
 from coupled.gap.batch import Row
-from coupled.gap.findings.budget import StageBudget
+from coupled.gap.findings.budget import StageBudget, share_of
 from coupled.gap.findings.flown import ChannelAgain
 from coupled.gap.findings.inflight import EffectInFlight
 from coupled.gap.findings.power import EffectPower
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
-from coupled.gap.findings.summary import change, figure, in_figures, labels, plain
+from coupled.gap.findings.summary import change, figure, in_figures, labels, plain, sentences
 
 if TYPE_CHECKING:
     from coupled.gap.findings.diagnosis import Diagnosis
@@ -53,11 +53,8 @@ def print_effects(
     table = Table("effect", "filed → found", box=None)
     for head in ("95 % interval", "share", "prob."):
         table.add_column(head, justify="right")
-    known = {one.stage: one for one in budget}
     for effect in effects:
-        shares = known[effect.stage].shares if effect.stage in known else ()
-        share = next((one for one in shares if one.name == effect.name), None)
-        explains = "" if share is None else f"{100 * share.value:.1f} %"
+        explains = share_of(budget, effect.stage, effect.name)
         first, *rest = [in_units(p, system) for p in effect.parameters] or (None,)
         sure = f"{effect.probability:.2f}"
         said, *others = labels(effect) or [""]
@@ -68,7 +65,7 @@ def print_effects(
         for left in (one.unexplained, one.noise):
             table.add_row(f"{one.stage}: {left.name}", "", "", f"{100 * left.value:.1f} %", "")
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("95 % interval", "prob."))
 
 
 def _number(parameter: ParameterEstimate | None) -> tuple[str, str]:
@@ -98,11 +95,16 @@ def in_units(parameter: ParameterEstimate, system: System) -> ParameterEstimate:
 
 
 def in_words(whole: Diagnosis, system: System) -> str:
-    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit."""
+    """Return a diagnosis's summary; what is to be set in a rig file stays in the file's unit.
+
+    Of two effects and more, a list of its sentences.
+    """
     text = whole.summary
     for parameter in (p for effect in whole.effects for p in effect.parameters):
         text = text.replace(change(parameter), change(in_units(parameter, system)))
-    return text
+    if len(whole.effects) < 2:
+        return text
+    return "\n".join(f"- {sentence}" for sentence in sentences(text))
 
 
 def print_closed_loop(
@@ -136,7 +138,7 @@ def print_in_flight(
             changed = in_system(unit, system).factor * by
             table.add_row(*first, word, f"{changed:.3g}", f"{100 * one.of_motion[name]:.3g} %")
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("changes by", "of its motion"))
 
 
 def _named(name: str, system: System) -> tuple[str, str]:
@@ -160,7 +162,7 @@ def print_power(console: Console, sizes: Sequence[EffectPower], system: System =
             least = ", ".join(each) or "it would show"
         table.add_row(one.name, one.stage, least)
     console.print()
-    print_whole(console, table)
+    print_whole(console, table, ("stage",))
 
 
 def _sized(name: str, value: float, system: System) -> str:
@@ -175,4 +177,4 @@ def print_summary(console: Console, rows: Sequence[Row]) -> None:
         closed = "" if row.closed is None else f"{row.closed:.3f}"
         verdict = row.verdict + (f": {row.why}" if row.why else "")
         table.add_row(row.record, verdict, ", ".join(row.effects), ", ".join(row.guilty), closed)
-    print_whole(console, table)
+    print_whole(console, table, ("guilty", "closed"))

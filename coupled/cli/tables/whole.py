@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 
-def print_whole(console: Console, table: Table) -> None:
+def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> None:
     """Print a table; where its columns do not fit, a line a cell under the row's name.
 
-    A cell without a head, as a unit or a verdict, stands behind the one before it.
+    Before that the columns whose heads are in `spare` are left out, the last one first, and
+    named: --wide shows them. A cell without a head, as a unit or a verdict, stands behind the one
+    before it.
     """
+    left_out = _narrow(table, console.width, spare)
     if _needs(table) <= console.width:
         console.print(table, highlight=False)
+        if left_out:
+            console.print(f"[dim]--wide shows also: {', '.join(left_out)}[/]", highlight=False)
         return
     first, *heads = [" ".join(str(one.header).split()).replace("- ", "") for one in table.columns]
     if table.title is not None:
@@ -34,6 +41,17 @@ def print_whole(console: Console, table: Table) -> None:
         for line in lines:
             if line.plain:
                 console.print(line)
+
+
+def _narrow(table: Table, width: int, spare: Sequence[str]) -> list[str]:
+    """Take spare columns off a table until it fits a width; return their heads."""
+    left_out = list[str]()
+    for head in reversed(spare):
+        if _needs(table) <= width:
+            break
+        table.columns = [column for column in table.columns if column.header != head]
+        left_out.insert(0, head)
+    return left_out
 
 
 def _needs(table: Table) -> int:

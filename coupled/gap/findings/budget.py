@@ -45,6 +45,13 @@ class Share:
     high: float
 
 
+def share_of(budgets: Sequence[StageBudget], stage: str, effect: str) -> str:
+    """Return an effect's share of its stage's residual for people, in per cent; "" for none."""
+    shares = (share for one in budgets if one.stage == stage for share in one.effects)
+    found = next((share for share in shares if share.name == effect), None)
+    return "" if found is None else f"{100 * found.value:.1f} %"
+
+
 @dataclass(frozen=True)
 class StageBudget:
     """The shares of a faulty stage: of each effect, of unexplained structure, of noise; sum 1."""

@@ -158,6 +158,8 @@ def _pressures(
     level = np.full(frames, usual)
     here = [(f"at {usual / 1000.0:.2g} kPa", level, nominal)]
     table = nominal.controls[control].schedule.dynamic_pressure
+    if nominal.flight is None and len(table) == 1:
+        return here
     if nominal.flight is None:
         whole = np.linspace(table[0], table[-1], frames)
         text = f"while q̄ goes from {table[0] / 1000.0:.2g} to {table[-1] / 1000.0:.2g} kPa"

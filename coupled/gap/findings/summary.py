@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 from coupled.display import unit_in
@@ -16,6 +17,7 @@ from coupled.gap.findings.where import Remains, Where
 from coupled.gap.noise.lines import SeenLine
 from coupled.gap.thresholds import CERTAIN, FREE_LEAST
 
+_SENTENCE = re.compile(r"(?<=\.) (?=[A-ZΑ-Ω])")
 OF_SIGNAL = {
     "computed": "the deflection",
     "estimate": "the estimated deflection",
@@ -57,6 +59,13 @@ def filtered_words(filtered: Mapping[str, str]) -> str:
 
 MOST_CHANGE = 100.0  # % a minute, beyond which a rate is no drift of a machine
 FAST = "changes by more than its own size within a minute"
+
+
+def sentences(text: str) -> list[str]:
+    """Return the sentences of a summary."""
+    return _SENTENCE.split(text)
+
+
 NOISE = "noise"
 MISFIT = "no more than the model error of the healthy machine"
 

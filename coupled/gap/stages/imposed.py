@@ -124,7 +124,7 @@ def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
 def _plays(
     number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
 ) -> list[dict[str, float]]:
-    """Return backlashes with the least residual of the force, as starts of a fit, by two scans each.
+    """Return the backlashes with the least residual of the force, where a fit starts, by scans.
 
     The cost has local minima, since the jumps of a backlash move from sample to sample. The force
     is scanned once as the rig predicts it, and once with a free factor and offset: with an unknown

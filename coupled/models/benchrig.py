@@ -1,0 +1,195 @@
+"""A first rig without an aircraft: a control by itself, from what its owner knows or a log of it.
+
+Answers are in SI or in US units, a bare number or one with its unit, as `12.5lbf/in`. What nobody
+gave is the light aircraft's of `draft`, and listed as a guess.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from coupled.display import System, in_system
+from coupled.errors import InputError, nearest
+from coupled.models.draft import HOW_TO_SETTLE, BEND_m_per_N, RIM_m, control_lines, kind_of
+from coupled.models.fromlog import LogNumbers
+from coupled.record.channels import ControlName, unit_of
+from coupled.units import parse_unit
+
+_NUMBER = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")
+_GRADIENT = "schedule.total_gradient"
+_YES, _NO = ("yes", "y", "true"), ("no", "n", "false")
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a control: its name, its words, its unit in SI, and its rig's field."""
+
+    name: str
+    words: str
+    unit: str
+    field: str
+
+
+def questions(control: ControlName) -> dict[str, Question]:
+    """Return what is asked of a control, by name, in the order in which it is asked."""
+    d = unit_of(control)
+    mass = "kg" if d == "m" else "N·s²/rad"
+    asked = (
+        Question("travel", "travel to each side", d, "travel"),
+        Question("gradient", "force gradient", f"N/{d}", _GRADIENT),
+        Question("breakout", "breakout force", "N", "loader.breakout"),
+        Question("friction", "friction force", "N", "loader.friction"),
+        Question("mass", "moving mass at the grip", mass, "loader.mass"),
+        Question("damping", "viscous damping", f"N·s/{d}", "loader.damping"),
+        Question("bend", "bend K of the structure, 0 if unknown", f"{d}/N", "loader.bend"),
+    )
+    return {each.name: each for each in asked}
+
+
+def answer(text: str, asked: Question, system: System) -> float:
+    """Return an answer in SI: a bare number in the system's unit, or a number with its own.
+
+    Raises InputError for what is none, or is of another quantity.
+    """
+    shown = in_system(asked.unit, system)
+    found = _NUMBER.fullmatch(text)
+    value = math.nan
+    if found is not None:
+        factor, own, wanted = 1.0 / shown.factor, found[2].strip(), parse_unit(asked.unit)
+        if own and own not in (shown.unit, asked.unit):
+            given = parse_unit(own)
+            if given is None or wanted is None or given.dimension != wanted.dimension:
+                problem = f"{own!r} is no unit of it; give a number in {shown.unit}"
+                raise InputError("new rig", asked.name, problem)
+            factor = given.factor
+        elif own == asked.unit:
+            factor = 1.0
+        try:
+            value = factor * float(found[1])
+        except ValueError:
+            value = math.nan
+    least = 0.0 if asked.name in ("travel", "gradient", "mass") else -1e-30
+    if not least < value < 1e6:
+        above = "above 0" if least == 0.0 else "of 0 or more"
+        raise InputError("new rig", asked.name, f"{text!r} is no number {above}, in {shown.unit}")
+    return value
+
+
+def yes(text: str) -> bool:
+    """Return an answer to whether there is a servo. Raises InputError for neither yes nor no."""
+    if text.lower() not in (*_YES, *_NO):
+        raise InputError("new rig", "servo", f"{text!r} is neither yes nor no")
+    return text.lower() in _YES
+
+
+def split_answers(words: list[str], control: ControlName) -> dict[str, str]:
+    """Return NAME=VALUE words as answers by name. Raises InputError for a name that is none."""
+    known = [*questions(control), "servo"]
+    answers = {}
+    for word in words:
+        name, sign, value = word.partition("=")
+        if not sign or name not in known:
+            problem = f"{word!r} is no NAME=VALUE of {', '.join(known)}; {nearest(name, known)}"
+            raise InputError("new rig", "--set", problem)
+        answers[name] = value
+    return answers
+
+
+def guesses(control: ControlName, servo: bool) -> dict[str, float]:
+    """Return what is taken where nobody knows, in SI, by name."""
+    guess = kind_of(0.0).controls[control]
+    bend = 0.0
+    if servo:
+        bend = BEND_m_per_N / (RIM_m if unit_of(control) == "rad" else 1.0)
+    return {
+        "travel": guess.travel,
+        "gradient": guess.full_force_N / guess.travel,
+        "breakout": guess.breakout_N,
+        "friction": guess.friction_N,
+        "mass": guess.mass,
+        "damping": guess.damping,
+        "bend": bend,
+    }
+
+
+def found_in(log: LogNumbers) -> tuple[dict[str, float], set[str]]:
+    """Return a log's numbers by name, and the names of those that it determines."""
+    numbers = {
+        "travel": log.travel,
+        "gradient": log.gradient,
+        "breakout": log.breakout_N,
+        "friction": log.friction_N,
+        "mass": log.mass,
+        "damping": log.damping,
+    }
+    if "bend" in log.sure:
+        numbers["bend"] = log.bend
+    return numbers, {name.removesuffix("_N") for name in log.sure}
+
+
+def bench_rig(
+    name: str,
+    control: ControlName,
+    given: Mapping[str, float],
+    servo: bool,
+    log: LogNumbers | None = None,
+    source: str = "",
+) -> str:
+    """Return the text of a rig file without an aircraft.
+
+    `given` are numbers in SI by name, which its owner knows. Those of a `log` come next, from the
+    file `source`; the others are guesses. The gradient is the same at any q̄: one row of a table.
+    """
+    asked = questions(control)
+    values, known = guesses(control, servo), set(given)
+    measured: dict[str, float] = {}
+    if log is not None:
+        measured, sure = found_in(log)
+        measured = {key: value for key, value in measured.items() if value > 0.0}
+        known |= sure
+    values |= measured | dict(given)
+    remarks = {
+        asked[key].field: f"from {source}" if key in known else f"from {source}, roughly"
+        for key in measured
+        if key not in given
+    }
+    if "travel" in measured and "travel" not in given:
+        remarks["travel"] = f"the greatest in {source}"
+    fields = {asked[key].field for key in known}
+    if "gradient" in known:
+        fields.add("loader.basic_gradient")
+    if "bend" in known:
+        fields.add("compensation.bend")
+    if _GRADIENT in remarks:
+        remarks["schedule"] = f"one row: the same gradient at any q̄, {remarks.pop(_GRADIENT)}"
+    remarks.setdefault("schedule", "one row: the same gradient at any q̄")
+    hardware = replace(
+        kind_of(0.0).controls[control],
+        travel=values["travel"],
+        mass=values["mass"],
+        damping=values["damping"],
+        breakout_N=values["breakout"],
+        friction_N=values["friction"],
+    )
+    lines = [
+        f"# {name}: a {control} on the bench, without an aircraft, by `coupled new rig`.",
+        "#",
+        *HOW_TO_SETTLE,
+        "",
+        f'name = "{name}"',
+        "frame_rate_Hz = 120.0",
+        *control_lines(
+            control,
+            hardware,
+            gradients=[values["gradient"]],
+            pressures=[0.0],
+            bend=values["bend"],
+            servo=servo,
+            known=fields,
+            remarks=remarks,
+        ),
+    ]
+    return "\n".join([*lines, ""])

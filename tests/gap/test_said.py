@@ -1,0 +1,71 @@
+"""What a diagnosis says in words: a list of sentences, one share, and why a rig has a key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from coupled.cli.gaps import _write_improved
+from coupled.cli.tables.gaps import in_words
+from coupled.gap.findings.budget import Share, StageBudget, share_of
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.record.record import Record
+from tests.support.rigs import bench
+
+SUMMARY = "Play of 1 mm explains 60 % of the gap. Friction explains 30 %. Set q̄ first."
+
+
+def said(effects: int) -> str:
+    effect = SimpleNamespace(parameters=())
+    whole = SimpleNamespace(summary=SUMMARY, effects=(effect,) * effects)
+    return in_words(cast("Diagnosis", whole), "si")
+
+
+def test_two_effects_make_a_list_and_one_a_paragraph() -> None:
+    assert said(1) == SUMMARY
+    lines = said(2).splitlines()
+    assert lines == [
+        "- Play of 1 mm explains 60 % of the gap.",
+        "- Friction explains 30 %.",
+        "- Set q̄ first.",
+    ]
+
+
+def test_a_share_is_one_number_wherever_it_is_written() -> None:
+    noise, rest = Share("noise", 0.2, 0.1, 0.3), Share("unexplained", 0.1, 0.0, 0.2)
+    budget = StageBudget("loader", (Share("play", 0.7, 0.6, 0.8),), rest, noise)
+    assert share_of((budget,), "loader", "play") == "70.0 %"
+    assert share_of((budget,), "loader", "friction") == ""
+    assert share_of((budget,), "linkage", "play") == ""
+
+
+def test_a_key_that_is_no_effect_is_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A servo found on a rig without one: its damping ratio is written, and is no effect."""
+    loader = "controls.column.loader"
+    old = bench({"servo_frequency_Hz": 0.0})
+    new = old.changed({f"{loader}.servo_frequency_Hz": 9.0, f"{loader}.servo_damping_ratio": 0.7})
+    found = SimpleNamespace(key="loader.servo_frequency_Hz", filed=None, found=9.0, unit="Hz")
+    whole = SimpleNamespace(
+        summary="A servo.",
+        effects=(SimpleNamespace(parameters=(found,)),),
+        settings=(),
+        nominal=old,
+        improved=new,
+    )
+    monkeypatch.setattr("coupled.gap.findings.summary.change", lambda p: "none → 9 Hz")
+    monkeypatch.setattr("coupled.gap.trimmed.rig_of_manifests", lambda records: old)
+    monkeypatch.setattr("coupled.gap.trimmed.trimmed", lambda rig, records: (rig, ""))
+    target = tmp_path / "new.toml"
+    records: dict[str, Record] = {}
+    _write_improved(target, cast("Diagnosis", whole), None, records)
+    head = [line for line in target.read_text(encoding="utf-8").splitlines() if line[:1] == "#"]
+    assert (
+        "# written beside these: controls.column.loader.servo_damping_ratio, since a file gives"
+        " both numbers of a servo or none" in head
+    )
+    assert not any("written beside" in line and "servo_frequency" in line for line in head)

@@ -1,0 +1,94 @@
+"""--units us in figures, reports and written forms, and one unit for a sweep's table and figure."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from coupled.calibration.readingsfile import read_readings
+from coupled.cli.tables.campaign import print_sweep
+from coupled.cli.terminal import SafeConsole
+from coupled.display import System
+from coupled.plots.campaign import draw_sweep
+from coupled.plots.sweepview import WORDS, Shown
+from tests.support.commands import coupled
+from tests.support.runs import SHORT
+
+
+def text_of(file: Path) -> str:
+    """Return the words of an HTML file."""
+    return " ".join(re.sub(r"<[^>]*>", " ", file.read_text(encoding="utf-8")).split())
+
+
+def test_a_comparison_in_us_units_has_them_in_report_and_figure(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(SHORT)
+    words = ("compare", "./short.toml", "--units", "us", "--report", "r.html", "--figure", "f.svg")
+    assert coupled(tmp_path, *words).returncode == 0
+    said = text_of(tmp_path / "r.html")
+    assert "force needed, lb" in said
+    assert "force needed, N" not in said
+    drawn = (tmp_path / "f.svg").read_text(encoding="utf-8")  # an axis's text is a comment there
+    assert "<!-- pilot's force, lb -->" in drawn
+    assert "of the column, in -->" in drawn
+
+
+def test_a_plans_form_in_us_units_is_read_as_such(tmp_path: Path) -> None:
+    for system in ("si", "us"):
+        words = ("calibrate", "--plan", "--write", f"{system}.csv", "--units", system)
+        assert coupled(tmp_path, *words).returncode == 0
+    rows = {
+        system: list(csv.DictReader((tmp_path / f"{system}.csv").read_text("utf-8").splitlines()))
+        for system in ("si", "us")
+    }
+    assert {"deflection_in", "force_lb", "force_after_lb"} <= set(rows["us"][0])
+    held = {
+        system: [float(row["remark"].split()[2]) for row in each] for system, each in rows.items()
+    }
+    assert held["si"] == [pytest.approx(0.0254 * x, rel=1e-3) for x in held["us"]]
+    assert "lb/ft² given to the host" in rows["us"][0]["remark"]
+
+
+def test_a_calibration_in_us_units_has_them_in_report_and_figure(tmp_path: Path) -> None:
+    assert coupled(tmp_path, "bench", "-o", "b.csv").returncode == 0
+    assert len(read_readings(tmp_path / "b.csv", "column").row) == 25
+    words = ("calibrate", "b.csv", "--units", "us", "--report", "r.html", "--figure", "f.svg")
+    assert coupled(tmp_path, *words).returncode == 0
+    said = text_of(tmp_path / "r.html")
+    assert "S1 = " in said
+    assert "V/in" in said
+    assert "δ, in F, lb" in said
+    assert "<!-- deflection δ, in -->" in (tmp_path / "f.svg").read_text(encoding="utf-8")
+
+
+TABLE = pl.DataFrame(
+    {
+        "flight": [0, 1],
+        "k": [1.0, 2.0],
+        "configuration": ["uncompensated"] * 2,
+        "peak_rate_rad_per_s": [0.1, 0.2],
+        "force_N": [10.0, 20.0],
+        "felt_ratio": [0.9, 0.8],
+        "ended_early": ["", ""],
+    }
+)
+
+
+@pytest.mark.parametrize("system", ["si", "us"])
+def test_a_sweeps_table_and_figure_have_the_same_units(
+    system: System, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ["peak_rate_rad_per_s", "force_N", "felt_ratio"]
+    drawn = draw_sweep(TABLE, ["k"], names, system=system)
+    print_sweep(SafeConsole(width=100), TABLE, names, system)
+    printed = capsys.readouterr().out
+    for axes, name in zip(drawn.axes, names, strict=True):
+        word, _, unit = axes.get_ylabel().partition(", ")
+        assert word == WORDS[name]
+        line = next(each for each in printed.splitlines() if f", {unit} " in each)
+        most = float(axes.get_lines()[0].get_ydata()[-1])
+        assert f"{most:.3g}" in line
+        assert Shown.of(name, system).factor * TABLE[name][1] == pytest.approx(most)
