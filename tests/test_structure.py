@@ -29,6 +29,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # A room may import from the rooms left of it.
 ORDER = [
+    "version",
     "errors",
     "timing",
     "units",
@@ -43,13 +44,14 @@ ORDER = [
 ORDER += [
     "record/channels",
     "plots/histories",
+    "results",
     "record",
     "rig",
     "record/importing",
     "flight",
-    "models",
+    "surveying",
     "authority",
-    "export",
+    "exporting",
     "campaign",
     "calibration",
 ]
@@ -70,6 +72,7 @@ ORDER += [
     "reports",
     "api",
     "live",
+    "pytest_plugin",
     "cli/tables",
     "cli/process",
     "cli/terminal",

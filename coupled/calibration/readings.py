@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.results import TableResult, frame_of
+
+if TYPE_CHECKING:
+    import polars as pl
+
 Floats = NDArray[np.float64]
+COLUMNS = ("deflection", "force_N", "v1_V", "v3_V")
 
 
 @dataclass(frozen=True)
-class Readings:
+class Readings(TableResult):
     """Readings in SI, a value a row: `deflection` in d, `force` in N, `v1` and `v3` in V.
 
     `row` is each one's row in its file, `label` its gradient set. `deflection` and `force`
@@ -38,6 +45,23 @@ class Readings:
     null_side: Floats
     other_names: tuple[str, ...]
     others: Floats
+
+    def __repr__(self) -> str:
+        sets = len(set(self.label))
+        nulls = len(self.null_row)
+        return f"Readings({len(self.row)} readings in {sets} gradient sets, {nulls} nulls)"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a reading: deflection in m, or rad on a wheel, force in N, voltages in V."""
+        columns = (self.deflection, self.force, self.v1, self.v3)
+        return frame_of(
+            [
+                dict(zip(("row", "gradient_set", *COLUMNS), (row, label, *numbers), strict=True))
+                for row, label, *numbers in zip(
+                    self.row.tolist(), self.label, *(c.tolist() for c in columns), strict=True
+                )
+            ]
+        )
 
     @property
     def deflection_looks(self) -> Floats:

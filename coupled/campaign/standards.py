@@ -46,12 +46,16 @@ _LONG_TERM: Standard = "25.143(d) long-term"
 
 @dataclass(frozen=True)
 class StandardFigure:
-    """A flight's figure and its bounds, in N, rad/s or s; `note` says which of several it is."""
+    """A flight's figure and its bounds, in N, rad/s or s; `note` says which of several it is.
+
+    `at_s` is the flight's time at which the figure was had, None where it is of no one moment.
+    """
 
     value: float
     least: float | None
     most: float | None
     note: str = ""
+    at_s: float | None = None
 
 
 def judge_standard(
@@ -89,10 +93,11 @@ def _pilot_force(standard: Standard, control: ControlName, flight: Flight) -> St
     if standard == _LONG_TERM:
         return held
     most = _SHORT_TERM[standard][control]
-    greatest = float(np.max(np.abs(force)))
+    at = int(np.argmax(np.abs(force)))
+    greatest = float(np.abs(force)[at])
     if sustained / LONG_TERM_N[control] > greatest / most:
         return held
-    return StandardFigure(greatest, None, most)
+    return StandardFigure(greatest, None, most, at_s=float(time_s[at]))
 
 
 def _rate(standard: Standard, flight: Flight, rigid: Flight) -> StandardFigure:

@@ -22,13 +22,14 @@ from coupled.errors import InputError
 from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
+from coupled.results import TableResult
 
 Progress = Callable[[str, int, int], None]
 TABLE = "table.parquet"
 
 
 @dataclass(frozen=True)
-class SweepResult:
+class SweepResult(TableResult):
     """A sweep's flights, a row each, and what they tell.
 
     `table` has the varied keys, the configuration, the figures that are kept, and why a flight
@@ -41,6 +42,12 @@ class SweepResult:
     indices: tuple[SobolIndex, ...]
     limits: tuple[SurvivalLimit, ...]
     found: int
+
+    def __repr__(self) -> str:
+        ended = int((self.table["ended_early"] != "").sum())
+        over = ", ".join(self.plan.keys)
+        flights = f"{len(self.table)} flights over {over}, {ended} ended early"
+        return f"SweepResult({self.plan.sweep.name}: {flights})"
 
     def to_polars(self) -> pl.DataFrame:
         """Return the table, a row a flight."""

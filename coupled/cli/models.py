@@ -18,7 +18,7 @@ from coupled.cli.terminal import check_json, give_json, out
 from coupled.errors import InputError, nearest
 
 if TYPE_CHECKING:
-    from coupled.models.survey import Surveyed
+    from coupled.surveying.survey import Surveyed
 
 
 @app.command(epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -[/]")
@@ -35,8 +35,8 @@ def models(
     json_file: JsonOption = "",
 ) -> None:
     """List JSBSim's models: where each trims or why not, how its controls move, its rigs."""
-    from coupled.models.survey import known_models, survey
     from coupled.parallel import as_done, cores, executor
+    from coupled.surveying.survey import known_models, survey
 
     known = known_models()
     for name in names or ():
@@ -88,8 +88,8 @@ def rig(
     ] = None,
 ) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
-    from coupled.models.draft import draft
-    from coupled.models.survey import survey
+    from coupled.surveying.draft import draft
+    from coupled.surveying.survey import survey
 
     name, home, own = _model(model)
     path = file or Path(f"{name}.toml")
@@ -107,7 +107,7 @@ def rig(
 
 def _model(word: str) -> tuple[str, Path, bool]:
     """Return a model's name, the folder that its own lies in, and whether it is unknown."""
-    from coupled.models.survey import known_models
+    from coupled.surveying.survey import known_models
 
     known = known_models()
     if word in known:

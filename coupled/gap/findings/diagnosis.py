@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupled.arguments import public
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
@@ -22,13 +22,17 @@ from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
+from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig
+
+if TYPE_CHECKING:
+    import polars as pl
 
 CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
 
 
 @dataclass(frozen=True)
-class Diagnosis(Findings):
+class Diagnosis(Findings, TableResult):
     """What records say of a rig, with the rig that has the effects found (`improved`).
 
     The flight again, the next test and the power are computed when they are first asked for:
@@ -49,6 +53,23 @@ class Diagnosis(Findings):
     left_out: tuple[str, ...] = ()
     # What of the trim was taken from the records or their manifests, in words; empty for nothing.
     trim: str = ""
+
+    def __repr__(self) -> str:
+        found = ", ".join(effect.name for effect in self.effects) or "no effect"
+        return f"Diagnosis({self.nominal.name}, {self.control}: {self.verdict}; {found})"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a parameter of the effects found; the units are in the column `unit`."""
+        rows = []
+        for effect in self.effects:
+            head = {"effect": effect.name, "stage": effect.stage, "probability": effect.probability}
+            rows += [
+                head
+                | {"key": p.key, "unit": p.unit, "filed": p.filed, "found": p.found}
+                | {"low": p.found_low, "high": p.found_high}
+                for p in effect.parameters
+            ]
+        return frame_of(rows)
 
     @property
     def first(self) -> Record:

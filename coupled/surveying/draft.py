@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
-from coupled.models.survey import Surveyed
 from coupled.record.channels import SURFACES, ControlName, unit_of
+from coupled.surveying.survey import Surveyed
 
 _BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
 _RIM_m = 0.15  # a wheel's radius
