@@ -30,7 +30,7 @@ Pilots, on `column`, `wheel` or `pedals`
 
 Calibrate and diagnose
     plan            the readings to take; `bench` takes them at a simulated rig
-    calibrate       readings to S1, S2, S3 and K, with errors
+    calibrate       readings to S1, S2, S3 and K, with errors; `with_calibration` puts them in a rig
     diagnose        records to where they part from the rig, which effect, how large
     fit             a nominal rig to records of the healthy machine
 
@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from coupled.api.records import import_log, read_record, write_record
     from coupled.api.rigs import load_rig, models, new_rig
     from coupled.calibration.calibrate import calibrate
+    from coupled.calibration.calibrated import with_calibration
     from coupled.campaign.check import check
     from coupled.campaign.sweep import sweep
     from coupled.errors import InputError
@@ -124,6 +125,7 @@ __all__ = [
     "read_record",
     "stability",
     "sweep",
+    "with_calibration",
     "write_record",
 ]
 
@@ -137,6 +139,7 @@ _HOMES = {
     "coupled.api.records": ("import_log", "read_record", "write_record"),
     "coupled.api.rigs": ("load_rig", "models", "new_rig"),
     "coupled.calibration.calibrate": ("calibrate",),
+    "coupled.calibration.calibrated": ("with_calibration",),
     "coupled.campaign.check": ("check",),
     "coupled.campaign.sweep": ("sweep",),
     "coupled.errors": ("InputError",),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.authority.maps import Feel, LossMap, envelope, feel, loss_maps, shipped_flights
+from coupled.display import percent
 from coupled.record.channels import ControlName, unit_of
 from coupled.record.record import Record
 from coupled.results import TableResult, frame_of
@@ -42,7 +43,7 @@ class AuthorityMap(TableResult):
             for name, maps in self.losses.items()
             if any(np.isfinite(each.loss).any() for each in maps)
         }
-        most = ", ".join(f"{name} up to {100 * loss:.1f} %" for name, loss in greatest.items())
+        most = ", ".join(f"{name} up to {percent(loss)}" for name, loss in greatest.items())
         return f"AuthorityMap({self.rig.name}: lost {most})"
 
     def to_polars(self) -> pl.DataFrame:

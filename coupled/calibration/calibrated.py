@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from coupled.arguments import public
 from coupled.calibration.accuracy import (
     DEFLECTION_WITHIN,
     FELT_WITHIN,
@@ -35,6 +36,7 @@ _ROUNDING = 1e-15  # of a figure: a smaller error is that of a computer alone
 _BEYOND = 3.0  # half widths of a 95 % interval: more is no chance, but other hardware
 
 
+@public
 def with_calibration(
     rig: Rig,
     control: ControlName,
@@ -48,6 +50,13 @@ def with_calibration(
     be as found, too: for readings of a real loader, whose rig file is a model. A scale that the
     file has not is as found in any case. Raises InputError where the figures make a rig
     that cannot be.
+
+    >>> import coupled
+    >>> rig = coupled.load_rig("report-column")
+    >>> found = coupled.calibrate(coupled.bench(rig, gradients=3, deflections=3), rig)
+    >>> calibrated = coupled.with_calibration(rig, "column", found)
+    >>> calibrated["controls.column.compensation.bend_m_per_N"] == found.line.bend.value
+    True
     """
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing

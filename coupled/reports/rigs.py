@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupled.display import percent
+from coupled.errors import listed
 from coupled.exporting.write import Export
 from coupled.plots.rigs import draw_rig
 from coupled.plots.saving import svg_text
@@ -31,15 +32,15 @@ def rig_report(rig: Rig, made: Made) -> Report:
         Section("Controls", (table,)),
         Section("Gradients", (Drawing(svg_text(draw_rig(rig)), _SHOWN),)),
     )
-    aircraft = "none, a bench" if rig.flight is None else rig.flight.model
+    aircraft = "none" if rig.flight is None else rig.flight.model
     settings = (
         ("rig", rig.name),
         ("aircraft", aircraft),
         ("frame rate", f"{rig.frame_rate:g} Hz, {rig.substeps} substeps of the rig a frame"),
     )
-    bends = {name: control.loader.bend > 0.0 for name, control in rig.controls.items()}
-    bent = ", ".join(name for name, each in bends.items() if each) or "no control"
-    said = f"{aircraft} at {rig.frame_rate:g} Hz. Of its structure bends: {bent}."
+    bent = [name for name, control in rig.controls.items() if control.loader.bend > 0.0]
+    under = f"bends under {listed(bent)}" if bent else "is rigid"
+    said = f"Aircraft: {aircraft}; {rig.frame_rate:g} Hz. The structure {under}."
     return Report("Rig", rig.name, Verdict(said), sections, settings, made)
 
 

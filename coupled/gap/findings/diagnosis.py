@@ -55,8 +55,14 @@ class Diagnosis(Findings, TableResult):
     trim: str = ""
 
     def __repr__(self) -> str:
-        found = ", ".join(effect.name for effect in self.effects) or "no effect"
-        return f"Diagnosis({self.nominal.name}, {self.control}: {self.verdict}; {found})"
+        found = "; ".join(
+            ", ".join(
+                [e.name, *(f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in e.parameters)]
+            )
+            for e in self.effects
+        )
+        words = f"{self.verdict}; {found}" if found else self.verdict
+        return f"Diagnosis({self.nominal.name}, {self.control}: {words})"
 
     def to_polars(self) -> pl.DataFrame:
         """Return a row a parameter of the effects found; the units are in the column `unit`."""
