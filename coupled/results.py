@@ -77,10 +77,13 @@ def _display() -> Display:
     return cast(Display, importlib.import_module("coupled.api.display"))
 
 
-def frame_of(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
-    """Return rows of figures as a polars DataFrame, null for None."""
+def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> pl.DataFrame:
+    """Return rows of figures as a polars DataFrame, null for None; without rows, of `columns`."""
     polars: Any = importlib.import_module("polars")
-    frame: pl.DataFrame = polars.DataFrame(rows, infer_schema_length=None)
+    if rows:
+        frame: pl.DataFrame = polars.DataFrame(rows, infer_schema_length=None)
+    else:
+        frame = polars.DataFrame({name: [] for name in columns})
     return frame
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -72,7 +72,7 @@ class Export(Displayed, Tabular):
 
     def to_polars(self) -> pl.DataFrame:
         """Return how far each flight is from our own, a row a flight."""
-        return frame_of(self.as_dict())
+        return frame_of(self.as_dict(), [field.name for field in fields(Beside)])
 
     @property
     def within(self) -> bool:

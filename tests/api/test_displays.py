@@ -91,7 +91,7 @@ class Page(HTMLParser):
 )
 def test_a_result_is_displayed_drawn_and_reported(kind: type, tmp_path: Path) -> None:
     result: Any = made(kind.__name__, tmp_path)
-    assert type(result) is kind
+    assert type(result).__name__ == kind.__name__
     text = repr(result)
     assert len(text) < 800
     assert len(text.splitlines()[0]) < 260
@@ -116,7 +116,7 @@ def test_a_result_is_displayed_drawn_and_reported(kind: type, tmp_path: Path) ->
     assert "What made this" in report
     if hasattr(result, "to_polars"):
         frame = result.to_polars()
-        assert frame.columns or kind.__name__ == "Export"
+        assert frame.columns
         assert list(result.to_pandas().columns) == frame.columns
 
 

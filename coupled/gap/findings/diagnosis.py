@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
+COLUMNS = ("effect", "stage", "probability", "key", "unit", "filed", "found", "low", "high")
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Diagnosis(Findings, TableResult):
                 | {"low": p.found_low, "high": p.found_high}
                 for p in effect.parameters
             ]
-        return frame_of(rows)
+        return frame_of(rows, COLUMNS)
 
     @property
     def first(self) -> Record:
