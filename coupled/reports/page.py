@@ -14,7 +14,7 @@ from functools import cache
 from typing import ClassVar, Literal
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from coupled.errors import printable
 from coupled.reports.inline import inline_svg
@@ -185,5 +185,6 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         finalize=_shown,
     )
-    environment.filters["typeset"] = typeset
+    # Markup, so that `_shown` leaves its spaces that do not break.
+    environment.filters["typeset"] = lambda text: escape(typeset(printable(text)))
     return environment
