@@ -10,6 +10,8 @@
 
 Load
     load_rig        a rig file, or a shipped rig by name: `Rig`
+    new_rig         a first rig for a JSBSim aircraft; `rig.save` writes it
+    models          JSBSim's aircraft: where each trims, how its controls move
     load_run        a run file, or a shipped run by name: a `Manoeuvre` each case
     read_record     a record of CSV or Parquet: `Record`
     write_record    the reverse, with a manifest
@@ -27,8 +29,19 @@ Pilots, on `column`, `wheel` or `pedals`
     Attitude Track                                                 a closed loop
 
 Calibrate and diagnose
-    calibrate       readings to S1, S2, S3 and K, with errors
+    plan            the readings to take; `bench` takes them at a simulated rig
+    calibrate       readings to S1, S2, S3 and K, with errors; `with_calibration` puts them in a rig
     diagnose        records to where they part from the rig, which effect, how large
+    fit             a nominal rig to records of the healthy machine
+
+Analyse and hand on
+    map_authority   what is lost over q̄ and deflection, stick force per g and per knot
+    stability       where a rig is stable, over K·G_T
+    document        forces and control checks of 14 CFR Part 60
+    export          a rig's loader as JSBSim systems
+
+Results display themselves in a notebook. Each has `.report(file)`, most have `.plot()`,
+`.to_polars()` and `.to_pandas()`.
 
 Data
     Rig Manoeuvre PressureProfile Record InputError
@@ -47,12 +60,19 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from coupled.version import __version__ as __version__
+
 if TYPE_CHECKING:
+    from coupled.api.analyses import map_authority, stability
+    from coupled.api.benches import bench, plan
+    from coupled.api.documents import document
+    from coupled.api.exports import export
     from coupled.api.flights import compare, fly, load_run
-    from coupled.api.gaps import diagnose
+    from coupled.api.gaps import diagnose, fit
     from coupled.api.records import import_log, read_record, write_record
-    from coupled.api.rigs import load_rig
+    from coupled.api.rigs import load_rig, models, new_rig
     from coupled.calibration.calibrate import calibrate
+    from coupled.calibration.calibrated import with_calibration
     from coupled.campaign.check import check
     from coupled.campaign.sweep import sweep
     from coupled.errors import InputError
@@ -71,8 +91,6 @@ if TYPE_CHECKING:
     from coupled.record.record import Record
     from coupled.rig.rig import Rig
 
-__version__ = "0.2.0"
-
 __all__ = [
     "Attitude",
     "Clamp",
@@ -88,25 +106,40 @@ __all__ = [
     "Step",
     "ThreeTwoOneOne",
     "Track",
+    "bench",
     "calibrate",
     "check",
     "compare",
     "diagnose",
+    "document",
+    "export",
+    "fit",
     "fly",
     "import_log",
     "load_rig",
     "load_run",
+    "map_authority",
+    "models",
+    "new_rig",
+    "plan",
     "read_record",
+    "stability",
     "sweep",
+    "with_calibration",
     "write_record",
 ]
 
 _HOMES = {
+    "coupled.api.analyses": ("map_authority", "stability"),
+    "coupled.api.benches": ("bench", "plan"),
+    "coupled.api.documents": ("document",),
+    "coupled.api.exports": ("export",),
     "coupled.api.flights": ("compare", "fly", "load_run"),
-    "coupled.api.gaps": ("diagnose",),
+    "coupled.api.gaps": ("diagnose", "fit"),
     "coupled.api.records": ("import_log", "read_record", "write_record"),
-    "coupled.api.rigs": ("load_rig",),
+    "coupled.api.rigs": ("load_rig", "models", "new_rig"),
     "coupled.calibration.calibrate": ("calibrate",),
+    "coupled.calibration.calibrated": ("with_calibration",),
     "coupled.campaign.check": ("check",),
     "coupled.campaign.sweep": ("sweep",),
     "coupled.errors": ("InputError",),

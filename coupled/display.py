@@ -40,6 +40,12 @@ class Shown:
         return "0" if float(text) == 0.0 else text
 
 
+def percent(share: float, decimals: int = 1) -> str:
+    """Return a share in per cent, without a sign before a zero."""
+    text = f"{100.0 * share:.{decimals}f}"
+    return f"{text.lstrip('-') if float(text) == 0.0 else text} %"
+
+
 _SI: Final[Mapping[str, Shown]] = {
     "N": Shown("N"),
     "m": Shown("m"),

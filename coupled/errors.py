@@ -102,6 +102,12 @@ class InputError(ValueError):
         return (self, *self.more)
 
 
+class MissingKeyError(InputError, KeyError):
+    """A key, a channel or the like that is not there."""
+
+    __str__ = InputError.__str__
+
+
 @contextmanager
 def collected(faults: list[InputError]) -> Iterator[None]:
     """Keep the faults of what is done within, so that those of the rest are found, too."""

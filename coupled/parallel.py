@@ -6,11 +6,14 @@ with it. Within one piece of work, threads share what runs compiled.
 
 from __future__ import annotations
 
+import ast
 import importlib
+import inspect
 import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,6 +22,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
@@ -234,6 +238,35 @@ def cores(workers: int) -> int:
     return workers or os.cpu_count() or 1
 
 
+def guarded() -> bool:
+    """Tell whether new processes could load the main module without running this call again.
+
+    A process that is spawned loads the main script anew. A call from the script's own level is
+    reached then as well, unless it stands under `if __name__ == "__main__":`.
+    """
+    main = sys.modules.get("__main__")
+    file = getattr(main, "__file__", None)
+    if main is None or file is None:  # a notebook, or an interactive session
+        return True
+    frame, line = inspect.currentframe(), 0
+    while frame is not None:
+        if frame.f_globals is vars(main) and frame.f_code.co_name == "<module>":
+            line = frame.f_lineno
+        frame = frame.f_back
+    try:
+        tree = ast.parse(Path(file).read_bytes()) if line else None
+    except (OSError, ValueError, SyntaxError):  # no script that could be loaded anew
+        return True
+    if tree is None:
+        return True
+    return any(
+        isinstance(node, ast.If)
+        and "__name__" in ast.unparse(node.test)
+        and node.lineno <= line <= (node.end_lineno or line)
+        for node in tree.body
+    )
+
+
 @contextmanager
 def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     """Give an executor of so many processes, or a cluster's where an address is given.
@@ -245,6 +278,10 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
         with _cluster(cluster) as pool:
             yield pool
         return
+    if workers > 1 and not guarded():
+        script = 'this script calls it outside of `if __name__ == "__main__":`'
+        print(f"note: works in one process, not in {workers}: {script}", file=sys.stderr)
+        workers = 1
     if workers <= 1:
         yield Here()
         return
@@ -259,8 +296,7 @@ def executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     try:
         yield pool
     except BrokenExecutor:
-        problem = "a worker died; what is finished is kept, and the same command goes on. A script"
-        problem += ' calls this under `if __name__ == "__main__":`, or with workers=1'
+        problem = "a worker died; what is finished is kept, and the same command goes on"
         raise InputError("--workers", "", problem) from None
     except BaseException:
         ours.close()  # interrupted, or nothing to be done with the rest: no worker is waited for

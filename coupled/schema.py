@@ -113,7 +113,12 @@ def _file_keys(section: type[Section], d: str) -> dict[str, str]:
 
 def load_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's tables."""
-    return loads_toml(read_text(path, "a TOML file is wanted", MOST_TOML_bytes), path)
+    return loads_toml(read_toml(path), path)
+
+
+def read_toml(path: Path) -> str:
+    """Return a TOML file's text."""
+    return read_text(path, "a TOML file is wanted", MOST_TOML_bytes)
 
 
 def loads_toml(text: str, file: object) -> dict[str, Any]:

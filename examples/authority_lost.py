@@ -9,22 +9,18 @@
 import coupled
 
 rig = coupled.load_rig("737")
-column = rig.controls["column"]
-print(f"K = {1e3 * column.loader.bend:.3f} mm/N, travel ±{100 * column.travel:.1f} cm")
+for key in ("loader.bend_m_per_N", "travel_m"):
+    print(key, "=", rig[f"controls.column.{key}"])
 
 # %% [markdown]
 # The same pull, held at 6 cm, on a rigid structure, on the one that bends, and with each of the
-# host's two corrections. `Clamp` holds the grip; the force is what that takes.
+# host's two corrections. `Clamp` holds the grip; the force is what that takes. A notebook shows
+# the table with its figure.
 
 # %%
 pull = coupled.Clamp(deflection_m=0.06, start_s=0.5)
 table = coupled.compare(rig, column=pull, duration_s=4)
-for flight in table:
-    figures = flight.outcome
-    print(
-        f"{flight.configuration:16} {100 * figures.loss:5.1f} % of the elevator lost,"
-        f" {figures.felt_ratio:.2f} of the specified force felt"
-    )
+print(table)
 
 # %% [markdown]
 # The closed form of the rig's statics agrees to what friction adds, which it leaves out. The

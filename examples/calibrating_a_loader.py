@@ -8,10 +8,6 @@
 
 # %%
 import coupled
-from coupled.calibration.bench import CalibrationBench, take_readings
-from coupled.calibration.calibrated import with_calibration
-from coupled.calibration.estimate import usual_instruments
-from coupled.calibration.plan import precision, stations
 
 rig = coupled.load_rig("report-column").changed(
     {
@@ -19,31 +15,28 @@ rig = coupled.load_rig("report-column").changed(
         "controls.column.compensation.bend_m_per_N": 0.0,  # and the host knows of no bend
     }
 )
-tools = usual_instruments("column")
 
 # %% [markdown]
 # Which readings, and how well will they tell K? The plan takes a usual K, as none is known yet.
 
 # %%
-grid = stations(rig, "column", 4, 4)
-print(f"{len(grid)} readings: K to ±{100 * precision(rig, 'column', grid, tools).half_width:.0f} %")
+print(coupled.plan(rig))
 
 # %%
-readings = take_readings(CalibrationBench(rig, "column", grid, tools), seed=1)
-found = coupled.calibrate(readings, rig)
-true = rig.controls["column"].loader.bend
-bend = found.line.bend
-print(
-    f"K = {1e3 * bend.value:.4f} mm/N, 95 % interval {1e3 * bend.low:.4f} to {1e3 * bend.high:.4f}"
-)
-print(f"true: {1e3 * true:.4f} mm/N")
+found = coupled.calibrate(coupled.bench(rig, gradients=4, deflections=4, seed=1), rig)
+true, bend = rig["controls.column.loader.bend_m_per_N"], found.line.bend
+print(found)
+print(f"true: {true:.4g} m/N")
 
 # %% [markdown]
 # A host that uses the calibration gives the authority back.
 
 # %%
-calibrated = with_calibration(rig, "column", found)
+calibrated = coupled.with_calibration(rig, "column", found)
 pull = coupled.Clamp(deflection_m=0.04, start_s=0.5)
-for name, each in (("before", rig), ("after", calibrated)):
-    flight = coupled.fly(each, column=pull, duration_s=5, configuration="compensated")
-    print(f"{name:7} {100 * flight.outcome.loss:5.1f} % of the elevator lost")
+before, after = (
+    coupled.fly(each, column=pull, duration_s=5, configuration="compensated")
+    for each in (rig, calibrated)
+)
+print("before:", before)
+print("after: ", after)

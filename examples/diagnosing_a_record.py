@@ -9,7 +9,7 @@ import coupled
 
 nominal = coupled.load_rig("t37")
 real = nominal.changed({"controls.column.loader.damping_N_s_per_m": 110.0, "noise": {}})
-print("nominal damping:", nominal.controls["column"].loader.damping, "N s/m")
+print("nominal damping:", nominal["controls.column.loader.damping_N_s_per_m"], "N s/m")
 
 # %% [markdown]
 # A frequency sweep moves the column from its static feel to its dynamics.
@@ -21,15 +21,12 @@ print(record)
 
 # %%
 found = coupled.diagnose(nominal, record)
-print("verdict:", found.verdict)
-for effect in found.effects:
-    for parameter in effect.parameters:
-        low, high = parameter.low, parameter.high
-        ends = "" if low is None or high is None else f"  ({low:.4g} to {high:.4g})"
-        print(f"{effect.stage}: {effect.name}, {parameter.name} = {parameter.value:.4g}{ends}")
+print(found)
+print(found.to_polars().select("key", "filed", "found", "low", "high"))
 
 # %% [markdown]
-# The improved rig flies as the record does.
+# The improved rig flies as the record does; `found.improved.save("improved.toml")` keeps it, with
+# the comments of the rig file.
 
 # %%
 for name, rig in (("nominal", nominal), ("improved", found.improved)):

@@ -57,7 +57,16 @@ def test_every_public_name_is_there_and_on_the_map() -> None:
     assert kinds <= set(coupled.__all__)
 
 
-LONG = {"calibrate", "diagnose"}  # to work an example
+LONG = {
+    "bench",
+    "calibrate",
+    "diagnose",
+    "document",
+    "fit",
+    "map_authority",
+    "stability",
+    "with_calibration",
+}
 
 
 @pytest.mark.parametrize(

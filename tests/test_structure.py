@@ -31,6 +31,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 # - `record/importing` checks a log against the rig that it is from, so it comes after `rig`;
 # - the parts of `gap`, `blind` and `cli` import each other in this order only.
 ORDER = [
+    "version",
     "errors",
     "timing",
     "units",
@@ -45,13 +46,14 @@ ORDER = [
 ORDER += [
     "record/channels",
     "plots/histories",
+    "results",
     "record",
     "rig",
     "record/importing",
     "flight",
-    "models",
+    "surveying",
     "authority",
-    "export",
+    "exporting",
     "campaign",
     "calibration",
 ]
@@ -72,6 +74,7 @@ ORDER += [
     "reports",
     "api",
     "live",
+    "pytest_plugin",
     "cli/tables",
     "cli/process",
     "cli/terminal",

@@ -1,22 +1,20 @@
-"""Diagnosis: hold records against their rig."""
+"""Diagnosis and fit: hold records against their rig."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike, fspath
+from os import PathLike
 
-from coupled.api.records import read_record
-from coupled.api.rigs import load_rig
+from coupled.api.records import Given, named_records
+from coupled.api.rigs import rig_given
 from coupled.arguments import public
-from coupled.errors import InputError
 from coupled.gap.diagnose import Diagnosis
 from coupled.gap.diagnose import diagnose as diagnose_records
+from coupled.gap.nominal import fit_nominal
+from coupled.gap.nominalfit import NominalFit
 from coupled.gap.trimmed import rig_of_manifests
 from coupled.record.channels import ControlName
-from coupled.record.record import DataFrame, Record
 from coupled.rig.rig import Rig
-
-Given = Record | DataFrame | str | PathLike[str]
 
 
 @public
@@ -49,38 +47,36 @@ def diagnose(
     >>> found = coupled.diagnose(rig, flight.record)
     >>> found.verdict, found.effects[0].name, round(found.effects[0].value, 5)
     ('effect', 'bend', 0.0004)
-    >>> round(found.improved.controls["column"].loader.bend, 5)
+    >>> round(found.improved["controls.column.loader.bend_m_per_N"], 5)
     0.0004
     """
     named = named_records(records)
-    if rig is None:
-        nominal = rig_of_manifests(named)
-    else:
-        nominal = rig if isinstance(rig, Rig) else load_rig(rig)
+    nominal = rig_of_manifests(named) if rig is None else rig_given(rig)
     well = None if healthy is None else named_records(healthy)
     return diagnose_records(nominal, named, control, progress, well)
 
 
-def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dict[str, Record]:
-    """Return records by the name that a fault is to say: the file's, or a number."""
-    if isinstance(records, (Record, DataFrame, str, PathLike)):
-        records = [records]
-    if not records:
-        raise InputError("coupled.diagnose", "records", "needs at least one")
-    if isinstance(records, Mapping):
-        return {name: _record(given) for name, given in records.items()}
-    named: dict[str, Record] = {}
-    for i, given in enumerate(records, 1):
-        numbered = "record" if len(records) == 1 else f"record {i}"
-        name = fspath(given) if isinstance(given, (str, PathLike)) else numbered
-        if name in named:
-            raise InputError(name, "", "is given twice")
-        named[name] = _record(given)
-    return named
+@public
+def fit(
+    rig: Rig | str | PathLike[str],
+    records: Given | Sequence[Given] | Mapping[str, Given],
+    free: Sequence[str] = (),
+    control: ControlName = "column",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> NominalFit:
+    """Fit the numbers of a rig to records of the healthy machine, and say what is undetermined.
 
+    `rig` is where the fit begins, `records` as `diagnose` takes them. `free` are keys of the
+    control, as `loader.mass_kg`; without any, those that the records judge. `found.rig` is the
+    fitted rig, whose `tolerance` holds half of each 95 % interval; `found.to_polars()` has the
+    numbers. Raises InputError where records and rig cannot be held against each other.
 
-def _record(given: Given) -> Record:
-    """Return a record given as such, as a DataFrame, or as a file."""
-    if isinstance(given, Record):
-        return given
-    return Record.from_frame(given) if isinstance(given, DataFrame) else read_record(given)
+    >>> import coupled
+    >>> heavy = coupled.load_rig("t37").changed({"controls.column.loader.mass_kg": 7.0})
+    >>> sweep = coupled.FrequencySweep(force_N=40, start_s=0.5, duration_s=8)
+    >>> flight = coupled.fly(heavy, column=sweep, duration_s=10)
+    >>> found = coupled.fit("t37", flight.record, ["loader.mass_kg"])
+    >>> round(found.rig["controls.column.loader.mass_kg"], 2)
+    7.0
+    """
+    return fit_nominal(rig_given(rig), named_records(records), free, control, progress)

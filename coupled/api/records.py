@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from os import PathLike
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
 from pathlib import Path
 
 from coupled.arguments import public
@@ -13,6 +13,8 @@ from coupled.record.importing import convert
 from coupled.record.importing.account import ImportAccount
 from coupled.record.record import DataFrame, Record
 from coupled.rig.rig import Rig
+
+Given = Record | DataFrame | str | PathLike[str]
 
 
 @public
@@ -89,3 +91,28 @@ def import_log(
         raise InputError("import_log", "log", "is empty; give a log's path, or several")
     map_file = None if log_map is None else Path(log_map)
     return convert.import_log([Path(each) for each in logs], map_file, rig)
+
+
+def named_records(records: Given | Sequence[Given] | Mapping[str, Given]) -> dict[str, Record]:
+    """Return records by the name that a fault is to say: the file's, or a number."""
+    if isinstance(records, (Record, DataFrame, str, PathLike)):
+        records = [records]
+    if not records:
+        raise InputError("records", "", "needs at least one")
+    if isinstance(records, Mapping):
+        return {name: _record(given) for name, given in records.items()}
+    named: dict[str, Record] = {}
+    for i, given in enumerate(records, 1):
+        numbered = "record" if len(records) == 1 else f"record {i}"
+        name = fspath(given) if isinstance(given, (str, PathLike)) else numbered
+        if name in named:
+            raise InputError(name, "", "is given twice")
+        named[name] = _record(given)
+    return named
+
+
+def _record(given: Given) -> Record:
+    """Return a record given as such, as a DataFrame, or as a file."""
+    if isinstance(given, Record):
+        return given
+    return Record.from_frame(given) if isinstance(given, DataFrame) else read_record(given)

@@ -36,7 +36,8 @@ from coupled.errors import InputError, listed, nearest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.channels import ATTITUDE, RATE, ControlName, channel
-from coupled.record.record import Record, frame_of, pandas_frame
+from coupled.record.record import Record
+from coupled.results import TableResult, frame_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -50,7 +51,7 @@ AS_THE_RIG = "as the rig file says"  # configuration name of an unchanged rig
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(Sequence[Flight]):
+class Comparison(Sequence[Flight], TableResult):
     """Flights of one run's cases, each in several configurations; a sequence of `Flight`."""
 
     flights: tuple[Flight, ...]
@@ -113,10 +114,6 @@ class Comparison(Sequence[Flight]):
     def to_polars(self) -> pl.DataFrame:
         """Return the figures, a row for each flight, with units in the names, null for none."""
         return frame_of(self.as_dict())
-
-    def to_pandas(self) -> Any:
-        """Return the figures as a pandas DataFrame; raises InputError without pandas."""
-        return pandas_frame(self.to_polars())
 
 
 def compare(manoeuvres: Sequence[Manoeuvre], progress: Progress | None = None) -> Comparison:

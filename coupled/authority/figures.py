@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from coupled.authority.held import dry_friction
-from coupled.display import System, shown
+from coupled.display import System, percent, shown
 from coupled.errors import listed
 from coupled.record.channels import SURFACES, unit_of
 from coupled.rig.guesses import guess_note
@@ -250,7 +250,7 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     written = [f"{travel:.{digits}f} {unit}" for travel in travels]
     places = (written[0], written[-1])
     others = [
-        f"{each.configuration} {written[number]} and {100 * each.loss:.0f} %"
+        f"{each.configuration} {written[number]} and {percent(each.loss, 0)}"
         for number, each in enumerate(moved[1:], start=1)
         if goes_as_far(each, rigid) is alike
     ]
@@ -258,7 +258,7 @@ def further(case: Sequence[Flight], system: System = "si") -> str:
     more = f" Likewise {listed(others)}." if others else ""
     return (
         f"The pilot holds a force: {bent.configuration}, the hand moves {places[0]} for it instead"
-        f" of {places[1]}{where}, since the structure bends; {surface} {100 * bent.loss:.0f} % of"
+        f" of {places[1]}{where}, since the structure bends; {surface} {percent(bent.loss, 0)} of"
         f" what the hand asks for is lost.{more}"
     )
 

@@ -20,10 +20,10 @@ from coupled.authority.outcome import Flight
 from coupled.errors import InputError
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import Step
-from coupled.models.survey import known_models, speed_range
 from coupled.record.channels import RATE, ControlName
 from coupled.rig.equations import specified_force
 from coupled.rig.rig import Rig
+from coupled.surveying.survey import known_models, speed_range
 from coupled.units import DEGREE_rad, KNOT_m_per_s
 
 _DURATION_s, _START_s, _HELD_s = 6.0, 1.0, 3.0

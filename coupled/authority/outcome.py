@@ -6,8 +6,10 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from coupled.display import percent
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.record.record import Record
+from coupled.results import Result
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Result):
     """One flight: its manoeuvre, its record, and the figures of its outcome.
 
     `configuration` is one of the manoeuvre's, or the name of an unchanged rig.
@@ -59,5 +61,5 @@ class Flight:
     def __repr__(self) -> str:
         ended = f", ended early: {self.ended_early}" if self.ended_early else ""
         loss, seconds = self.outcome.loss, self.manoeuvre.duration_s
-        lost = f", {100.0 * loss:.1f} % authority lost" if math.isfinite(loss) else ""
+        lost = f", {percent(loss)} authority lost" if math.isfinite(loss) else ""
         return f"Flight({self.manoeuvre.label}, {self.configuration}: {seconds:g} s{lost}{ended})"

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from coupled.arguments import public
 from coupled.calibration.accuracy import (
     DEFLECTION_WITHIN,
     FELT_WITHIN,
@@ -35,6 +36,7 @@ _ROUNDING = 1e-15  # relative; a smaller error is rounding
 _BEYOND = 3.0  # half widths of a 95 % interval, beyond which the hardware differs
 
 
+@public
 def with_calibration(
     rig: Rig,
     control: ControlName,
@@ -48,6 +50,13 @@ def with_calibration(
     found, too: for readings of a real loader, whose rig file is a model. A scale that the file does
     not state becomes that found in any case. Raises InputError if the values give an impossible
     rig.
+
+    >>> import coupled
+    >>> rig = coupled.load_rig("report-column")
+    >>> found = coupled.calibrate(coupled.bench(rig, gradients=3, deflections=3), rig)
+    >>> calibrated = coupled.with_calibration(rig, "column", found)
+    >>> calibrated["controls.column.compensation.bend_m_per_N"] == found.line.bend.value
+    True
     """
     data, d = rig.controls[control], unit_of(control)
     place, sensing = f"controls.{control}", data.sensing

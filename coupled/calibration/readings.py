@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.results import TableResult, frame_of
+
+if TYPE_CHECKING:
+    import polars as pl
+
 Floats = NDArray[np.float64]
+COLUMNS = ("deflection", "force_N", "v1_V", "v3_V")
 Signal = Literal["V", "counts"]
 _WHOLE = ("label", "other_names", "gauge", "signal")  # fields that are no column of numbers
 
 
 @dataclass(frozen=True)
-class Readings:
+class Readings(TableResult):
     """Readings in SI, a value for each row: `deflection` in d, `force` in N, `v1` and `v3` in V.
 
     `row` is the row in the file, `label` the gradient set. `deflection` and `force` are means if
@@ -46,6 +52,23 @@ class Readings:
     others: Floats
     gauge: bool = True
     signal: Signal = "V"
+
+    def __repr__(self) -> str:
+        sets = len(set(self.label))
+        nulls = len(self.null_row)
+        return f"Readings({len(self.row)} readings in {sets} gradient sets, {nulls} nulls)"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a reading: deflection in m, or rad on a wheel, force in N, voltages in V."""
+        columns = (self.deflection, self.force, self.v1, self.v3)
+        return frame_of(
+            [
+                dict(zip(("row", "gradient_set", *COLUMNS), (row, label, *numbers), strict=True))
+                for row, label, *numbers in zip(
+                    self.row.tolist(), self.label, *(c.tolist() for c in columns), strict=True
+                )
+            ]
+        )
 
     @property
     def deflection_looks(self) -> Floats:

@@ -16,12 +16,13 @@ from coupled.calibration.fit import LineFit
 from coupled.calibration.readings import Readings
 from coupled.calibration.suspects import Suspect
 from coupled.record.channels import unit_of
+from coupled.results import Result
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class CalibrationResult:
+class CalibrationResult(Result):
     """The result of a calibration.
 
     `fit` has errors in all variables, `plain` is ordinary least squares, `printed` (a, b) of the
@@ -45,6 +46,12 @@ class CalibrationResult:
     level: Floats | None
     angle_rad: Floats | None
     changed: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        d, bend = unit_of(self.control), self.line.bend
+        ends = f"{bend.low:.4g} to {bend.high:.4g}"
+        found = f"K = {bend.value:.4g} {d}/N ({ends})"
+        return f"CalibrationResult({self.control}: {found}, of {self.count} readings)"
 
     @property
     def line(self) -> LineFit:

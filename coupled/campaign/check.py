@@ -5,38 +5,71 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-import polars as pl
+from typing import TYPE_CHECKING, NamedTuple
 
 from coupled.arguments import public
 from coupled.authority.compare import Flight, compare
 from coupled.campaign.latency import fly_undelayed
-from coupled.campaign.verdict import Verdict, judge_expectation
+from coupled.campaign.verdict import Verdict, in_full, judge_expectation
 from coupled.errors import InputError
 from coupled.flight.expectation import LATENCIES, Expect, UnjudgedError
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.runfile import read_run
+from coupled.results import TableResult, frame_of
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Progress = Callable[[str, int, int], None]
 Flown = dict[tuple[str, str], Flight]  # by case and configuration
 
 
+class Asked(NamedTuple):
+    """One expectation of one flight."""
+
+    expect: Expect
+    scenario: Manoeuvre
+    configuration: Configuration
+
+
 @dataclass(frozen=True)
-class CheckResult:
-    """The verdicts on runs, in the order of their expectations."""
+class CheckResult(TableResult):
+    """The verdicts on runs, in the order of their expectations; true if all hold.
+
+    Its text names what fails: measured, expected, margin, time and why. `assert coupled.check(run)`
+    shows that text where an expectation fails.
+    """
 
     verdicts: tuple[Verdict, ...]
+    judged: int | None = None  # how many were judged, where the verdicts are only those that failed
+
+    @property
+    def total(self) -> int:
+        """How many expectations were judged."""
+        return len(self.verdicts) if self.judged is None else self.judged
 
     @property
     def passed(self) -> bool:
         """Whether all expectations are met."""
         return all(verdict.passed for verdict in self.verdicts)
 
+    def __bool__(self) -> bool:
+        return self.passed
+
+    def __repr__(self) -> str:
+        failed = [verdict for verdict in self.verdicts if not verdict.passed]
+        head = f"{self.total - len(failed)} of {self.total} expectations hold"
+        return "\n".join([head, *(in_full(verdict) for verdict in failed)])
+
+    def require(self) -> CheckResult:
+        """Return this result; raise AssertionError with its text where an expectation fails."""
+        if not self.passed:
+            raise AssertionError(repr(self))
+        return self
+
     def to_polars(self) -> pl.DataFrame:
         """Return a row for each verdict; values and bounds are in the unit of their quantity."""
-        return pl.DataFrame(
-            [verdict.as_dict() for verdict in self.verdicts], infer_schema_length=None
-        )
+        return frame_of([verdict.as_dict() for verdict in self.verdicts])
 
 
 @public
@@ -83,8 +116,13 @@ def check_run(scenarios: Sequence[Manoeuvre], progress: Progress | None = None) 
     flights = compare([_needed(scenario) for scenario in scenarios], progress)
     flown: Flown = {(f.outcome.case, f.configuration): f for f in flights}
     undelayed = {where: fly_undelayed(f.manoeuvre) for where, f in flown.items() if _timed(f)}
+    return [_verdict(*asked, flown, undelayed) for asked in asked_of(scenarios)]
+
+
+def asked_of(scenarios: Sequence[Manoeuvre]) -> list[Asked]:
+    """Return what is expected of a run, an item a verdict, in the order of the verdicts."""
     return [
-        _verdict(expect, scenario, configuration, flown, undelayed)
+        Asked(expect, scenario, configuration)
         for scenario in scenarios
         for expect in scenario.expect
         for configuration in scenario.configurations
@@ -127,4 +165,5 @@ def _verdict(
         return judge_expectation(expect, flight, other)
     except UnjudgedError as why:
         where = (scenario.name, scenario.label, configuration)
-        return Verdict(*where, expect.words, None, *expect.bounds, str(why), expect.quantity)
+        unjudged = Verdict(*where, expect.words, None, *expect.bounds, str(why), expect.quantity)
+        return replace(unjudged, why=expect.why or "")

@@ -44,12 +44,16 @@ _LONG_TERM: Standard = "25.143(d) long-term"
 
 @dataclass(frozen=True)
 class StandardFigure:
-    """A flight's figure and its bounds, in N, rad/s or s; `note` identifies one of several."""
+    """A flight's figure and its bounds, in N, rad/s or s; `note` identifies one of several.
+
+    `at_s` is the time of the figure in the flight, None if it has none.
+    """
 
     value: float
     least: float | None
     most: float | None
     note: str = ""
+    at_s: float | None = None
 
 
 def judge_standard(
@@ -87,10 +91,11 @@ def _pilot_force(standard: Standard, control: ControlName, flight: Flight) -> St
     if standard == _LONG_TERM:
         return held
     most = _SHORT_TERM[standard][control]
-    greatest = float(np.max(np.abs(force)))
+    at = int(np.argmax(np.abs(force)))
+    greatest = float(np.abs(force)[at])
     if sustained / LONG_TERM_N[control] > greatest / most:
         return held
-    return StandardFigure(greatest, None, most)
+    return StandardFigure(greatest, None, most, at_s=float(time_s[at]))
 
 
 def _rate(standard: Standard, flight: Flight, rigid: Flight) -> StandardFigure:

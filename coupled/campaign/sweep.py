@@ -22,6 +22,7 @@ from coupled.errors import InputError
 from coupled.parallel import cores, executor
 from coupled.record import csvfile
 from coupled.resources import find, shipped_sweeps
+from coupled.results import TableResult
 from coupled.rig.guesses import guess_note
 
 Progress = Callable[[str, int, int], None]
@@ -29,7 +30,7 @@ TABLE = "table.parquet"
 
 
 @dataclass(frozen=True)
-class SweepResult:
+class SweepResult(TableResult):
     """The flights of a sweep, a row each, with their analysis.
 
     `table` has the varied keys, the configuration, the figures, and why a flight ended early;
@@ -42,6 +43,12 @@ class SweepResult:
     indices: tuple[SobolIndex, ...]
     limits: tuple[SurvivalLimit, ...]
     found: int
+
+    def __repr__(self) -> str:
+        ended = int((self.table["ended_early"] != "").sum())
+        over = ", ".join(self.plan.keys)
+        flights = f"{len(self.table)} flights over {over}, {ended} ended early"
+        return f"SweepResult({self.plan.sweep.name}: {flights})"
 
     def to_polars(self) -> pl.DataFrame:
         """Return the table, a row for each flight."""

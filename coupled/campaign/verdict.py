@@ -27,7 +27,8 @@ class Verdict:
     """The verdict on one expectation of one flight; `value` and bounds in one unit.
 
     `problem` is the reason why there is no figure. `quantity` is a name that ends in the unit of
-    value and bounds, such as `force_N`.
+    value and bounds, such as `force_N`. `at_s` is the time of the figure in the flight, None if it
+    has none; `why` is the run's own reason for its bounds.
     """
 
     run: str
@@ -39,6 +40,8 @@ class Verdict:
     most: float | None
     problem: str = ""
     quantity: str = ""
+    at_s: float | None = None
+    why: str = ""
 
     @property
     def margin(self) -> float | None:
@@ -91,6 +94,21 @@ def finding(verdict: Verdict, system: System = "si") -> str:
     return f"{found}{bounds}, margin {margin}"
 
 
+def in_full(verdict: Verdict, system: System = "si") -> str:
+    """Return a verdict for people, in lines: measured, expected, margin, time, and why."""
+    found, margin = figures(verdict, system)
+    head = f"{verdict.run}, {verdict.case} [{verdict.configuration}]: {verdict.what}"
+    lines = [f"measured  {verdict.problem if verdict.value is None else found}"]
+    lines.append(f"expected  {wanted(verdict, system) or '–'}")
+    if verdict.value is not None:
+        lines.append(f"margin    {margin}")
+    if verdict.at_s is not None:
+        lines.append(f"time      {verdict.at_s:.4g} s")
+    if verdict.why:
+        lines.append(f"why       {verdict.why}")
+    return "\n  ".join([head, *lines])
+
+
 def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | None) -> Verdict:
     """Return the verdict on a flight, compared with `other` if the expectation requires it."""
     if flight is None or (expect.reference is not None and other is None):
@@ -102,7 +120,10 @@ def judge_expectation(expect: Expect, flight: Flight | None, other: Flight | Non
     what = expect.words + figure.note
     bounds = (figure.least, figure.most)
     where = (run.name, run.label, flight.configuration, what)
-    return Verdict(*where, figure.value, *bounds, quantity=expect.quantity)
+    why = expect.why or ""
+    return Verdict(
+        *where, figure.value, *bounds, quantity=expect.quantity, at_s=figure.at_s, why=why
+    )
 
 
 def _figure(expect: Expect, flight: Flight, other: Flight | None) -> StandardFigure:
@@ -112,15 +133,16 @@ def _figure(expect: Expect, flight: Flight, other: Flight | None) -> StandardFig
                 raise UnjudgedError(f"the flight ended early: {flown.outcome.ended_early}")
     if expect.standard is not None:
         return judge_standard(expect.standard, expect.control, flight, other)
+    at_s: float | None = None
     if expect.measure is not None:
         value = _measured(expect.measure, flight)
         if other is not None:
             value -= _measured(expect.measure, other)
     elif expect.reaches is not None:
-        value = _time_reached(expect, flight)
+        value = at_s = _time_reached(expect, flight)
     else:
-        value = _taken(expect, flight, other)
-    return StandardFigure(value, *expect.bounds)
+        value, at_s = _taken(expect, flight, other)
+    return StandardFigure(value, *expect.bounds, at_s=at_s)
 
 
 def _measured(name: str, flight: Flight) -> float:
@@ -144,8 +166,11 @@ def _refuse_early(flight: Flight, end_s: float) -> None:
         raise UnjudgedError(f"the flight ended early: {flight.outcome.ended_early}")
 
 
-def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
-    """Return the figure of a channel; of all rows, the one closest to its bound."""
+def _taken(expect: Expect, flight: Flight, other: Flight | None) -> tuple[float, float | None]:
+    """Return the figure of a channel and its time; of all rows, the one closest to its bound.
+
+    A mean has no time.
+    """
     last_s = flight.manoeuvre.duration_s if expect.end is None else expect.end
     end_s = last_s if expect.at is None else expect.at
     flights = [flight] if other is None else [flight, other]
@@ -153,19 +178,22 @@ def _taken(expect: Expect, flight: Flight, other: Flight | None) -> float:
         _refuse_early(flown, end_s)
     if expect.at is not None:
         windows = [_window(expect, flown, math.inf) for flown in flights]
-        figures = [np.interp([expect.at], *window) for window in windows]
+        times = np.array([expect.at])
+        figures = [np.interp(times, *window) for window in windows]
     else:
-        figures = [_window(expect, flown, end_s)[1] for flown in flights]
+        windows = [_window(expect, flown, end_s) for flown in flights]
+        times, figures = windows[0][0], [window[1] for window in windows]
     values = figures[0] - figures[1] if len(figures) > 1 else figures[0]
-    lowest, greatest = float(np.min(values)), float(np.max(values))
-    figure = {
-        "mean": float(np.mean(values)),
-        "lowest": lowest,
-        "greatest": greatest,
-        "last": float(values[-1]),
-        "every": min((lowest, greatest), key=lambda value: _margin(value, expect.bounds)),
-    }
-    return figure[expect.take]
+    if expect.take == "mean":
+        return float(np.mean(values)), None
+    ends = (int(np.argmin(values)), int(np.argmax(values)))
+    row = {
+        "lowest": ends[0],
+        "greatest": ends[1],
+        "last": -1,
+        "every": min(ends, key=lambda one: _margin(float(values[one]), expect.bounds)),
+    }[expect.take]
+    return float(values[row]), float(times[row])
 
 
 def _time_reached(expect: Expect, flight: Flight) -> float:

@@ -17,7 +17,6 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from coupled import __version__
 from coupled.cli.process import (
     INTERRUPTED,
     PIPE_CLOSED,
@@ -33,6 +32,7 @@ from coupled.cli.terminal import ReaderGoneError, err, out, say_error
 from coupled.display import System
 from coupled.errors import InputError, shown
 from coupled.timing import parts
+from coupled.version import __version__
 
 app = typer.Typer(
     add_completion=True,

@@ -17,7 +17,7 @@ from coupled.errors import InputError, nearest
 from coupled.resources import find, shipped_rigs
 
 if TYPE_CHECKING:
-    from coupled.export.write import Export
+    from coupled.exporting.write import Export
     from coupled.flight.manoeuvre import Manoeuvre
     from coupled.rig.rig import Rig
 
@@ -46,8 +46,8 @@ def export(
     json_file: JsonOption = "",
 ) -> None:
     """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies."""
-    from coupled.export.folder import check_folder, exportable, write_export
-    from coupled.export.write import export as make
+    from coupled.exporting.folder import check_folder, exportable, write_export
+    from coupled.exporting.write import export as make
     from coupled.rig.rigfile import read_rig
 
     file = find(rig, shipped_rigs(), "rig")
@@ -65,7 +65,7 @@ def export(
 
 def _asked(rig: Rig, name: str, runs: list[str], case: str) -> tuple[Rig, list[Manoeuvre]]:
     """Return the rig to export, and the cases whose scripts are asked for."""
-    from coupled.export.folder import runs_of
+    from coupled.exporting.folder import runs_of
     from coupled.flight.runfile import read_run
 
     named = runs or runs_of(name)

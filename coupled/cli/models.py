@@ -22,9 +22,9 @@ from coupled.errors import InputError, nearest, shown
 from coupled.record.channels import TIME, ControlName, control_named
 
 if TYPE_CHECKING:
-    from coupled.models.fromlog import LogNumbers
-    from coupled.models.survey import Surveyed
     from coupled.record.record import Record
+    from coupled.surveying.fromlog import LogNumbers
+    from coupled.surveying.survey import Surveyed
 
 
 @app.command(epilog="[dim]Examples: coupled models · coupled models T37 DHC6 --json -[/]")
@@ -41,8 +41,8 @@ def models(
     json_file: JsonOption = "",
 ) -> None:
     """List JSBSim's models: where each trims or why not, how its controls move, its rigs."""
-    from coupled.models.survey import known_models, survey
     from coupled.parallel import as_done, cores, executor
+    from coupled.surveying.survey import known_models, survey
 
     known = known_models()
     for name in names or ():
@@ -149,10 +149,10 @@ def _bench(
     units: System,
 ) -> None:
     """Write a rig without an aircraft; at a terminal, ask for what is not given."""
-    from coupled.models.benchrig import answer, bench_rig, questions, split_answers, yes
-    from coupled.models.fromlog import numbers_from_log
     from coupled.rig.rigfile import rig_from_table
     from coupled.schema import loads_toml
+    from coupled.surveying.benchrig import answer, bench_rig, questions, split_answers, yes
+    from coupled.surveying.fromlog import numbers_from_log
 
     log, map_file = logged
     check_new(path, ".toml")
@@ -198,7 +198,7 @@ def _asked(
     control: ControlName, known: dict[str, float], servo: bool, units: System
 ) -> dict[str, float]:
     """Return the numbers known and those that a person answers; an empty answer is a guess."""
-    from coupled.models.benchrig import answer, guesses, questions
+    from coupled.surveying.benchrig import answer, guesses, questions
 
     found = dict(known)
     for name, question in questions(control).items():
@@ -221,7 +221,7 @@ def _asked(
 
 def _print_found(found: LogNumbers, control: ControlName, units: System) -> None:
     """Print what a log gives of a control, and how sure it is."""
-    from coupled.models.benchrig import found_in, questions
+    from coupled.surveying.benchrig import found_in, questions
 
     numbers, sure = found_in(found)
     table = Table("of the log", "value", "", box=None, pad_edge=False)
@@ -237,8 +237,8 @@ def _print_found(found: LogNumbers, control: ControlName, units: System) -> None
 
 def _for_model(model: str, file: Path | None) -> None:
     """Write a first rig for a JSBSim model: where it trims, found; its loader, guessed."""
-    from coupled.models.draft import draft
-    from coupled.models.survey import survey
+    from coupled.surveying.draft import draft
+    from coupled.surveying.survey import survey
 
     name, home, own = _model(model)
     path = file or Path(f"{name}.toml")
@@ -257,7 +257,7 @@ def _for_model(model: str, file: Path | None) -> None:
 
 def _model(word: str) -> tuple[str, Path, bool]:
     """Return a model's name, the folder that its own lies in, and whether it is unknown."""
-    from coupled.models.survey import known_models
+    from coupled.surveying.survey import known_models
 
     known = known_models()
     if word in known:

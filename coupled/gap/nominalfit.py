@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupled.record.channels import ControlName
+from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig
+
+if TYPE_CHECKING:
+    import polars as pl
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
-class NominalFit:
+class NominalFit(TableResult):
     """A nominal rig fitted to records: its numbers, and what the records do not tell of them."""
 
     control: ControlName
@@ -94,6 +98,16 @@ class NominalFit:
     alike: tuple[Alike, ...]
     channels: tuple[ChannelFit, ...]
     doubts: tuple[str, ...] = ()  # what was found and cannot be a machine's, a sentence each
+
+    def __repr__(self) -> str:
+        doubts = f", {len(self.doubts)} doubts" if self.doubts else ""
+        known = len(self.numbers) - len(self.unknown)
+        of = f"{known} of {len(self.numbers)} numbers determined"
+        return f"NominalFit({self.rig.name}, {self.control}: {of}{doubts})"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a number: its key, as filed and as found, and its 95 % interval."""
+        return frame_of([{"key": one.key} | one.as_dict() for one in self.numbers])
 
     @property
     def unknown(self) -> tuple[str, ...]:

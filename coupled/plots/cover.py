@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from coupled import __version__
 from coupled.calibration.documentation import Documentation
 from coupled.calibration.qualification import FeelTest, Issue, Kind, cover_rows, feel_tests, written
 from coupled.plots.histories import plain
 from coupled.record.channels import ControlName
+from coupled.version import __version__
 
 PAGE = (8.27, 11.0)  # inches: within A4 and Letter
 _LEFT, _VALUES, _RIGHT = 0.1, 0.36, 0.92

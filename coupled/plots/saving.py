@@ -12,6 +12,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.category import StrCategoryLocator
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, fontManager, get_font
 from matplotlib.text import Text
@@ -115,7 +116,12 @@ def save(figure: Figure, path: Path, note: str = "") -> None:
 
 
 def svg_text(figure: Figure) -> str:
-    """Return a figure as SVG, its letters as outlines: it looks alike wherever it is shown."""
+    """Return a figure as SVG, its letters as outlines: it looks alike wherever it is shown.
+
+    A shaded mesh is an image within it: as outlines it would be some 10 MB.
+    """
+    for mesh in figure.findobj(QuadMesh):
+        mesh.set_rasterized(True)
     FigureCanvasSVG(figure)
     make_drawable(figure)
     made = StringIO()

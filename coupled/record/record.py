@@ -6,9 +6,8 @@ hashes of the inputs, the seed, and events.
 
 from __future__ import annotations
 
-import importlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -17,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.arguments import public
-from coupled.errors import InputError, nearest, shown, shown_value
+from coupled.errors import InputError, MissingKeyError, nearest, shown, shown_value
 from coupled.files import MOST_TEXT_bytes, check_format, json_text, read_bytes, write_text
 from coupled.outputs import Outputs
 from coupled.record.channels import TIME
 from coupled.record.csvfile import read_columns, write_table
+from coupled.results import TableResult
 
 if TYPE_CHECKING:
     import polars as pl
@@ -45,12 +45,6 @@ class DataFrame(Protocol):
         """Return the columns by name."""
 
 
-class ChannelError(InputError, KeyError):
-    """A channel that a record does not have."""
-
-    __str__ = InputError.__str__
-
-
 @dataclass(frozen=True)
 class EndedEarly:
     """Why, and after how long, a flight ended before its time."""
@@ -64,7 +58,7 @@ class EndedEarly:
 
 @public
 @dataclass(frozen=True)
-class Record:
+class Record(TableResult):
     """Channels over time: `data` has shape (rows, channels), SI, one row a frame.
 
     `record["column_force_N"]` is a channel, shape (rows,); an unknown name raises an InputError,
@@ -113,10 +107,10 @@ class Record:
     def __getitem__(self, channel: str) -> Floats:
         if not isinstance(channel, str):
             problem = f"is {shown_value(channel)}; give the name of a channel"
-            raise ChannelError("record", "channel", problem)
+            raise MissingKeyError("record", "channel", problem)
         if channel not in self.channels:
             problem = f"no channel {shown(channel)}; {nearest(channel, self.channels)}"
-            raise ChannelError("record", "", problem)
+            raise MissingKeyError("record", "", problem)
         return self.data[:, self.channels.index(channel)]
 
     def __contains__(self, channel: str) -> bool:
@@ -165,10 +159,6 @@ class Record:
 
         return pl.DataFrame(self.data, schema=list(self.channels), orient="row")
 
-    def to_pandas(self) -> Any:
-        """Return the rows as a pandas DataFrame; raises InputError without pandas."""
-        return pandas_frame(self.to_polars())
-
     def plot(self, *channels: str, title: str = "") -> Figure:
         """Return a matplotlib Figure of the channels over time, one below the other.
 
@@ -179,23 +169,6 @@ class Record:
         from coupled.plots.histories import draw_channels, draw_record
 
         return draw_channels(self, channels, title) if channels else draw_record(self, title)
-
-
-def frame_of(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
-    """Return rows of figures as a polars DataFrame, null for None."""
-    import polars as pl
-
-    return pl.DataFrame(rows, infer_schema_length=None)
-
-
-def pandas_frame(frame: pl.DataFrame) -> Any:
-    """Return a polars DataFrame as a pandas one; raises InputError without pandas."""
-    try:
-        pandas: Any = importlib.import_module("pandas")
-    except ImportError:
-        problem = "is not installed: pip install pandas, or take to_polars()"
-        raise InputError("pandas", "", problem) from None
-    return pandas.DataFrame({name: frame[name].to_list() for name in frame.columns})
 
 
 def manifest_path(path: Path) -> Path:

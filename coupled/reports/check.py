@@ -19,16 +19,22 @@ def check_report(checked: CheckResult, made: Made) -> Report:
     groups = groupby(checked.verdicts, key=lambda v: v.run)
     sections = [Section(run, (_table(list(group)),)) for run, group in groups]
     settings = (("runs", ", ".join(runs)),)
-    return Report(
-        "Check", ", ".join(runs), _verdict(checked.verdicts), tuple(sections), settings, made
-    )
+    title = ", ".join(runs) or "Expectations"
+    return Report("Check", title, _verdict(checked), tuple(sections), settings, made)
 
 
-def _verdict(verdicts: Sequence[Judged]) -> Verdict:
-    failed = [verdict for verdict in verdicts if not verdict.passed]
-    said = f"{len(verdicts) - len(failed)} of {len(verdicts)} expectations hold."
-    remarks = [f"{v.run}, {v.case}: {v.what} [{v.configuration}]: {finding(v)}" for v in failed]
+def _verdict(checked: CheckResult) -> Verdict:
+    failed = [verdict for verdict in checked.verdicts if not verdict.passed]
+    said = f"{checked.total - len(failed)} of {checked.total} expectations hold."
+    remarks = [_remark(verdict) for verdict in failed]
     return Verdict(said, "bad" if failed else "good", tuple(remarks))
+
+
+def _remark(verdict: Judged) -> str:
+    where = f"{verdict.run}, {verdict.case}: {verdict.what} [{verdict.configuration}]"
+    at = "" if verdict.at_s is None else f", at {verdict.at_s:.4g} s"
+    why = f". Why: {verdict.why}" if verdict.why else ""
+    return f"{where}: {finding(verdict)}{at}{why}"
 
 
 def _table(verdicts: Sequence[Judged]) -> Table:

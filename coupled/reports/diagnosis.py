@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from coupled.display import percent
 from coupled.gap.findings.budget import share_of
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.power import EffectPower
@@ -127,7 +128,7 @@ def _in_flight(whole: Diagnosis) -> tuple[str, Table] | None:
         return None
     rows = []
     for one in whole.in_flight:
-        share = f"{100 * one.share:.0f} %"
+        share = percent(one.share, 0)
         for i, (name, value) in enumerate(one.changes.items()):
             factor, unit = unit_shown(name)
             own = f"{100 * one.of_motion[name]:.3g} %"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from coupled import __version__
 from coupled.calibration.checks import ControlCheck
 from coupled.calibration.documentation import Documentation
 from coupled.calibration.qualification import FeelTest, Issue, cover_rows, feel_tests, written
@@ -28,6 +27,7 @@ from coupled.reports.page import (
     Verdict,
     passed,
 )
+from coupled.version import __version__
 
 _SIGNED = ("Prepared", "Checked", "Accepted")
 _RESULTS = ("", "rig", "reference", "± allowed", "unit", "margin", "result")
@@ -52,6 +52,14 @@ def force_report(
     verdict = _verdict([test for _, test in tests])
     verdict = replace(verdict, remarks=(*verdict.remarks, *why))
     return Report("Force documentation", rig.name, verdict, tuple(sections), settings, made, cover)
+
+
+def force_summary(documents: Sequence[Documentation], issue: Issue, made: Made) -> Report:
+    """Return the table of checks alone."""
+    tests = [test for found in documents for test in feel_tests(found, issue.reference)]
+    rig = documents[0].rig
+    sections = (Section("Checks", (_checks(tests),)),)
+    return Report("Force documentation", rig.name, _verdict(tests), sections, (), made)
 
 
 def _verdict(tests: Sequence[FeelTest]) -> Verdict:

@@ -6,14 +6,15 @@ head forbids it. The same results give the same bytes. It prints on A4 and on Le
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import ClassVar, Literal
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from coupled.errors import printable
 from coupled.reports.inline import inline_svg
@@ -133,16 +134,30 @@ class Report:
 def render(report: Report) -> str:
     """Return a report as one HTML file."""
     sections = [(section, list(_blocks(report, section))) for section in report.sections]
-    return _template().render(report=report, sections=sections) + "\n"
+    return _templates().get_template("report.html").render(report=report, sections=sections) + "\n"
 
 
-def _blocks(report: Report, section: Section) -> Iterator[tuple[Block, int, Markup]]:
+def render_part(report: Report, most: int) -> str:
+    """Return a report's verdict and its first `most` sections as a part of another page.
+
+    Its styles act within it only. Its figures' ids are of their content: several parts on one page
+    do not share them.
+    """
+    text = "".join(b.svg for s in report.sections for b in s.blocks if isinstance(b, Drawing))
+    prefix = f"c{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    sections = [(s, list(_blocks(report, s, prefix))) for s in report.sections[:most]]
+    return _templates().get_template("part.html").render(report=report, sections=sections) + "\n"
+
+
+def _blocks(
+    report: Report, section: Section, prefix: str = ""
+) -> Iterator[tuple[Block, int, Markup]]:
     """Yield a section's blocks; with each figure its number in the report, and its SVG."""
     drawings = [b for s in report.sections for b in s.blocks if isinstance(b, Drawing)]
     for block in section.blocks:
         if isinstance(block, Drawing):
             number = next(i for i, one in enumerate(drawings, 1) if one is block)
-            yield block, number, Markup(inline_svg(block.svg, f"f{number}-", block.caption))
+            yield block, number, Markup(inline_svg(block.svg, f"{prefix}f{number}-", block.caption))
         else:
             yield block, 0, Markup()
 
@@ -161,7 +176,7 @@ def _shown(value: object) -> object:
 
 
 @cache
-def _template() -> Template:
+def _templates() -> Environment:
     environment = Environment(
         loader=PackageLoader("coupled.reports", "templates"),
         autoescape=True,
@@ -170,5 +185,6 @@ def _template() -> Template:
         lstrip_blocks=True,
         finalize=_shown,
     )
-    environment.filters["typeset"] = typeset
-    return environment.get_template("report.html")
+    # Markup, so that `_shown` leaves its spaces that do not break.
+    environment.filters["typeset"] = lambda text: escape(typeset(printable(text)))
+    return environment

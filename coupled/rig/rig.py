@@ -10,28 +10,27 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
+from os import PathLike
+from pathlib import Path
 from typing import Any, ClassVar
 
-from pydantic import ValidationError
+from pydantic import PrivateAttr, ValidationError
 
 from coupled.arguments import public
-from coupled.errors import InputError, nearest
+from coupled.errors import InputError, MissingKeyError, nearest, shown_value
+from coupled.files import check_target, write_text
 from coupled.record.channels import (
     CONTROL_NAMES,
     SURFACES,
-    ControlName,
     noisy_channels,
     unit_of,
 )
+from coupled.results import Result
 from coupled.rig.guesses import check_guesses
-from coupled.rig.parameters import (
-    DELAY_SLOTS,
-    GAUGE_SLOTS,
-    MAX_ROWS,
-    Control,
-    Flight,
-    PlainName,
-)
+from coupled.rig.parameters import DELAY_SLOTS, GAUGE_SLOTS, MAX_ROWS, Control
+from coupled.rig.rigdata import RigData
+from coupled.rig.rigedit import updated
+from coupled.rig.rigwrite import rig_text
 from coupled.rig.structure import Structure, check_structure
 from coupled.schema import (
     Section,
@@ -41,41 +40,76 @@ from coupled.schema import (
     file_keys,
     grouped,
     known_keys,
-    quantity,
 )
 
 
 @public
-class Rig(Section):
+class Rig(RigData, Result):
     """A control-loading rig, and the aircraft that it is coupled to.
 
     Without `flight` it is a bench: q̄ is given, and there is no aircraft. `noise` has the standard
-    deviation of a channel's white noise by the channel's name. SI throughout; a field's key in a
-    file, and in `changed`, ends in its unit.
+    deviation of a channel's white noise by the channel's name. SI throughout.
+
+    A number has one name, its dotted key in a rig file, which ends in its unit: `rig[key]` reads
+    it, `changed` replaces it, `save` writes it.
 
     >>> import coupled
     >>> rig = coupled.load_rig("t37").changed({"controls.column.loader.play_m": 1e-3})
-    >>> rig.controls["column"].loader.play, list(rig.only("column").controls)
+    >>> rig["controls.column.loader.play_m"], list(rig.only("column").controls)
     (0.001, ['column'])
+    >>> rig
+    Rig(t37: column, wheel, pedals at 120 Hz; T37)
     >>> rig.changed({"controls.column.loader.mass_kg": -1.0})
     Traceback (most recent call last):
     coupled.errors.InputError: t37: controls.column.loader.mass_kg: input should be greater than 0…
     """
 
     _WANTED: ClassVar[str] = "a Rig (coupled.load_rig returns one)"
-    name: PlainName
-    frame_rate: float = quantity("Hz", ge=1, le=2000)
-    loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
-    controls: dict[ControlName, Control]
-    flight: Flight | None = None
-    noise: dict[str, float] = {}
-    structure: Structure = Structure()
+    _filed: tuple[Path, str] | None = PrivateAttr(None)  # the file that it came from, and its text
 
     def __init__(self, **values: Any) -> None:
         try:
             super().__init__(**values)
         except ValidationError as error:
             raise faults_of(error, type(self), "coupled.Rig") from None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rig):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in Rig.model_fields)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.frame_rate, self.loader_rate))
+
+    def __repr__(self) -> str:
+        aircraft = "no aircraft" if self.flight is None else self.flight.model
+        return f"Rig({self.name}: {', '.join(self.controls)} at {self.frame_rate:g} Hz; {aircraft})"
+
+    def __getitem__(self, key: str) -> Any:
+        """Return a value, or a whole section, by its dotted key in a rig file.
+
+        Raises InputError, which is a KeyError too, where the rig has no such key.
+        """
+        if not isinstance(key, str):
+            raise MissingKeyError(
+                self.name, "key", f"is {shown_value(key)}; give a key of a rig file"
+            )
+        found: Any = self
+        d, place = "m", ""
+        for part in key.split("."):
+            held: Mapping[str, Any] = found if isinstance(found, dict) else {}
+            if isinstance(found, Section):
+                held = {k: getattr(found, f) for k, f in file_keys(type(found), d).items()}
+            if part not in held:
+                raise MissingKeyError(self.name, key, _no_key(part, place, held))
+            d = unit_of(part) if place == "controls" else d
+            found, place = held[part], f"{place}.{part}" if place else part
+        return found
+
+    @property
+    def file(self) -> Path | None:
+        """The file that the rig came from, if any."""
+        return None if self._filed is None else self._filed[0]
 
     @property
     def substeps(self) -> int:
@@ -96,7 +130,31 @@ class Rig(Section):
         if controls:
             given = _changed_controls(self, controls)
             whole = changed(whole, {"controls": given}, self.name)
-        return checked(whole, self.name)
+        return of_file(checked(whole, self.name), self._filed)
+
+    def to_toml(self) -> str:
+        """Return the text of a rig file, with the comments of the file that the rig came from."""
+        return self._text(None)
+
+    def save(self, file: str | PathLike[str], remark: str = "") -> None:
+        """Write the rig as a rig file, with the comments of the file that it came from.
+
+        Read again, the file gives this rig. `remark` goes to its head. A file that is there is
+        replaced. Raises InputError where the name does not end in .toml, or it cannot be written.
+        """
+        path = Path(file)
+        if path.suffix.lower() != ".toml":
+            raise InputError(path, "", "a rig file ends in .toml")
+        check_target(path)
+        head = "".join(f"# {line}".rstrip() + "\n" for line in remark.splitlines())
+        write_text(path, head + self._text(path.parent))
+
+    def _text(self, folder: Path | None) -> str:
+        """Return the rig file's text, to lie in a folder."""
+        if self._filed is None:
+            return rig_text(self)
+        file, text = self._filed
+        return updated(text, self, file, folder)
 
     def only(self, control: str) -> Rig:
         """Return the rig with one control only, no aircraft, no noise and no common structure.
@@ -108,7 +166,19 @@ class Rig(Section):
             raise InputError(self.name, "controls", problem)
         kept = {name: data for name, data in self.controls.items() if name == control}
         alone = {"controls": kept, "flight": None, "noise": {}, "structure": Structure()}
-        return changed(self, alone, self.name)
+        return of_file(changed(self, alone, self.name), self._filed)
+
+
+def of_file(rig: Rig, filed: tuple[Path, str] | None) -> Rig:
+    """Return the rig with the file that it came from, and its text, whose comments `save` keeps."""
+    rig._filed = filed
+    return rig
+
+
+def _no_key(part: str, place: str, held: Mapping[str, Any]) -> str:
+    if not held and place:
+        return f"{place} has nothing within it"
+    return f"no {part!r}; {nearest(part, held)}"
 
 
 def _changed_controls(rig: Rig, changes: Mapping[str, Any]) -> dict[str, Control]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from coupled.record.channels import unit_of
-from coupled.rig.rig import Rig
-from coupled.schema import Section, file_keys
+from coupled.rig.rigdata import RigData
+from coupled.rig.rigwrite import rig_table, rig_text
+from coupled.schema import Section, file_keys, loads_toml
 
 
 def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") -> str:
@@ -29,7 +31,39 @@ def edited(text: str, changes: Mapping[tuple[str, ...], Any], remark: str = "") 
     return head + tomlkit.dumps(document)
 
 
-def differences(old: Rig, new: Rig) -> dict[tuple[str, ...], Any]:
+def updated(text: str, rig: RigData, filed: Path, folder: Path | None = None) -> str:
+    """Return a rig file's text with the values of another rig: read again, it gives that rig.
+
+    `text` is that of the file `filed`. Values that are the same stay as they are written; a key
+    that the rig lacks is left out, and one that differs from its default is added. A folder of
+    models stays relative if the text is written to `folder` and it is the same from there.
+    """
+    document: Any = tomlkit.parse(text)
+    whole = rig_table(rig)
+    models = document.get("flight", {}).get("model_folder")
+    if models and folder is not None and rig.flight is not None:
+        there = str((folder / str(models)).resolve())
+        if there == whole["flight"]["model_folder"]:
+            whole["flight"]["model_folder"] = models
+    _update(document, whole, loads_toml(rig_text(rig), filed))
+    return tomlkit.dumps(document)
+
+
+def _update(table: Any, whole: Mapping[str, Any], needed: Mapping[str, Any]) -> None:
+    """Give a table of a document the values of `whole`; add what is `needed` and not there."""
+    for key in list(table):
+        if key not in whole:
+            del table[key]
+        elif isinstance(whole[key], dict):
+            _update(table[key], whole[key], needed.get(key, {}))
+        elif table[key] != whole[key]:
+            table[key] = whole[key]
+    for key, value in needed.items():
+        if key not in table:
+            table[key] = value
+
+
+def differences(old: RigData, new: RigData) -> dict[tuple[str, ...], Any]:
     """Return the values that differ between two rigs of the same controls, by their keys.
 
     A number that differs is no longer a guess.

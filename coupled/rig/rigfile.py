@@ -10,17 +10,18 @@ from typing import Any
 from coupled.errors import InputError, collected, together
 from coupled.record.channels import CONTROL_NAMES, unit_of
 from coupled.rig.parameters import Control, Flight
-from coupled.rig.rig import Rig, checked
-from coupled.schema import build, file_keys, known_keys, load_toml
+from coupled.rig.rig import Rig, checked, of_file
+from coupled.schema import build, file_keys, known_keys, loads_toml, read_toml
 
 
 def read_rig(path: Path, changes: Mapping[str, Any] | None = None) -> Rig:
     """Return the rig of a file, with `changes`: {dotted key: value}."""
-    table = load_toml(path)
+    text = read_toml(path)
+    table = loads_toml(text, path)
     for key, value in (changes or {}).items():
         if not change(table, key, value):
             raise InputError(path, key, "names a key within a value, not a table")
-    return rig_from_table(table, path)
+    return of_file(rig_from_table(table, path), (path, text))
 
 
 def _placed(flight: Any, file: object) -> Any:

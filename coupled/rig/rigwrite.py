@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from coupled.record.channels import unit_of
-from coupled.rig.rig import Rig
+from coupled.rig.rigdata import RigData
 from coupled.schema import Section, file_keys
 
 
-def rig_text(rig: Rig, remark: str = "") -> str:
+def rig_text(rig: RigData, remark: str = "") -> str:
     """Return a rig file's text, with a remark at its head."""
     lines = [f"# {line}".rstrip() for line in remark.splitlines()]
     lines += _values(rig, "m")
@@ -30,7 +30,7 @@ def rig_text(rig: Rig, remark: str = "") -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def rig_table(rig: Rig) -> dict[str, Any]:
+def rig_table(rig: RigData) -> dict[str, Any]:
     """Return a rig as the tables of a rig file, every key with its unit, defaults included.
 
     Parts that the rig lacks, such as a flight on a bench, are left out: the tables read back as the

@@ -243,6 +243,7 @@ def test_a_bench_calibrated_and_flown_has_the_promised_authority(tmp_path: Path)
         assert after.felt_ratio == pytest.approx(1.0, abs=0.01)
         # and it is what the closed form of the coverage's count says
         s2 = found.s2["the null, eq. (14)"]
+        assert found.s3 is not None
         assumed = Scales(found.line.s1.value, s2.value, found.s3.value)
         k, stiff = found.line.bend.value, max(never.schedule.total_gradient)
         off = deflection_off(assumed, k, true, bend, stiff)

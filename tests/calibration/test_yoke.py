@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
@@ -108,9 +109,9 @@ def test_the_figure_draws_both_directions(tmp_path: Path) -> None:
         writer.writerows(rows)
     top = draw_readings(fitted(file), "both").axes[0]
     lines = [line for line in top.get_lines() if isinstance(line, Line2D)]
-    spans = [line.get_xdata() for line in lines if line.get_linestyle() == "-"]
+    spans = [np.asarray(line.get_xdata()) for line in lines if line.get_linestyle() == "-"]
     assert len(spans) == 5
-    assert all(min(x) < 0.0 < max(x) for x in spans)
+    assert all(x.min() < 0.0 < x.max() for x in spans)
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from coupled.export.alone import fly_alone
-from coupled.export.write import Flown, export, put, script_name
+from coupled.exporting.alone import fly_alone
+from coupled.exporting.write import Flown, export, put, script_name
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre
 from tests.support.exported import bench, forces, on_bench

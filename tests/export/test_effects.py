@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.export.beside import beside
-from coupled.export.control import control_system
-from coupled.export.keys import EXPORTED, REFUSED, WITHOUT_EFFECT, check_keys
-from coupled.export.write import DEFLECTION, FORCE, LOSS
+from coupled.exporting.beside import beside
+from coupled.exporting.control import control_system
+from coupled.exporting.keys import EXPORTED, REFUSED, WITHOUT_EFFECT, check_keys
+from coupled.exporting.write import DEFLECTION, FORCE, LOSS
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.flight.pilot import Step
 from coupled.flight.runfile import read_run
@@ -189,7 +189,7 @@ def test_a_key_that_came_to_the_rig_later_is_refused(monkeypatch: pytest.MonkeyP
     """A key that the export does not list is refused."""
     known: dict[type[Section], frozenset[str]] = dict(EXPORTED)
     known[parameters.Loader] -= {"play"}
-    monkeypatch.setattr("coupled.export.keys.EXPORTED", known)
+    monkeypatch.setattr("coupled.exporting.keys.EXPORTED", known)
     assert check_keys(bench(), "rig") == []
     with pytest.raises(
         InputError, match=r"loader\.play_m: is not exported, nor left out in silence"

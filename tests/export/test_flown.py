@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.export.beside import beside
-from coupled.export.write import DEFLECTION, FORCE, LOSS
+from coupled.exporting.beside import beside
+from coupled.exporting.write import DEFLECTION, FORCE, LOSS
 from coupled.flight.runfile import read_run
 from coupled.resources import shipped_runs
 from tests.support.exported import bench, both, forces, on_bench

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.export.alone import fly_alone
-from coupled.export.beside import beside
-from coupled.export.write import DEFLECTION, FORCE, LOSS, Export, Flown, export, put
+from coupled.exporting.alone import fly_alone
+from coupled.exporting.beside import beside
+from coupled.exporting.write import DEFLECTION, FORCE, LOSS, Export, Flown, export, put
 from coupled.flight.airframe import packaged_models
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step

@@ -15,13 +15,13 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.surfaces import _moves_itself, surface_points
-from coupled.models.draft import draft
-from coupled.models.survey import survey
 from coupled.record.channels import LONGITUDINAL
 from coupled.record.record import Record
 from coupled.resources import shipped_rigs
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
+from coupled.surveying.draft import draft
+from coupled.surveying.survey import survey
 from tests.support.gaps import pushes
 from tests.support.records import NOISE
 

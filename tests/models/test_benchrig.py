@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from coupled.errors import InputError
-from coupled.export.keys import check_keys
-from coupled.models.benchrig import answer, questions
-from coupled.models.fromlog import numbers_from_log
+from coupled.exporting.keys import check_keys
 from coupled.record.record import Record, record_of
 from coupled.rig.rig import Rig
 from coupled.rig.rigfile import read_rig
 from coupled.rig.standalone import nodes_of, run_control
+from coupled.surveying.benchrig import answer, questions
+from coupled.surveying.fromlog import numbers_from_log
 from tests.support.commands import coupled, files
 from tests.support.rigs import bench
 
@@ -33,7 +33,7 @@ FIRST_s, EACH_s = 30.0, 4.5
 def yoke() -> Rig:
     rows = {"dynamic_pressure_Pa": [0.0], "total_gradient_N_per_m": [800.0]}
     place = "controls.column"
-    loader = {f"{place}.loader.{key}": value for key, value in TRUE.items()}
+    loader: dict[str, object] = {f"{place}.loader.{key}": value for key, value in TRUE.items()}
     loader |= {f"{place}.schedule": rows, f"{place}.compensation.bend_m_per_N": 0.0}
     return bench().changed(loader)
 

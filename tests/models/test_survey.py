@@ -12,9 +12,9 @@ import pytest
 from coupled.authority.compare import fly_and_judge
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.flight.pilot import Step
-from coupled.models.draft import draft, kind_of
-from coupled.models.survey import Surveyed, known_models, survey
 from coupled.rig.rigfile import read_rig
+from coupled.surveying.draft import draft, kind_of
+from coupled.surveying.survey import Surveyed, known_models, survey
 from tests.support.commands import coupled, files
 
 MODELS = known_models()

@@ -6,6 +6,7 @@ import csv
 import re
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -89,6 +90,6 @@ def test_a_sweeps_table_and_figure_have_the_same_units(
         word, _, unit = axes.get_ylabel().partition(", ")
         assert word == WORDS[name]
         line = next(each for each in printed.splitlines() if f", {unit} " in each)
-        most = float(axes.get_lines()[0].get_ydata()[-1])
+        most = float(np.asarray(axes.get_lines()[0].get_ydata())[-1])
         assert f"{most:.3g}" in line
         assert Shown.of(name, system).factor * TABLE[name][1] == pytest.approx(most)

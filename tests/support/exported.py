@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from coupled.export.write import Flown, export, fly_exported, put, script_name
+from coupled.exporting.write import Flown, export, fly_exported, put, script_name
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Configuration, Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable, Pilot

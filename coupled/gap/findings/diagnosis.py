@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupled.arguments import public
 from coupled.gap.findings.changed import Comparison
@@ -23,13 +23,18 @@ from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
+from coupled.results import TableResult, frame_of
 from coupled.rig.rig import Rig
 
+if TYPE_CHECKING:
+    import polars as pl
+
 CIRCLED = "The search stopped because it returned to an earlier set of effects."
+COLUMNS = ("effect", "stage", "probability", "key", "unit", "filed", "found", "low", "high")
 
 
 @dataclass(frozen=True)
-class Diagnosis(Findings):
+class Diagnosis(Findings, TableResult):
     """The findings of a diagnosis, and the rig with the effects found (`improved`).
 
     `closed_loop`, `in_flight`, `next_tests` and `power` are computed on first use: each simulates
@@ -51,6 +56,29 @@ class Diagnosis(Findings):
     left_out: tuple[str, ...] = ()
     # What of the trim comes from the records or their manifests, in words; empty if nothing.
     trim: str = ""
+
+    def __repr__(self) -> str:
+        found = "; ".join(
+            ", ".join(
+                [e.name, *(f"{p.key} = {p.found:.4g} {p.unit}".strip() for p in e.parameters)]
+            )
+            for e in self.effects
+        )
+        words = f"{self.verdict}; {found}" if found else self.verdict
+        return f"Diagnosis({self.nominal.name}, {self.control}: {words})"
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a parameter of the effects found; the units are in the column `unit`."""
+        rows = []
+        for effect in self.effects:
+            head = {"effect": effect.name, "stage": effect.stage, "probability": effect.probability}
+            rows += [
+                head
+                | {"key": p.key, "unit": p.unit, "filed": p.filed, "found": p.found}
+                | {"low": p.found_low, "high": p.found_high}
+                for p in effect.parameters
+            ]
+        return frame_of(rows, COLUMNS)
 
     @property
     def first(self) -> Record:

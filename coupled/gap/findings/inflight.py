@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coupled.display import percent
 from coupled.gap.findings.flown import Again
 from coupled.gap.findings.shapley import shapley_weights
 from coupled.gap.search.case import Case
@@ -142,4 +143,4 @@ def _plain(name: str) -> str:
 
 
 def _per_cent(share: float) -> str:
-    return f"{100 * share:.0f} %" if abs(share) >= 0.095 else f"{100 * share:.1f} %"
+    return percent(share, 0 if abs(share) >= 0.095 else 1)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from coupled.export.expression import either, prop, within
-from coupled.export.host import pressure
-from coupled.export.making import Made, stepping
+from coupled.exporting.expression import either, prop, within
+from coupled.exporting.host import pressure
+from coupled.exporting.making import Made, stepping
 
 
 def add_surface(made: Made) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from coupled.export.expression import (
+from coupled.exporting.expression import (
     Expr,
     cosine,
     either,
@@ -18,8 +18,8 @@ from coupled.export.expression import (
     sine,
     within,
 )
-from coupled.export.loader import Motion
-from coupled.export.making import Made
+from coupled.exporting.loader import Motion
+from coupled.exporting.making import Made
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coupled.export.expression import (
+from coupled.exporting.expression import (
     Expr,
     either,
     equal,
@@ -30,7 +30,7 @@ from coupled.export.expression import (
     size,
     within,
 )
-from coupled.export.making import Made
+from coupled.exporting.making import Made
 from coupled.rig.loader import stop_of
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 from coupled.display import System, in_system
 from coupled.errors import InputError, nearest
-from coupled.models.draft import HOW_TO_SETTLE, BEND_m_per_N, RIM_m, control_lines, kind_of
-from coupled.models.fromlog import LogNumbers
 from coupled.record.channels import ControlName, unit_of
+from coupled.surveying.draft import HOW_TO_SETTLE, BEND_m_per_N, RIM_m, control_lines, kind_of
+from coupled.surveying.fromlog import LogNumbers
 from coupled.units import parse_unit
 
 _NUMBER = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")

@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from coupled.errors import InputError
-from coupled.export.model import Files, model_name
+from coupled.exporting.model import Files, model_name
 from coupled.flight.aircraft import make_aircraft
 from coupled.flight.altered import ALTERATIONS, UNALTERED
 from coupled.resources import aircraft_folder

@@ -5,25 +5,30 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
 from coupled.errors import InputError
-from coupled.export.alone import PROGRAM, fly_alone
-from coupled.export.befalling import add_conditions
-from coupled.export.beside import Beside, alone_record, beside, properties
-from coupled.export.control import control_system
-from coupled.export.keys import check_keys, only_scripted
-from coupled.export.load import check_load, set_load
-from coupled.export.model import Files, model_files, model_name
-from coupled.export.readme import readme_text
-from coupled.export.script import Script, lead_pilots
-from coupled.export.start import add_start, initial_conditions
-from coupled.export.system import System
+from coupled.exporting.alone import PROGRAM, fly_alone
+from coupled.exporting.befalling import add_conditions
+from coupled.exporting.beside import Beside, alone_record, beside, properties
+from coupled.exporting.control import control_system
+from coupled.exporting.keys import check_keys, only_scripted
+from coupled.exporting.load import check_load, set_load
+from coupled.exporting.model import Files, model_files, model_name
+from coupled.exporting.readme import readme_text
+from coupled.exporting.script import Script, lead_pilots
+from coupled.exporting.start import add_start, initial_conditions
+from coupled.exporting.system import System
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Configuration, Manoeuvre
 from coupled.record.record import Record
+from coupled.results import Displayed, Tabular, frame_of
 from coupled.rig.rig import Rig
+
+if TYPE_CHECKING:
+    import polars as pl
 
 RATE_Hz = 960.0  # default of the loader: docs/export.md has the errors
 MOST_SUBSTEPS = 64
@@ -40,7 +45,7 @@ class Flown:
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Displayed, Tabular):
     """The result of an export: its files by path, its loader's steps in a run, its errors.
 
     `beside` are the flights compared with our own, `left` the parts of the rig left out and why,
@@ -54,6 +59,20 @@ class Export:
     left: tuple[str, ...] = ()
     scripted: tuple[str, ...] = ()
     said: str = ""
+
+    def __repr__(self) -> str:
+        flights = (
+            f"{len(self.beside)} flights {'within' if self.within else 'NOT within'} tolerance"
+        )
+        return f"Export({self.rig.name}: {len(self.files)} files, {flights})"
+
+    def as_dict(self) -> list[dict[str, object]]:
+        """Return how far each flight is from our own, as JSON takes it."""
+        return [one.as_dict() for one in self.beside]
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return how far each flight is from our own, a row a flight."""
+        return frame_of(self.as_dict(), [field.name for field in fields(Beside)])
 
     @property
     def within(self) -> bool:

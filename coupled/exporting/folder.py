@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coupled.errors import InputError
-from coupled.export.befalling import unknown_condition
-from coupled.export.model import Files
-from coupled.export.write import Export, Flown
+from coupled.exporting.befalling import unknown_condition
+from coupled.exporting.model import Files
+from coupled.exporting.write import Export, Flown
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.manoeuvre import Manoeuvre
 from coupled.outputs import Outputs

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from coupled.export.expression import Expr, Value, either, equal, exponential, prop
-from coupled.export.system import System
+from coupled.exporting.expression import Expr, Value, either, equal, exponential, prop
+from coupled.exporting.system import System
 from coupled.record.channels import SURFACES, ControlName, unit_of
 from coupled.rig.parameters import Control
 from coupled.rig.rig import Rig

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from coupled.export.expression import Expr, Value, either, equal, prop, sine, within
-from coupled.export.host import (
+from coupled.exporting.expression import Expr, Value, either, equal, prop, sine, within
+from coupled.exporting.host import (
     BENCH_PRESSURE,
     add_estimate,
     add_external,
@@ -14,11 +14,11 @@ from coupled.export.host import (
     add_reading,
     add_schedule,
 )
-from coupled.export.linkage import Grip, add_hand, add_servo, add_weights, begin, deflection
-from coupled.export.loader import Motion, add_loader, held
-from coupled.export.making import Made, add_clock, stepping
-from coupled.export.surface import add_surface
-from coupled.export.system import System
+from coupled.exporting.linkage import Grip, add_hand, add_servo, add_weights, begin, deflection
+from coupled.exporting.loader import Motion, add_loader, held
+from coupled.exporting.making import Made, add_clock, stepping
+from coupled.exporting.surface import add_surface
+from coupled.exporting.system import System
 from coupled.record.channels import CONTROL_NAMES, ControlName
 from coupled.rig.declaration import Given, Hand
 from coupled.rig.packing import crossed_bends

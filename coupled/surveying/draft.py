@@ -12,8 +12,8 @@ import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from coupled.models.survey import Surveyed
 from coupled.record.channels import SURFACES, ControlName, unit_of
+from coupled.surveying.survey import Surveyed
 
 BEND_m_per_N = 9.136e-5  # 0.016 in/lb, the report's column
 RIM_m = 0.15  # a wheel's radius

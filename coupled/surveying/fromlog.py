@@ -87,10 +87,14 @@ def numbers_from_log(record: Record, control: ControlName, file: object) -> LogN
         if bend * most > _BENT * travel:
             sure.add("bend")
     return LogNumbers(
-        travel,
-        *(values[name] for name in ("mass", "damping", "gradient", "breakout_N", "friction_N")),
-        bend,
-        frozenset(sure),
+        travel=travel,
+        mass=values["mass"],
+        damping=values["damping"],
+        gradient=values["gradient"],
+        breakout_N=values["breakout_N"],
+        friction_N=values["friction_N"],
+        bend=bend,
+        sure=frozenset(sure),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
-from coupled.export.expression import Expr, Value, as_expr, prop
+from coupled.exporting.expression import Expr, Value, as_expr, prop
 
 
 class System:

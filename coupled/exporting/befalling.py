@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from coupled.errors import InputError
-from coupled.export.script import Floats, Move, Script
+from coupled.exporting.script import Floats, Move, Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.event import OFF, PICK, Event

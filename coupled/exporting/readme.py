@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from coupled.export.beside import Beside
-from coupled.export.keys import approximated
-from coupled.export.model import model_name
-from coupled.export.system import System
+from coupled.exporting.beside import Beside
+from coupled.exporting.keys import approximated
+from coupled.exporting.model import model_name
+from coupled.exporting.system import System
 from coupled.flight.altered import ALTERATIONS
 from coupled.record.channels import SURFACES
 from coupled.rig.rig import Rig

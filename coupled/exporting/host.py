@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.export.expression import (
+from coupled.exporting.expression import (
     Expr,
     below,
     either,
@@ -18,8 +18,8 @@ from coupled.export.expression import (
     prop,
     within,
 )
-from coupled.export.loader import has_extra, modifying
-from coupled.export.making import Made
+from coupled.exporting.loader import has_extra, modifying
+from coupled.exporting.making import Made
 from coupled.rig.equations import total_to_computed
 from coupled.units import PSF_Pa
 

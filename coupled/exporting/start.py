@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coupled.export.host import BENCH_PRESSURE
-from coupled.export.load import POINT, TANKS
-from coupled.export.model import Files, parsed_leniently
-from coupled.export.script import Script
+from coupled.exporting.host import BENCH_PRESSURE
+from coupled.exporting.load import POINT, TANKS
+from coupled.exporting.model import Files, parsed_leniently
+from coupled.exporting.script import Script
 from coupled.flight.airframe import JSBSimAirframe
 from coupled.flight.altered import ALTERATIONS
 from coupled.flight.loop import make_airframe

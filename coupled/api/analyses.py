@@ -1,0 +1,60 @@
+"""Analyses of a rig: its authority maps, its stability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+
+from coupled.api.records import Given, named_records
+from coupled.api.rigs import rig_given
+from coupled.arguments import public
+from coupled.authority.stability.whole import Stability, map_stability
+from coupled.authority.whole import AuthorityMap, map_rig
+from coupled.errors import InputError
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
+
+Path = str | PathLike[str]
+Progress = Callable[[str, int, int], None]
+_PRESSURE = "dynamic_pressure_Pa"
+
+
+@public
+def map_authority(
+    rig: Rig | Path,
+    records: Given | Sequence[Given] | Mapping[str, Given] | None = None,
+    progress: Progress | None = None,
+) -> AuthorityMap:
+    """Map what a rig loses over q̄ and deflection, and its stick force per g and per knot.
+
+    `records`, as `diagnose` takes them, give the envelope that is flown; without any, the rig's
+    shipped runs are flown. Raises InputError for a record without q̄.
+
+    >>> import coupled
+    >>> found = coupled.map_authority("bench")
+    >>> found.to_polars().columns[:3]
+    ['control', 'configuration', 'dynamic_pressure_Pa']
+    """
+    flown = None if records is None else named_records(records)
+    for name, record in (flown or {}).items():
+        if _PRESSURE not in record:
+            raise InputError(name, _PRESSURE, "no such channel")
+    given = None if flown is None else list(flown.values())
+    return map_rig(rig_given(rig), given, progress)
+
+
+@public
+def stability(
+    rig: Rig | Path, control: ControlName | None = None, progress: Progress | None = None
+) -> Stability:
+    """Map where a rig is stable over K·G_T, simulated and by linear theory.
+
+    Of one control, or of all that bend. Some thousand motions of each are simulated, which takes
+    about a minute a control. Raises InputError where nothing bends.
+
+    >>> import coupled
+    >>> found = coupled.stability("bench")
+    >>> found.limits[0].control, found.to_polars().columns[:2]
+    ('column', ['control', 'quantity'])
+    """
+    return map_stability(rig_given(rig), control, progress)

@@ -1,0 +1,150 @@
+"""How each result becomes a figure, a part of a notebook, and a report: in one place.
+
+`DISPLAYS` has a line a result. A notebook gets the verdict and the first sections of the report.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from coupled.authority.compare import Comparison, Flight
+from coupled.authority.stability.whole import Stability
+from coupled.authority.whole import AuthorityMap
+from coupled.calibration.forcedocument import ForceDocument
+from coupled.calibration.planned import ReadingsPlan
+from coupled.calibration.readings import Readings
+from coupled.calibration.result import CalibrationResult
+from coupled.campaign.check import CheckResult
+from coupled.campaign.sweep import SweepResult
+from coupled.errors import InputError
+from coupled.exporting.write import Export
+from coupled.files import check_target, write_text
+from coupled.gap.findings.diagnosis import Diagnosis
+from coupled.gap.nominalfit import NominalFit
+from coupled.plots.checks import draw_static_checks
+from coupled.plots.fits import draw_fit
+from coupled.plots.flights import draw_comparison
+from coupled.plots.gapview import View
+from coupled.plots.histories import Figure, draw_record
+from coupled.plots.ladder import draw_ladder
+from coupled.plots.readings import draw_readings
+from coupled.plots.results import draw_result
+from coupled.plots.rigs import draw_rig
+from coupled.plots.saving import make_drawable
+from coupled.plots.taken import draw_taken
+from coupled.plots.verdicts import draw_verdicts
+from coupled.record.record import Record
+from coupled.reports.analyses import (
+    draw_map,
+    draw_planes,
+    map_report,
+    plan_report,
+    readings_report,
+    stability_report,
+)
+from coupled.reports.calibration import calibration_report
+from coupled.reports.check import check_report
+from coupled.reports.comparison import comparison_report
+from coupled.reports.diagnosis import diagnosis_report
+from coupled.reports.forces import force_report, force_summary
+from coupled.reports.made import made_by
+from coupled.reports.page import InputFile, Made, Report, render, render_part
+from coupled.reports.records import draw_flight, fit_report, flight_report, record_report
+from coupled.reports.rigs import export_report, rig_report, survey_report
+from coupled.reports.sweep import sweep_report
+from coupled.rig.rig import Rig
+from coupled.surveying.whole import Survey
+
+_ALL = 100  # sections
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How a kind of result is reported and drawn; a notebook shows so many sections."""
+
+    report: Callable[[Any, Made], Report]
+    draw: Callable[[Any], Figure] | None = None
+    sections: int = _ALL
+    rig: Callable[[Any], Rig | None] = lambda result: None
+    brief: Callable[[Any, Made], Report] | None = None  # for a notebook, where the report is long
+
+
+def _diagnosed(found: Diagnosis, made: Made) -> Report:
+    return diagnosis_report(found, ", ".join(Path(name).name for name in found.records), made)
+
+
+DISPLAYS: dict[type, _Way] = {
+    Rig: _Way(rig_report, draw_rig, rig=lambda rig: rig),
+    Record: _Way(record_report, draw_record, 1),
+    Flight: _Way(flight_report, draw_flight, rig=lambda flight: flight.manoeuvre.rig),
+    Comparison: _Way(
+        lambda found, made: comparison_report(found.flights, made),
+        lambda found: draw_comparison(found.flights),
+        3,
+        lambda found: found[0].manoeuvre.rig,
+    ),
+    Diagnosis: _Way(
+        _diagnosed, lambda found: draw_ladder(View(found)), rig=lambda found: found.nominal
+    ),
+    NominalFit: _Way(fit_report, draw_fit, rig=lambda found: found.rig),
+    SweepResult: _Way(sweep_report, draw_result),
+    CheckResult: _Way(check_report, draw_verdicts),
+    CalibrationResult: _Way(
+        lambda found, made: calibration_report(found, "", "readings", "", made),
+        lambda found: draw_readings(found, "readings"),
+        2,
+    ),
+    AuthorityMap: _Way(map_report, draw_map, rig=lambda found: found.rig),
+    Stability: _Way(stability_report, draw_planes, rig=lambda found: found.rig),
+    ForceDocument: _Way(
+        lambda found, made: force_report(found.controls, found.fits, found.issue, made),
+        lambda found: draw_static_checks(found.controls[0]),
+        rig=lambda found: found.rig,
+        brief=lambda found, made: force_summary(found.controls, found.issue, made),
+    ),
+    ReadingsPlan: _Way(plan_report, rig=lambda found: found.rig),
+    Readings: _Way(readings_report, draw_taken),
+    Survey: _Way(survey_report),
+    Export: _Way(export_report, rig=lambda found: found.rig),
+}
+
+
+def draw(result: Any) -> Figure:
+    """Return a result's figure."""
+    way = DISPLAYS[type(result)]
+    assert way.draw is not None
+    figure = way.draw(result)
+    make_drawable(figure)
+    return figure
+
+
+def html(result: Any) -> str:
+    """Return a result as a part of a page of HTML, which stands alone."""
+    way = DISPLAYS[type(result)]
+    report = way.brief or way.report
+    return render_part(report(result, _made(result)), way.sections)
+
+
+def write_report(result: Any, file: str | PathLike[str]) -> None:
+    """Write a result's report. Raises InputError for a file that is no HTML, or cannot be made."""
+    path = Path(file)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(path, "", "a report is one HTML file: its name ends in .html")
+    check_target(path)
+    write_text(path, render(DISPLAYS[type(result)].report(result, _made(result))))
+
+
+def _made(result: Any) -> Made:
+    """Return what made a result: with the text of its rig, as it was."""
+    made = made_by(f"coupled, from Python: {type(result).__name__}", [])
+    rig = DISPLAYS[type(result)].rig(result)
+    if rig is None:
+        return made
+    text = rig.to_toml()
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return Made(made.command, made.versions, (InputFile(f"{rig.name}.toml", digest, text),))

@@ -1,0 +1,56 @@
+"""A rig's loader taken to JSBSim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+
+from coupled.api.rigs import rig_given
+from coupled.arguments import public
+from coupled.errors import InputError, nearest
+from coupled.exporting.folder import check_folder, exportable, runs_of, write_export
+from coupled.exporting.write import Export, RATE_Hz
+from coupled.exporting.write import export as make
+from coupled.flight.runfile import read_run
+from coupled.rig.rig import Rig
+
+
+@public
+def export(
+    rig: Rig | str | PathLike[str],
+    folder: str | PathLike[str],
+    runs: Sequence[str | PathLike[str]] | None = None,
+    case: str = "",
+    loader_rate_Hz: float = RATE_Hz,
+    check: bool = True,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Export:
+    """Write a rig's loader as JSBSim systems, with the aircraft and scripts that JSBSim flies.
+
+    `folder` is new, or a former export. `runs` get a script each (the shipped runs of the rig's
+    name unless given); with `case` the rig is exported as that case of them has it.
+    `loader_rate_Hz` is the least rate of the loader. With `check` each script is flown by JSBSim
+    alone: `.beside` has how far each flight is from our own, `.within` whether all are near enough.
+    Raises InputError for what an export cannot express, naming the key.
+
+    >>> import coupled, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = coupled.export("t37", f"{folder}/t37", runs=[])
+    >>> made.substeps
+    8
+    """
+    place, data = Path(folder), rig_given(rig)
+    check_folder(place)
+    named = runs_of(data.name) if runs is None else [fspath(run) for run in runs]
+    cases = [each for name in named for each in read_run(name)]
+    if case:
+        chosen = {each.label: each for each in cases}
+        if case not in chosen:
+            problem = f"no case {case!r}; {nearest(case, chosen)}"
+            raise InputError(", ".join(named), "case", problem)
+        data, cases = chosen[case].rig, [chosen[case]]
+    flown, _ = exportable(data, cases)
+    made = make(data, flown, data.file or data.name, loader_rate_Hz, check, progress)
+    write_export(made, place)
+    return made

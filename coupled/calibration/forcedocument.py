@@ -1,0 +1,136 @@
+"""The force document of a rig, whole: each control's documentation, its fit, and which issue."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coupled.calibration.aircraftdata import read_aircraft_data
+from coupled.calibration.bench import CalibrationBench, take_readings
+from coupled.calibration.calibrate import calibrate_control
+from coupled.calibration.documentation import (
+    Documentation,
+    controls_of,
+    document,
+    surface_travels,
+)
+from coupled.calibration.estimate import usual_instruments
+from coupled.calibration.plan import stations
+from coupled.calibration.qualification import Issue
+from coupled.calibration.readingsfile import read_readings
+from coupled.calibration.result import CalibrationResult
+from coupled.errors import InputError, nearest
+from coupled.files import sha256
+from coupled.record.channels import ControlName
+from coupled.results import TableResult, frame_of
+from coupled.rig.rig import Rig
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Progress = Callable[[str, int, int], None]
+Fits = Mapping[ControlName, tuple[CalibrationResult, str] | None]
+
+
+@dataclass(frozen=True, repr=False)
+class ForceDocument(TableResult):
+    """A rig's forces, documented: a `Documentation` a control, with the fit of its readings."""
+
+    rig: Rig
+    controls: tuple[Documentation, ...]
+    fits: Fits
+    issue: Issue
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check of 14 CFR Part 60 is within its tolerance."""
+        return all(check.passed for found in self.controls for check in found.checks)
+
+    def __repr__(self) -> str:
+        checks = [check for found in self.controls for check in found.checks]
+        within = sum(check.passed for check in checks)
+        return f"ForceDocument({self.rig.name}: {within} of {len(checks)} checks within tolerance)"
+
+    def as_dict(self) -> dict[str, list[dict[str, Any]]]:
+        """Return each control's checks as JSON takes them."""
+        return {found.control: [c.as_dict() for c in found.checks] for found in self.controls}
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the checks, a row each, with units."""
+        table = self.as_dict()
+        return frame_of([{"control": name} | row for name, rows in table.items() for row in rows])
+
+
+def document_rig(
+    rig: Rig,
+    control: ControlName | None = None,
+    readings: Path | None = None,
+    specified: Rig | None = None,
+    aircraft: Path | None = None,
+    date: str = "",
+    revision: str = "",
+    progress: Progress | None = None,
+) -> ForceDocument:
+    """Return a rig's force document, of one control or of all.
+
+    `readings` are of the first control (a virtual bench's unless given), `specified` is a rig that
+    says what is specified, `aircraft` the aircraft's own forces. Raises InputError where the rig
+    lacks the control, or a file cannot be used.
+    """
+    file = rig.file or Path(rig.name)
+    if control is not None and control not in rig.controls:
+        raise InputError(file, "control", f"no {control!r}; {nearest(control, rig.controls)}")
+    chosen = controls_of(rig) if control is None else [control]
+    travels = surface_travels(rig, file)
+    own, read = specified or rig, None
+    if aircraft is not None:
+        if chosen[0] not in own.controls:
+            raise InputError(own.name, "controls", f"the rig has no {chosen[0]}")
+        first = own.controls[chosen[0]]
+        read = read_aircraft_data(aircraft, chosen[0], first, travels.get(chosen[0]))
+    fits = {name: _fit(rig, name, readings, chosen) for name in chosen}
+    found = []
+    for name in chosen:
+        known = read if name == chosen[0] else None
+        found.append(document(rig, name, travels.get(name), progress, specified, known))
+    reference = "what the rig's own file specifies"
+    if specified is not None:
+        reference = f"what {specified.name} specifies"
+    if aircraft is not None:
+        reference += f"; static checks of the first control: {aircraft.name}, the aircraft's"
+    return ForceDocument(rig, tuple(found), fits, _issue(rig, reference, date, revision))
+
+
+def _issue(rig: Rig, reference: str, date: str, revision: str) -> Issue:
+    """Return what the cover says: of the rig as it is, which may differ from its file."""
+    text = rig.to_toml()
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    name = rig.file.name if rig.file is not None else f"{rig.name}.toml"
+    if rig.file is not None and rig.file.is_file() and sha256(rig.file) != digest:
+        name += ", changed"
+    return Issue(name, digest, reference, date, revision)
+
+
+def _fit(
+    rig: Rig, control: ControlName, readings: Path | None, chosen: Sequence[ControlName]
+) -> tuple[CalibrationResult, str] | None:
+    """Return the fit to draw of a control, and where its readings are from.
+
+    None for a control of one gradient, and for all but the first where readings are given.
+    """
+    data, tools = rig.controls[control], usual_instruments(control)
+    if readings is not None:
+        if control != chosen[0]:
+            return None
+        read = read_readings(readings, control)
+        return calibrate_control(read, data, control, tools, readings), readings.name
+    try:
+        grid = stations(rig, control, 5, 5)
+    except InputError:
+        return None
+    made = take_readings(CalibrationBench(rig, control, grid, tools), 0)
+    found = calibrate_control(made, data, control, tools, rig.name)
+    return found, "a virtual bench's readings"

@@ -1,0 +1,98 @@
+"""The reports of a record, of one flight, and of a nominal rig fitted to records."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupled.authority.compare import Flight
+from coupled.authority.figures import named, remarks, rows
+from coupled.display import percent
+from coupled.gap.findings.summary import figure
+from coupled.gap.nominalfit import NominalFit
+from coupled.plots.fits import draw_fit
+from coupled.plots.histories import Figure, draw_record
+from coupled.plots.saving import svg_text
+from coupled.record.record import Record
+from coupled.reports.page import Drawing, Made, Report, Section, Table, Text, Verdict
+
+_HISTORY = "The record over time."
+_FITTED = "Each number as found over as filed, with its 95 % interval."
+
+
+def record_report(record: Record, made: Made) -> Report:
+    """Return the report of a record: its time histories, and the range of each channel."""
+    columns = zip(record.channels, record.data.T, strict=True)
+    table = Table(("channel", "least", "mean", "greatest"), tuple(map(_range, columns)))
+    sections = (
+        Section("Time histories", (Drawing(svg_text(draw_record(record)), _HISTORY),)),
+        Section("Channels", (table,)),
+    )
+    ended = record.ended_early
+    said = repr(record).removeprefix("Record(").removesuffix(")")
+    why = () if ended is None else (f"It ended early: {ended}.",)
+    verdict = Verdict(f"{said}.", "plain" if ended is None else "bad", why)
+    return Report("Record", "Record", verdict, sections, (("rows", str(len(record))),), made)
+
+
+def _range(column: tuple[str, np.ndarray]) -> tuple[str, ...]:
+    name, values = column
+    there = values[np.isfinite(values)]
+    if not there.size:
+        return name, "–", "–", "–"
+    return name, *(f"{float(each):.4g}" for each in (there.min(), there.mean(), there.max()))
+
+
+def flight_report(flight: Flight, made: Made) -> Report:
+    """Return the report of one flight: its figures, and its time histories."""
+    table = Table(("", named(flight)), tuple((label, *cells) for label, cells in rows([flight])))
+    history = Drawing(svg_text(draw_flight(flight)), _HISTORY)
+    sections = (Section("Figures", (table,)), Section("Time histories", (history,)))
+    loss, run = flight.outcome.loss, flight.manoeuvre
+    said = "The surface is not asked for anything."
+    if np.isfinite(loss):
+        said = f"Authority lost: {percent(loss)}; felt of the specified gradient:"
+        said += f" {flight.outcome.felt_ratio:.3f}."
+    ended = (f"It ended early: {flight.ended_early}.",) if flight.ended_early else ()
+    verdict = Verdict(said, "bad" if ended else "plain", (*ended, *remarks([flight])))
+    settings = (
+        *(("rig", run.rig.name), ("control", run.control), ("configuration", named(flight))),
+        ("length", f"{run.duration_s:g} s"),
+        ("seed", str(run.seed)),
+    )
+    return Report("Flight", run.label, verdict, sections, settings, made)
+
+
+def draw_flight(flight: Flight) -> Figure:
+    """Draw a flight's time histories."""
+    return draw_record(flight.record, f"{flight.manoeuvre.label}, {flight.configuration}")
+
+
+def fit_report(found: NominalFit, made: Made) -> Report:
+    """Return the report of a fitted rig: its numbers, and how far each channel stays off."""
+    numbers = []
+    for one in found.numbers:
+        ends = "not determined"
+        if one.interval is not None:
+            ends = " to ".join(figure(end) for end in one.interval)
+        numbers.append((one.key, figure(one.filed), figure(one.found), ends))
+    channels = tuple(
+        (one.channel, *(f"{n:.3g}" for n in (one.before, one.after, one.floor, one.moves)))
+        for one in found.channels
+    )
+    heads = ("channel", "as filed", "fitted", "noise alone", "it moves by")
+    caption = "The rms distance on stretches of the records that the fit has not seen"
+    sections = [
+        Section("Numbers", (Table(("number", "filed", "found", "95 % interval"), tuple(numbers)),)),
+        Section("Fit", (Drawing(svg_text(draw_fit(found)), _FITTED),)),
+        Section("Channels", (Table(heads, channels, caption),)),
+    ]
+    lines = [f"Not distinguished: {one.words}." for one in found.alike]
+    lines += [f"Not determined: {key}." for key in found.unknown]
+    lines += [f"At the end of what it may be: {n.key}." for n in found.numbers if n.at_bound]
+    if lines:
+        sections.insert(1, Section("What the records do not determine", (Text(tuple(lines)),)))
+    known = len(found.numbers) - len(found.unknown)
+    said = f"{known} of {len(found.numbers)} numbers are determined by the records."
+    verdict = Verdict(said, "bad" if found.doubts else "plain", found.doubts)
+    settings = (("rig", found.rig.name), ("control", found.control))
+    return Report("Fit", found.rig.name, verdict, tuple(sections), settings, made)

@@ -1,0 +1,108 @@
+"""The reports of a rig, of JSBSim's models, and of a rig exported to JSBSim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupled.display import percent
+from coupled.errors import listed
+from coupled.exporting.write import Export
+from coupled.plots.rigs import draw_rig
+from coupled.plots.saving import svg_text
+from coupled.record.channels import unit_of
+from coupled.reports.page import Drawing, Made, Mark, Report, Section, Table, Text, Verdict
+from coupled.rig.equations import uncompensated_loss
+from coupled.rig.parameters import Control
+from coupled.rig.rig import Rig
+from coupled.surveying.survey import Surveyed
+from coupled.surveying.whole import Survey
+
+_SHOWN = "G_T over q̄, and the share that the bend takes where the host corrects nothing."
+
+
+def rig_report(rig: Rig, made: Made) -> Report:
+    """Return the report of a rig: a table of its controls, and their gradients."""
+    heads = ("", *rig.controls)
+    columns = [list(_numbers(name, control)) for name, control in rig.controls.items()]
+    table = Table(
+        heads,
+        tuple((rows[0][0], *(value for _, value in rows)) for rows in zip(*columns, strict=True)),
+    )
+    sections = (
+        Section("Controls", (table,)),
+        Section("Gradients", (Drawing(svg_text(draw_rig(rig)), _SHOWN),)),
+    )
+    aircraft = "none" if rig.flight is None else rig.flight.model
+    settings = (
+        ("rig", rig.name),
+        ("aircraft", aircraft),
+        ("frame rate", f"{rig.frame_rate:g} Hz, {rig.substeps} substeps of the rig a frame"),
+    )
+    bent = [name for name, control in rig.controls.items() if control.loader.bend > 0.0]
+    under = f"bends under {listed(bent)}" if bent else "is rigid"
+    said = f"Aircraft: {aircraft}; {rig.frame_rate:g} Hz. The structure {under}."
+    return Report("Rig", rig.name, Verdict(said), sections, settings, made)
+
+
+def _numbers(name: str, control: Control) -> Iterator[tuple[str, str]]:
+    """Yield a control's main numbers, each with its label and unit."""
+    d, loader, host = unit_of(name), control.loader, control.compensation
+    gradients = control.schedule.total_gradient
+    yield "travel", f"±{control.travel:.4g} {d}"
+    yield "mass", f"{loader.mass:.4g} kg"
+    yield "damping", f"{loader.damping:.4g} N·s/{d}"
+    yield "breakout", f"{loader.breakout:.4g} N"
+    yield "friction", f"{loader.friction:.4g} N"
+    yield "gradient G_T", f"{min(gradients):.4g} to {max(gradients):.4g} N/{d}"
+    yield "bend K", f"{loader.bend:.4g} {d}/N"
+    yield "  lost at most, uncorrected", percent(uncompensated_loss(loader.bend, max(gradients)))
+    yield "host's K̂", f"{host.bend:.4g} {d}/N"
+    words = {"deflection": host.deflection, "gradient": host.gradient}
+    yield "  corrects", ", ".join(word for word, on in words.items() if on) or "nothing"
+
+
+def survey_report(found: Survey, made: Made) -> Report:
+    """Return the report of JSBSim's models: a row each."""
+    table = Table(
+        ("model", "trims at", "controls", "rigs"),
+        tuple(_surveyed(one) for one in found),
+        words=4,
+    )
+    trimmed = [one for one in found if one.flight is not None]
+    led = sum(bool(one.controls) for one in trimmed)
+    said = f"{len(trimmed)} of {len(found)} trim, {led} can be flown by a rig."
+    settings = (("models", str(len(found))),)
+    return Report("Models", "JSBSim", Verdict(said), (Section("Models", (table,)),), settings, made)
+
+
+def _surveyed(one: Surveyed) -> tuple[str | Mark, ...]:
+    if one.flight is None:
+        return one.model, Mark(f"no: {one.why}", "bad"), "", ", ".join(one.rigs)
+    held = "" if one.holds else ", does not hold"
+    speed, height = one.flight.calibrated_airspeed, one.flight.altitude
+    controls = ", ".join(one.controls) or "none"
+    controls += "" if one.direct or not one.controls else " (by a law or lag)"
+    return one.model, f"{speed:g} m/s, {height:g} m{held}", controls, ", ".join(one.rigs)
+
+
+def export_report(found: Export, made: Made) -> Report:
+    """Return the report of an export: how far each flight by JSBSim alone is from our own."""
+    rows = tuple(
+        (
+            *(one.run, f"{one.case}, {one.configuration}"),
+            *(f"{100 * x:.3f} %" for x in (one.deflection, one.force, one.modifying_force)),
+            "–" if one.loss is None else f"{100 * one.loss:+.3f}",
+        )
+        for one in found.beside
+    )
+    heads = ("run", "case", "deflection, of travel", "force", "F_mod", "lost, points")
+    sections = [Section("Flights by JSBSim alone, off our own by", (Table(heads, rows, words=2),))]
+    lines = [f"Left out: {line}" for line in found.left]
+    lines += [f"By the scripts only: {line}" for line in found.scripted]
+    if lines:
+        sections.append(Section("What the export lacks", (Text(tuple(lines)),)))
+    near = "are as near to our own as they have to be" if found.within else "are too far off"
+    said = f"{len(found.files)} files; {len(found.beside)} flights {near}."
+    settings = (("rig", found.rig.name), ("steps of the loader a run", str(found.substeps)))
+    verdict = Verdict(said, "good" if found.within else "bad")
+    return Report("Export", found.rig.name, verdict, tuple(sections), settings, made)

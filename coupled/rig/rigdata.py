@@ -1,0 +1,20 @@
+"""The data of a rig: its sections, without what checks and changes them."""
+
+from __future__ import annotations
+
+from coupled.record.channels import ControlName
+from coupled.rig.parameters import Control, Flight, PlainName
+from coupled.rig.structure import Structure
+from coupled.schema import Section, quantity
+
+
+class RigData(Section):
+    """The sections of a rig file; SI."""
+
+    name: PlainName
+    frame_rate: float = quantity("Hz", ge=1, le=2000)
+    loader_rate: float = quantity("Hz", 2000.0, ge=2000, le=100_000)
+    controls: dict[ControlName, Control]
+    flight: Flight | None = None
+    noise: dict[str, float] = {}
+    structure: Structure = Structure()

@@ -1,0 +1,72 @@
+"""A survey of several JSBSim models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, overload
+
+from coupled.errors import InputError, nearest
+from coupled.parallel import as_done, cores, executor
+from coupled.results import Displayed, Tabular, frame_of
+from coupled.surveying.survey import Surveyed, known_models, survey
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, repr=False)
+class Survey(Sequence[Surveyed], Displayed, Tabular):
+    """JSBSim models: where each trims or why not, how its controls move, its rigs."""
+
+    models: tuple[Surveyed, ...]
+
+    @overload
+    def __getitem__(self, index: int) -> Surveyed: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Surveyed, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Surveyed | tuple[Surveyed, ...]:
+        return self.models[index]
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    def __repr__(self) -> str:
+        trimmed = sum(one.flight is not None for one in self.models)
+        return f"Survey({len(self.models)} models, {trimmed} trim)"
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """Return the findings of each model, as JSON takes them."""
+        return [one.as_dict() for one in self.models]
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return a row a model; SI."""
+        return frame_of(self.as_dict())
+
+
+def survey_models(
+    names: Sequence[str] = (), workers: int = 0, progress: Progress | None = None
+) -> Survey:
+    """Return what is found of some models, or of all that are here.
+
+    `workers` are processes, 0 for one a core. Raises InputError for a model that is not here.
+    """
+    known = known_models()
+    for name in names:
+        if name not in known:
+            problem = f"there is no JSBSim model {name!r}; {nearest(name, known)}"
+            raise InputError("coupled.surveying", "names", problem)
+    chosen = list(names or known)
+    found: dict[str, Surveyed] = {}
+    # A survey keeps a core busy, and each process holds a model: more than the cores only cost.
+    count = 1 if len(chosen) < 4 else min(cores(workers), cores(0), len(chosen))
+    with executor(count) as pool:
+        for one in as_done(pool, survey, [(name, known[name]) for name in chosen], 2 * count):
+            found[one.model] = one
+            if progress is not None:
+                progress(one.model, len(found), len(chosen))
+    return Survey(tuple(found[name] for name in chosen))
