@@ -21,14 +21,14 @@ from coupled.gap.checks import check_record
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.freed import default_keys, freed
 from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
+from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
 from coupled.gap.search.fit import Fit, fit, touched
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
-from coupled.gap.stages.joined import as_judged
 from coupled.gap.stages.stages import Reader
-from coupled.gap.stages.surfaces import surface_points
+from coupled.gap.stages.tried import as_judged
 from coupled.gap.thresholds import ALIKE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -60,9 +60,7 @@ def fit_nominal(
     rig = as_driven(rig, list(records.values()), control) if control in rig.controls else rig
     for file, record in records.items():
         check_record(rig, record, control, file)
-    readers = [
-        Reader(rig, record, control, surface_points, i) for i, record in enumerate(records.values())
-    ]
+    readers = readers_of(rig, records, control)
     outputs = [output.halved(rig) for output in _outputs(readers)]
     if not outputs:
         problem = "holds too little to judge any stage by, so nothing can be fitted"

@@ -7,27 +7,19 @@ structure, which bends under the measured force, the servo, and play.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, dotted
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.signals.floors import with_error
-from coupled.gap.signals.output import Floats, Output, Predict
+from coupled.gap.signals.output import Floats, Predict
 from coupled.gap.signals.reading import Reading
-from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES, PLAY_LEAST, PLAYS
-from coupled.record.channels import ControlName
+from coupled.gap.thresholds import JUMP_COUNTED, NOISE_TRIES
 from coupled.rig.imposed import answer_to, behind_linkage
 from coupled.rig.nodes import Nodes
 from coupled.rig.recorder import stamped
 from coupled.rig.rig import Rig
-
-OF_PLAY = "loader.play"  # its key in a rig file without the unit
 
 
 class Imposed:
@@ -84,44 +76,3 @@ class Imposed:
         """Return the prediction with a sample of what is wrong with the smoothed motion."""
         moved = with_error(self._motion, k, self._level)
         return self.predict(moved, self._force.with_error(k + NOISE_TRIES))(rig)
-
-
-def under_motion(library: Sequence[Effect], imposed: str) -> list[Effect]:
-    """Return a library for imposed motions: the linkage's effects show in the force.
-
-    Only play does where δc is `imposed`, and none that is a limit of the servo: the motion of the
-    grip is given, whatever the servo can do.
-    """
-    found = []
-    for effect in library:
-        keys = [p.key for p in effect.parameters]
-        plays = [p for p in effect.parameters if p.key.rpartition("_")[0] == OF_PLAY]
-        if effect.stage != "linkage":
-            sensed = imposed == "deflection" and "linkage" in effect.shows_in
-            found.append(replace(effect, outputs=("loader",)) if sensed else effect)
-        elif plays:
-            if len(keys) == 1:
-                found.append(replace(effect, outputs=("loader",), seen=partial(_plays, plays[0])))
-        elif imposed == "deflection" and not any("servo" in k and "limit" in k for k in keys):
-            found.append(replace(effect, outputs=("loader",)))
-    return found
-
-
-def _plays(
-    number: Parameter, outputs: Sequence[Output], rig: Rig, control: ControlName
-) -> list[dict[str, float]]:
-    """Return the play that leaves least of the force, where a fit starts: by two scans.
-
-    A play's jumps go from sample to sample, so that a fit from elsewhere ends between two.
-    """
-    ours = [output for output in outputs if output.stage == "loader"]
-    key = dotted(number.key_on(control), control)
-    filed, travel = rig.controls[control].loader.play, rig.controls[control].travel
-
-    def left(play: float) -> float:
-        other = rig.changed({key: number.entered(filed, play)})
-        return sum(float(np.sum(output.residual(other, wide=True) ** 2)) for output in ours)
-
-    best = min(np.geomspace(PLAY_LEAST * travel, travel, PLAYS).tolist(), key=left)
-    best = min((best * np.linspace(0.75, 1.3, PLAYS)).tolist(), key=left)
-    return [{number.name: best}]
