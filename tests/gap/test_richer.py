@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap import diagnose as diagnosis
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search import candidates, contest, richer
-from coupled.gap.search import search as search_module
 from coupled.gap.search.candidates import may_be_causes
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
 from coupled.gap.search.contest import in_place_of_open
 from coupled.gap.search.fit import Fit
 from coupled.gap.search.gain import Candidate, likelier_by
@@ -284,32 +280,6 @@ def test_a_start_that_is_soon_far_behind_another_of_the_same_effect_is_given_up(
     begun = [(OFFSET, 10.0), (OFFSET, 99.0), (OFFSET, 101.0), (WEIGHT, 500.0)]
     fits = [(effect, replace(stood, cost=cost)) for effect, cost in begun]
     assert candidates._not_far_behind(fits) == [fits[0], fits[1], fits[3]]
-
-
-def test_the_floors_of_a_rig_asked_again_are_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A search goes back and forth between two rigs: each was read anew every time."""
-    rig = nominal_rig(False)
-    record = made(tmp_path, rig, {}, 31).between(0.0, 12.0)
-    read = list[Rig]()
-    outputs, search = diagnosis._outputs, search_module.search
-
-    def counted(readers: list[Reader], *more: Any) -> list[Output]:
-        read.append(readers[0].rig)
-        return outputs(readers, *more)
-
-    def asked(case: Case, library: list[Effect]) -> tuple[Case, Choice]:
-        read.clear()
-        assert case.refloored is not None
-        for friction in (1.0, 2.0, 1.0, 2.0):
-            case.refloored(rig.changed({"controls.column.loader.friction_N": friction}))
-        assert len(read) == 2
-        return search(case, library)
-
-    monkeypatch.setattr(diagnosis, "_outputs", counted)
-    monkeypatch.setattr(diagnosis, "search_unrefuted", asked)
-    assert diagnosis.diagnose(rig, {"r": record}).verdict == "no_gap"
 
 
 def test_of_several_richer_laws_the_likeliest_is_named_and_what_is_near_it_a_rival(

@@ -132,9 +132,7 @@ class Case:
         found: dict[str, float] = {}
         for one in self.outputs:
             new = made.get((one.record, one.channel), one)
-            floor = max(
-                one.floor, hypot(min(one.own, new.own), new.carried) if new.carried else new.floor
-            )
+            floor = max(one.floor, hypot(min(one.own, new.own), new.carried))
             gap = one.gap(rig) * one.floor / floor
             if one.stage == "surface" and rig.flight != self.nominal.flight:
                 gap = min(gap, new.gap(rig))
