@@ -1,7 +1,7 @@
 """A diagnosis: where the gap lies, which effects cause it, how far it shrinks.
 
     prepare    how the machine is driven, where it trims, what can be judged (`prepare`)
-    search     the sets of effects that explain the outputs best
+    search     the sets of effects with the largest evidence (`beam`)
     findings   the verdict, each effect's probability and interval, and what else may be the cause
 
 The verdict is `no_gap` where every stage stays within its noise floor, `effect` where the residual
@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from coupled.gap.beam.histories import search as search_sets
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
@@ -23,7 +24,6 @@ from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.prepare import Prepared, prepare
-from coupled.gap.refuted import search_unrefuted
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.choose import Choice
 from coupled.gap.search.descent import Descent
@@ -44,15 +44,14 @@ def diagnose(
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
     workers: int = 0,
-    search: Search = search_unrefuted,
+    search: Search = search_sets,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
     `tell` is called with what is being done, and how much of how much is done. With records of the
     machine when it was well (`healthy`), the difference from those is judged (`healthy`). So many
     threads work as `workers`, 0 being one a core; the answer is that of one. `search` finds the
-    effects: `beam.beam.search_sets` is the one that is being built. Raises InputError where a
-    record cannot be of this rig, or lets no stage be judged.
+    effects. Raises InputError where a record cannot be of this rig, or lets no stage be judged.
     """
     with threads(workers):
         baseline = None
