@@ -25,8 +25,8 @@ from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
-from coupled.gap.search.choose import Choice
 from coupled.gap.search.descent import Descent
+from coupled.gap.search.found import Choice
 from coupled.parallel import threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
@@ -72,8 +72,8 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     effects = effects_of(case, choice, readers, stages)
     if unsure := incredible(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
-    last = choice.halves or choice.fit
-    fitted = case.fit(last.effects, "fitted", last.values, descent=Descent("own"), near=last)
+    own, found = Descent("own"), choice.fit
+    fitted = case.fit(found.effects, "fitted", found.values, descent=own)
     floors = floors_of(case, choice)
     budgets = [
         stage_budget(stage.name, case, choice.settled, choice.fit, floors)

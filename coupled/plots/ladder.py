@@ -12,7 +12,7 @@ from coupled.gap.chain import CHAIN, stage_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.summary import figure as written
 from coupled.gap.findings.summary import plain
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Found
 from coupled.gap.signals.output import stage_gaps
 from coupled.gap.thresholds import LEAST_GAIN, RIVAL_GAIN
 from coupled.plots import gapview as look

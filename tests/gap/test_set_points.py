@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from coupled.gap.diagnose import diagnose
+from coupled.gap.chain import STAGES
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
 from coupled.gap.prepare import readers_of
 from coupled.gap.signals.drives import as_counted, as_driven, in_set_points
+from coupled.gap.signals.output import Output
 from coupled.gap.stages.tried import tried_effects
 from coupled.record.record import Record
 from tests.support.machines import servo, servo_rig, set_points
@@ -67,7 +69,9 @@ def test_one_record_that_shows_set_points_is_enough_for_the_machine() -> None:
 
 def _tried(record: Record) -> list[Effect]:
     """Return the effects that a record of set points lets be tried."""
-    return tried_effects(EFFECTS, readers_of(servo_rig(), {"r": record}, "column"), [])
+    readers = readers_of(servo_rig(), {"r": record}, "column")
+    outputs = [Output(stage, stage, POINTS, lambda _: POINTS, 1.0, 50.0) for stage in STAGES]
+    return tried_effects(EFFECTS, readers, outputs)
 
 
 def test_set_points_whose_grip_nobody_recorded_have_a_limit_at_any_rate() -> None:

@@ -12,14 +12,24 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.effects.effect import apply
+from coupled.gap.beam.problem import Problem
+from coupled.gap.beam.screen import Screen
+from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.records import NOISE
 from tests.support.rigs import BENCH, bench
 
 LONG_s = 40.0
+
+
+def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
+    """Return where the fits of an effect start beside the nuisance parameters alone."""
+    problem = Problem(case)
+    found = Screen(problem).best(problem.fit(()), [effect])
+    return [start for one in found for start in one.starts]
 
 
 def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
-from coupled.gap.effects.library import BY_NAME, ONE_LAW
+from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.gain import likelier_by
 from coupled.gap.thresholds import RIVAL_GAIN
@@ -27,8 +27,15 @@ SAME = {
     ("asymmetric_friction",): ((PLAIN, "force_offset"), (YIELDS, "force_offset")),
     (PLAIN, "force_offset"): (("asymmetric_friction",), (YIELDS, "force_offset")),
 }
-# One law in a limit that a record may not leave; a contact may be stiff, too.
-NEAR = (*ONE_LAW, ("backlash", "soft_backlash"))
+# One law in a limit that a record may not leave: a rig that does not bend, a short lag, a lift that
+# is all of the angle of attack, a contact that is stiff.
+NEAR = (
+    ("force_zero", "force_offset"),
+    ("force_skew", "transport_delay"),
+    ("viscous_damping", "modifying_lag"),
+    ("mass", "lift_slope"),
+    ("backlash", "soft_backlash"),
+)
 # Laws that are the plainer one beside them where a record shows nothing of what they add: a mode
 # far above what the pilot excites is a bend, and a short dead time is a slower servo. The plainer
 # one is then named, and rightly.

@@ -29,10 +29,8 @@ from coupled.gap.beam.problem import Problem
 from coupled.gap.beam.screen import Screen, Screened
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.gain import Candidate
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Candidate, Choice, Found
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEAM_BESIDE,
@@ -168,6 +166,8 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     rounds = list[dict[str, float]]()
     _fit_sets(beam, [((e,), {}, beam.fits[front[0]]) for e in library if not e.free])
     for _ in range(BEAM_DEPTH):
+        if not front:
+            break
         base, known = beam.log(front[0]), set(beam.fits)
         for names in front:
             if wide := beam.open_outputs(names):

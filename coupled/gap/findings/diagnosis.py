@@ -17,14 +17,12 @@ from coupled.gap.findings.result import FORMAT, Findings
 from coupled.gap.findings.shrink import Shrink
 from coupled.gap.findings.summary import MISFIT, NOISE, filtered_words, summary
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
+from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Output
 from coupled.gap.signals.reading import worth_recording
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
-
-CIRCLED = "Effects displaced one another: the search ended where it came back to some of them."
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,6 @@ class Diagnosis(Findings):
         missed = self.baseline is not None and self.baseline.missed
         floor = MISFIT if missed else NOISE
         said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
-        said += f" {CIRCLED}" if self.choice.circled else ""
         held = "" if self.baseline is None else self.baseline.words
         return " ".join(words for words in (self.trim, held, said, *self.left_out) if words)
 
@@ -127,8 +124,6 @@ class Diagnosis(Findings):
             "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
         found |= {one.name: one.yields for one in self.settings if one.yields is not None}
-        if self.choice.circled:
-            found["circled"] = True
         if self.filtered:
             found["filtered"] = dict(self.filtered)
         if self.left_out:

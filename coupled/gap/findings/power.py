@@ -84,7 +84,7 @@ def _values(effect: Effect, size: float, nominal: Rig, control: ControlName) -> 
             value = start
         elif p.mode == "factor":
             off = size * (start - 1.0)
-            value = 1.0 + math.copysign(max(abs(off), effect.tolerance), off)
+            value = 1.0 + math.copysign(max(abs(off), p.tolerance), off)
         elif p.inverse:
             value = start / size
         else:
@@ -125,7 +125,7 @@ def _settings(nominal: Rig, control: ControlName, output: Output, effect: Effect
     """Return the signatures of a stage's settings, a column each."""
     columns = []
     known = settings(nominal, control, [output])
-    beside = [one for name, one in known.items() if name not in (effect.name, *effect.swallows)]
+    beside = [one for name, one in known.items() if name != effect.name]
     for setting in (*beside, *(contact(nominal, control) if effect.dry else ())):
         if output.stage in setting.shows_in:
             (number,) = setting.free

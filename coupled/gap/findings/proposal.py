@@ -2,7 +2,7 @@
 
 Each candidate test is flown by the rig with one rival, noise and all, and the record so made is
 fitted by both: the rival refitted, since without the refit any test would seem to separate them.
-What counts is by how much the true one then beats the other on held-out stretches.
+What counts is the log-likelihood by which the true one then beats the other.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.gain import ranked_by_gain
+from coupled.gap.search.found import Choice
+from coupled.gap.search.gain import likelier_by
 from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
@@ -110,12 +110,8 @@ def _gain(
     if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
         outputs += airframe_outputs(test.rig, record)
     case = Case(test.rig, control, outputs)
-    fits = [case.fit(effects, "fitted", start) for effects in pair]
-    settled = case.fit((), "fitted")
-    fitted = [(effects[-1], found) for effects, found in zip(pair, fits, strict=True)]
-    ranked = ranked_by_gain(outputs, settled, fitted)
-    gains = {candidate.effect.name: candidate.gain for candidate in ranked}
-    return gains[pair[0][-1].name] - gains[pair[1][-1].name]
+    right, wrong = (case.fit(effects, start=start) for effects in pair)
+    return likelier_by(outputs, right, wrong)
 
 
 def pushes(nominal: Rig, record: Record, control: ControlName) -> Iterator[Push]:

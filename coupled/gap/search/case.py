@@ -207,13 +207,12 @@ class Case:
         return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
 
     def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the settings whose number none of these effects frees, nor is the same law as.
+        """Return the settings whose number none of these effects frees.
 
         Where friction is filed, or among the effects, how far its contact yields is one.
         """
         freed = {p.key for effect in effects for p in effect.parameters}
-        same = {name for effect in effects for name in effect.swallows}
-        free = [one for name, one in self.settings.items() if name not in same]
+        free = list(self.settings.values())
         if any(effect.dry for effect in effects) or is_dry(self.nominal, self.control):
             free += [one for one in self.contact if self._unsettled & {*one.shows_in}]
         return [one for one in free if freed.isdisjoint(p.key for p in one.free)]

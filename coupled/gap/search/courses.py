@@ -29,8 +29,8 @@ def course_in(effect: Effect, case: Case, found: Fit, records: list[Record]) -> 
         return None
     most = max(parts, key=lambda k: sum(float(action @ action) for action, _ in parts[k]))
     record, rate_Hz = records[most], case.nominal.frame_rate
-    if effect.events is not None:
-        at_s = effect.events(record)
+    if effect.sampled is not None and effect.sampled.times is not None:
+        at_s = effect.sampled.times(record)
         return course_of_events(at_s, len(record) / rate_Hz) if at_s.size else None
     if effect.free[0].inverse:
         return None
@@ -49,7 +49,8 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     """
     number = effect.free[0] if effect.free else None
     sized = number is not None and not number.inverse and not effect.gradual
-    if not sized or effect.events is not None or case.timing(effect) is not None:
+    events = effect.sampled is not None and effect.sampled.times is not None
+    if not sized or events or case.timing(effect) is not None:
         return None
     alone = case.fit((effect,))
     parts = _parts(effect, case, alone)

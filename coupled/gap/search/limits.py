@@ -3,8 +3,8 @@
 A limit that only the peaks of a record meet is a tenth below them: sizes that are a factor of three
 apart are either never met, or cut so much off that the effect looks like none of the residual.
 
-A servo that a limit of its acceleration makes swing answers so steeply that a fit from 3 % off ends
-in a hollow. Such an effect is in reserve, tried where nothing else explains: many are worth it.
+A servo's limit is inside its feedback, and its answer so steep that a fit from 3 % off ends in a
+local minimum: limits 2 % apart are tried as well.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 
 from coupled.gap.effects.effect import Effect
-from coupled.gap.thresholds import LIMIT_BISECTIONS, LIMIT_SHARES, RESERVE_SHARES
+from coupled.gap.thresholds import LIMIT_BISECTIONS, LIMIT_SHARES, SERVO_SHARES
 
 
 def is_limit(effect: Effect) -> bool:
@@ -24,9 +24,8 @@ def is_limit(effect: Effect) -> bool:
 def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
     """Return sets of limits to try, from the largest one that shows on, in the limit's own unit.
 
-    Of each set the best is a start; of an effect in reserve that of many stands beside that of few.
-    `shows` tells of a limit whether it changes what is predicted. None where not even the lowest
-    does.
+    Of each set the best is a start. `shows` tells of a limit whether it changes what is predicted.
+    None where not even the lowest does.
     """
     number = effect.free[0]
     low, high = math.log(number.low), math.log(number.high)
@@ -35,6 +34,6 @@ def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
     for _ in range(LIMIT_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
-    sets = (LIMIT_SHARES, RESERVE_SHARES) if effect.reserve else (LIMIT_SHARES,)
+    sets = (LIMIT_SHARES, SERVO_SHARES) if effect.stage == "linkage" else (LIMIT_SHARES,)
     most = math.exp(low)
     return [[max(share * most, number.low) for share in shares] for shares in sets]

@@ -345,7 +345,9 @@ class Reader(Reading):
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""
-        return [self._output("compensation", *compensated(self))]
+        name, estimate, predict, floor, carried = compensated(self)
+        found = self._output("compensation", name, estimate, predict, floor)
+        return [replace(found, smoothed=carried / floor) if floor else found]
 
     def _surface(self) -> list[Output]:
         points = None if self.rig.flight is None else self.surface_points(self.rig, self.control)

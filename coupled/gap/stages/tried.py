@@ -35,7 +35,10 @@ def tried_effects(
     records, control = [reader.record for reader in readers], readers[0].control
     known = [effect for effect in library if effect.can_be_tried(records, control)]
     known = as_judged(known, readers, outputs)
-    return _under_set_points(known, records, control) if readers[0].set_points else known
+    if readers[0].set_points:
+        known = _under_set_points(known, records, control)
+    judged = {output.stage for output in outputs}
+    return [effect for effect in known if judged & {*effect.shows_in}]
 
 
 def as_judged(
