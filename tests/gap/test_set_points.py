@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupled.gap.diagnose import diagnose
 from coupled.gap.chain import STAGES
+from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.nominal import fit_nominal
