@@ -1,0 +1,119 @@
+"""What changes no answer: order and names of data, how it is cut, and what is irrelevant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupled.gap.beam.beam import search_sets
+from coupled.gap.diagnose import Diagnosis, diagnose
+from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.entries import added
+from coupled.gap.prepare import prepare
+from coupled.record.record import Record
+from coupled.rig.rigfile import rig_from_table
+from tests.support import records
+from tests.support.gaps import made, nominal_rig
+from tests.support.rigs import BENCH
+
+RIG = nominal_rig(False)
+BEND_m_per_N = 1.6e-4
+WITH_A_BEND = {"bend": {"bend_{d}_per_N": BEND_m_per_N}}
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """A record of 40 s of a bench that bends more than its rig file says: of the linkage alone."""
+    whole = made(tmp_path_factory.mktemp("bent"), RIG, WITH_A_BEND, 3)
+    kept = ("time_s", *(f"column_{name}" for name in ("force_N", "computed_m", "deflection_m")))
+    return Record(kept, np.column_stack([whole[name] for name in kept]))
+
+
+def bend_of(found: Diagnosis) -> tuple[float, float]:
+    """Return the bend found, the only effect, and the half width of its interval, m/N."""
+    (effect,) = found.effects
+    assert (found.verdict, effect.name) == ("effect", "bend"), found.summary
+    (number,) = effect.parameters
+    assert number.low is not None
+    assert number.high is not None
+    return number.value, 0.5 * (number.high - number.low)
+
+
+def test_the_order_of_channels_changes_nothing(bent: Record) -> None:
+    order = np.random.default_rng(1).permutation(len(bent.channels))
+    turned = Record(tuple(bent.channels[i] for i in order), bent.data[:, order])
+    one, other = (diagnose(RIG, {"r": record}).as_dict() for record in (bent, turned))
+    assert one == other
+
+
+def test_the_order_of_records_changes_nothing(bent: Record) -> None:
+    halves = {"a": bent.between(0.0, 12.0), "b": bent.between(12.0, 26.0)}
+    first = bend_of(diagnose(RIG, halves))
+    last = bend_of(diagnose(RIG, dict(reversed(halves.items()))))
+    assert last == pytest.approx(first, rel=1e-4)
+
+
+def test_a_record_cut_in_two_gives_the_same_answer(bent: Record) -> None:
+    value, half = bend_of(diagnose(RIG, {"r": bent}))
+    cut = {"a": bent.between(0.0, 20.0), "b": bent.between(20.0, 40.1)}
+    again, _ = bend_of(diagnose(RIG, cut))
+    assert abs(again - value) < half
+    assert abs(value - BEND_m_per_N) < half
+
+
+def test_more_of_the_same_data_narrows_an_interval(bent: Record) -> None:
+    """Beside the model error of 1.5 % of the change, which no data narrow."""
+    short, whole = (bend_of(diagnose(RIG, {"r": bent.between(0.0, s)}))[1] for s in (8.0, 40.1))
+    assert whole < short
+
+
+def test_a_control_by_another_name_has_the_same_answer(bent: Record) -> None:
+    pedals = {**BENCH["controls"]["column"], "surface": "rudder"}
+    rig = rig_from_table({**BENCH, "frame_rate_Hz": 120.0, "controls": {"pedals": pedals}}, "bench")
+    names = tuple(name.replace("column_", "pedals_") for name in bent.channels)
+    found = diagnose(rig, {"r": Record(names, bent.data)}, "pedals")
+    assert bend_of(found) == pytest.approx(bend_of(diagnose(RIG, {"r": bent})), rel=1e-6)
+
+
+def test_an_irrelevant_effect_in_the_library_changes_no_answer(bent: Record) -> None:
+    """Its number is one of the surface, which a bench does not have."""
+    prepared = prepare(RIG, {"r": bent})
+    numbers = (added("play_norm", "rigging.play_norm", 0.0, 0.5, 0.01),)
+    for stage in ("linkage", "sensing"):
+        irrelevant = Effect("irrelevant", stage, numbers, Signature("force", "bent"))
+        _, without = search_sets(prepared.case, prepared.library)
+        _, beside = search_sets(prepared.case, [irrelevant, *prepared.library])
+        assert [one.effect for one in beside.steps] == [one.effect for one in without.steps]
+        assert beside.fit.values == pytest.approx(without.fit.values, rel=1e-6)
+
+
+@pytest.mark.parametrize(("times", "seed"), [(0.3, 21), (1.0, 22), (3.0, 23)])
+def test_a_healthy_record_with_other_noise_has_no_gap(
+    tmp_path: Path, times: float, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, level in records.NOISE.items():
+        monkeypatch.setitem(records.NOISE, name, times * level)
+    found = diagnose(RIG, {"r": made(tmp_path, RIG, {}, seed).between(0.0, 20.0)})
+    assert (found.verdict, found.effects) == ("no_gap", ()), found.summary
+
+
+def test_a_pair_is_ambiguous_until_the_test_that_separates_it(tmp_path: Path) -> None:
+    """At one q̄ a wrong pressure scale and a wrong slope of the schedule are one factor of G_T."""
+    rig = RIG.changed(
+        {
+            "controls.column.schedule.dynamic_pressure_Pa": [0.0, 1000.0, 2000.0, 3000.0],
+            "controls.column.schedule.total_gradient_N_per_m": [700.0, 1500.0, 1700.0, 2300.0],
+        }
+    )
+    whole = made(tmp_path, rig, {"schedule_slope": {"factor": 1.1}}, 5)
+    kept = ("time_s", "dynamic_pressure_Pa", "column_gradient_N_per_m")
+    record = Record(kept, np.column_stack([whole[name] for name in kept]))
+    first, second = record.between(0.0, 8.9), record.between(9.0, 40.1)
+    alone = diagnose(rig, {"a": first})
+    assert alone.verdict == "ambiguous"
+    assert {"schedule_slope", "pressure_scale"} <= set(alone.rivals[0])
+    both = diagnose(rig, {"a": first, "b": second})
+    assert (both.verdict, [one.name for one in both.effects]) == ("effect", ["schedule_slope"])
+    assert both.rivals == ()
