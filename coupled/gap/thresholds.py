@@ -189,7 +189,8 @@ SERVO_SHARES = tuple(0.98**k for k in range(1, 161))  # chosen: and of a servo, 
 LIMIT_SHARES = (0.98, 0.95, 0.9, 0.84, 0.76, 0.65, 0.5, 0.35, 0.2, 0.1, 0.04)  # chosen
 SCREEN_SHOWN = 1e-4  # chosen: mean square of a signature, floors², from which a size does something
 
-# Where a fit of a ripple starts (`ripples`).
+# Where a fit starts as the residuals show it (`effects/seen`).
+STOP_PASSED = 0.02  # chosen: of the motion's range, by which the nominal rig passes a stop at least
 RIPPLE_LEAST = 1.5  # chosen: periods within the deflections met, fewer of which are a spring's law
 RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: the most of them, and how many are tried
 

@@ -19,74 +19,72 @@ from tests.support.gaps import made, nominal_rig
 from tests.support.rigs import BENCH
 
 RIG = nominal_rig(False)
-BEND_m_per_N = 1.6e-4
-WITH_A_BEND = {"bend": {"bend_{d}_per_N": BEND_m_per_N}}
+PLAY_m = 1.5e-3
 
 
 @pytest.fixture(scope="module")
-def bent(tmp_path_factory: pytest.TempPathFactory) -> Record:
-    """A record of 40 s of a bench that bends more than its rig file says: of the linkage alone."""
-    whole = made(tmp_path_factory.mktemp("bent"), RIG, WITH_A_BEND, 3)
+def worn(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """A record of 40 s of a bench with play: what judges the linkage alone."""
+    whole = made(tmp_path_factory.mktemp("worn"), RIG, {"backlash": {"play_{d}": PLAY_m}}, 3)
     kept = ("time_s", *(f"column_{name}" for name in ("force_N", "computed_m", "deflection_m")))
     return Record(kept, np.column_stack([whole[name] for name in kept]))
 
 
-def bend_of(found: Diagnosis) -> tuple[float, float]:
-    """Return the bend found, the only effect, and the half width of its interval, m/N."""
+def play_of(found: Diagnosis) -> tuple[float, float]:
+    """Return the play found, the only effect, and the half width of its interval, m."""
     (effect,) = found.effects
-    assert (found.verdict, effect.name) == ("effect", "bend"), found.summary
+    assert (found.verdict, effect.name) == ("effect", "backlash"), found.summary
     (number,) = effect.parameters
     assert number.low is not None
     assert number.high is not None
     return number.value, 0.5 * (number.high - number.low)
 
 
-def test_the_order_of_channels_changes_nothing(bent: Record) -> None:
-    order = np.random.default_rng(1).permutation(len(bent.channels))
-    turned = Record(tuple(bent.channels[i] for i in order), bent.data[:, order])
-    one, other = (diagnose(RIG, {"r": record}).as_dict() for record in (bent, turned))
+def test_the_order_of_channels_changes_nothing(worn: Record) -> None:
+    order = np.random.default_rng(1).permutation(len(worn.channels))
+    turned = Record(tuple(worn.channels[i] for i in order), worn.data[:, order])
+    one, other = (diagnose(RIG, {"r": record}).as_dict() for record in (worn, turned))
     assert one == other
 
 
-def test_the_order_of_records_changes_nothing(bent: Record) -> None:
-    halves = {"a": bent.between(0.0, 12.0), "b": bent.between(12.0, 26.0)}
-    first = bend_of(diagnose(RIG, halves))
-    last = bend_of(diagnose(RIG, dict(reversed(halves.items()))))
+def test_the_order_of_records_changes_nothing(worn: Record) -> None:
+    halves = {"a": worn.between(0.0, 12.0), "b": worn.between(12.0, 26.0)}
+    first = play_of(diagnose(RIG, halves))
+    last = play_of(diagnose(RIG, dict(reversed(halves.items()))))
     assert last == pytest.approx(first, rel=1e-4)
 
 
-def test_a_record_cut_in_two_gives_the_same_answer(bent: Record) -> None:
-    value, half = bend_of(diagnose(RIG, {"r": bent}))
-    cut = {"a": bent.between(0.0, 20.0), "b": bent.between(20.0, 40.1)}
-    again, _ = bend_of(diagnose(RIG, cut))
+def test_a_record_cut_in_two_gives_the_same_answer(worn: Record) -> None:
+    value, half = play_of(diagnose(RIG, {"r": worn}))
+    cut = {"a": worn.between(0.0, 20.0), "b": worn.between(20.0, 40.1)}
+    again, _ = play_of(diagnose(RIG, cut))
     assert abs(again - value) < half
-    assert abs(value - BEND_m_per_N) < half
+    assert abs(value - PLAY_m) < half
 
 
-def test_more_of_the_same_data_narrows_an_interval(bent: Record) -> None:
+def test_more_of_the_same_data_narrows_an_interval(worn: Record) -> None:
     """Beside the model error of 1.5 % of the change, which no data narrow."""
-    short, whole = (bend_of(diagnose(RIG, {"r": bent.between(0.0, s)}))[1] for s in (8.0, 40.1))
+    short, whole = (play_of(diagnose(RIG, {"r": worn.between(0.0, s)}))[1] for s in (8.0, 40.1))
     assert whole < short
 
 
-def test_a_control_by_another_name_has_the_same_answer(bent: Record) -> None:
+def test_a_control_by_another_name_has_the_same_answer(worn: Record) -> None:
     pedals = {**BENCH["controls"]["column"], "surface": "rudder"}
     rig = rig_from_table({**BENCH, "frame_rate_Hz": 120.0, "controls": {"pedals": pedals}}, "bench")
-    names = tuple(name.replace("column_", "pedals_") for name in bent.channels)
-    found = diagnose(rig, {"r": Record(names, bent.data)}, "pedals")
-    assert bend_of(found) == pytest.approx(bend_of(diagnose(RIG, {"r": bent})), rel=1e-6)
+    names = tuple(name.replace("column_", "pedals_") for name in worn.channels)
+    found = diagnose(rig, {"r": Record(names, worn.data)}, "pedals")
+    assert play_of(found) == pytest.approx(play_of(diagnose(RIG, {"r": worn})), rel=1e-6)
 
 
-def test_an_irrelevant_effect_in_the_library_changes_no_answer(bent: Record) -> None:
+def test_an_irrelevant_effect_in_the_library_changes_no_answer(worn: Record) -> None:
     """Its number is one of the surface, which a bench does not have."""
-    prepared = prepare(RIG, {"r": bent})
+    prepared = prepare(RIG, {"r": worn})
     numbers = (added("play_norm", "rigging.play_norm", 0.0, 0.5, 0.01),)
-    for stage in ("linkage", "sensing"):
-        irrelevant = Effect("irrelevant", stage, numbers, Signature("force", "bent"))
-        _, without = search_sets(prepared.case, prepared.library)
-        _, beside = search_sets(prepared.case, [irrelevant, *prepared.library])
-        assert [one.effect for one in beside.steps] == [one.effect for one in without.steps]
-        assert beside.fit.values == pytest.approx(without.fit.values, rel=1e-6)
+    irrelevant = Effect("irrelevant", "linkage", numbers, Signature("force", "bent"))
+    _, without = search_sets(prepared.case, prepared.library)
+    _, beside = search_sets(prepared.case, [irrelevant, *prepared.library])
+    assert [one.effect for one in beside.steps] == [one.effect for one in without.steps]
+    assert beside.fit.values == pytest.approx(without.fit.values, rel=1e-6)
 
 
 @pytest.mark.parametrize(("times", "seed"), [(0.3, 21), (1.0, 22), (3.0, 23)])

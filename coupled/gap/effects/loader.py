@@ -7,8 +7,7 @@ from dataclasses import replace
 from coupled.gap.effects.effect import OTHER_FORCE, Effect, Parameter, Signature
 from coupled.gap.effects.entries import SETTING, added, factor, limit, one, switch, value
 from coupled.gap.effects.frictions import FRICTIONS
-from coupled.gap.effects.ripples import ripples
-from coupled.gap.effects.stops import stops
+from coupled.gap.effects.seen import ripples, stops
 from coupled.gap.thresholds import CLOCK_s
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from coupled.gap.effects.effect import Effect, Parameter, Sampled, Signature
 from coupled.gap.effects.entries import added, exact, factor, one, value
-from coupled.gap.effects.hums import hums
+from coupled.gap.effects.seen import hums
 from coupled.gap.signals.missed import shares_missed, spread_of_missed, times_missed
 from coupled.gap.thresholds import CLOCK_s
 
