@@ -13,7 +13,7 @@ from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
 from coupled.gap.beam.problem import Problem
-from coupled.gap.beam.screen import Screen
+from coupled.gap.beam.screen import Screen, Worth
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
@@ -28,7 +28,9 @@ LONG_s = 40.0
 def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
     """Return where the fits of an effect start beside the nuisance parameters alone."""
     problem = Problem(case)
-    found = Screen(problem).best(problem.fit(()), [effect])
+    root, every = problem.fit(()), np.full(len(case.outputs), 1e6)
+    screen = Screen(problem, problem.variances(root.rig))
+    found = screen.best(root, [effect], Worth(0.0, every))
     return [start for one in found for start in one.starts]
 
 

@@ -16,7 +16,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
@@ -103,6 +103,17 @@ class Problem:
                 half = NORMAL_95 * prior.sigma
                 values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
         return self.rig_of((), values) or self.case.nominal
+
+    def surely_open(self, settled: Rig) -> Problem:
+        """Return the problem in which a gap that this rig leaves is held to noise alone."""
+        anew = Problem(self.case.surely_open(settled))
+        anew._known.update(self._known)  # no fit asks for a limit
+        return anew
+
+    def over_limit(self, rig: Rig) -> set[str]:
+        """Return the outputs of which a rig leaves more than noise may, by the noise known."""
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        return {at for at, gap in gaps.items() if gap > limits[at]}
 
     @cached_property
     def by_shots(self) -> Problem | None:
