@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from coupled.gap.beam.histories import search as search_sets
+from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
@@ -73,7 +74,7 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
     if unsure := incredible(choice, effects):
         stages = replace(judge, doubted=unsure).stages()
     own, found = Descent("own"), choice.fit
-    fitted = case.fit(found.effects, "fitted", found.values, descent=own)
+    fitted = Problem(case).fit(found.effects, found.values, descent=own, part="fitted")
     floors = floors_of(case, choice)
     budgets = [
         stage_budget(stage.name, case, choice.settled, choice.fit, floors)

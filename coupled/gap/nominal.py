@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.gap.beam.fit import Group, SetFit, fit_alone
 from coupled.gap.checks import check_record
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.freed import default_keys, freed
 from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
 from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
-from coupled.gap.search.fit import Fit, fit, touched
+from coupled.gap.search.fit import Fit, touched
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
@@ -80,9 +81,9 @@ def fit_nominal(
             problem = f"nothing in these records depends on it; they lack {needs}"
             raise InputError(next(iter(records)), key, problem)
     _tell(tell, "fitting", 0, len(records) + 2)
-    held = fit(rig, control, outputs, effects, part="fitted")
+    held = fit_alone(rig, control, outputs, effects, part="fitted")
     _tell(tell, "fitting to all", 1, len(records) + 2)
-    whole = fit(rig, control, outputs, effects, start=held.values)
+    whole = fit_alone(rig, control, outputs, effects, held.values)
     each = _each(rig, control, outputs, effects, whole, tell)
     numbers = tuple(
         _number(rig, control, key, effect, whole, each)
@@ -96,7 +97,7 @@ def fit_nominal(
         control,
         known,
         numbers,
-        tuple(one for group in whole.information.items() for one in _alike(rig, control, *group)),
+        tuple(one for group in whole.groups.values() for one in _alike(group)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         doubts,
     )
@@ -176,14 +177,14 @@ def _each(
     effects: Sequence[Effect],
     whole: Fit,
     tell: Tell | None,
-) -> list[Fit]:
+) -> list[SetFit]:
     """Return a fit to each record alone; none where there is one record."""
     records = sorted({output.record for output in outputs})
     found = []
     for i, record in enumerate(records if len(records) > 1 else []):
         _tell(tell, f"fitting to record {i + 1} alone", i + 2, len(records) + 2)
         ours = [output for output in outputs if output.record == record]
-        found.append(fit(rig, control, ours, effects, start=whole.values))
+        found.append(fit_alone(rig, control, ours, effects, whole.values))
     return found
 
 
@@ -230,19 +231,18 @@ def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
     return rig.changed({**changes, f"controls.{control}.tolerance": kept})
 
 
-def _alike(
-    rig: Rig, control: ControlName, names: tuple[str, ...], information: Floats
-) -> list[Alike]:
+def _alike(group: Group) -> list[Alike]:
     """Return the numbers of a group whose signatures nearly add up to nothing.
 
     By the small eigenvalues of the signatures' cosines: where each number may be moved as far as
     the others make good again.
     """
+    information = group.information
     size = np.sqrt(np.diag(information))
     moved = size > 0.0
     if moved.sum() < 2:
         return []
-    keys = [name.rstrip(".") for name in names]  # of numbers without a name of their own
+    keys = [name.rstrip(".") for name in group.values]  # of numbers without a name of their own
     shown = [key for key, on in zip(keys, moved, strict=True) if on]
     cosines = information[np.ix_(moved, moved)] / np.outer(size[moved], size[moved])
     strengths, directions = np.linalg.eigh(cosines)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from coupled.gap import diagnose as diagnosing
+from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
@@ -203,10 +204,10 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(
     record = Record(
         ("time_s", "dynamic_pressure_Pa"), np.column_stack((np.arange(frames) / rate_Hz, pressure))
     )
-    found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
+    found = credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0)
     assert found.value > 0.99 if lag_s else found.value < 0.1
     monkeypatch.setattr(credible, "part_of_a_curve", lambda *_: 0.4)
-    assert credibility(lag, case, case.fit((lag,)), [record], 0.0).curve == 0.4
+    assert credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0).curve == 0.4
 
 
 @pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
@@ -35,7 +36,7 @@ def test_less_friction_than_filed_is_fitted_down_to_none(tmp_path: Path) -> None
     case, effect = Case(rig, "column", outputs(rig, record)), BY_NAME["coulomb_friction"]
     [start] = starts_of(case, effect)
     assert start["coulomb_friction.friction_N"] < 0.0
-    found = case.fit((effect,), start=start)
+    found = Problem(case).fit((effect,), start)
     assert found.rig.controls["column"].loader.friction == pytest.approx(0.0, abs=0.03)
     # None at all is an answer, and no end of a range.
     assert "coulomb_friction.friction_N" not in found.at_bound

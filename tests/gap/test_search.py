@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from coupled.gap.beam.beam import search_sets
+from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
@@ -68,7 +69,8 @@ def test_a_contact_is_looked_for_at_lengths_that_a_fit_does_not_come_to() -> Non
         length = 6.0 / stiffness if stiffness else 0.0
         return np.full(FRAMES, 30.0 if length < 2e-4 else 1e5 * (length - 4e-4))
 
-    found = Case(rig, "column", [Output("loader", "x", noise, moved, 1.0, 120.0)]).fit(())
+    case = Case(rig, "column", [Output("loader", "x", noise, moved, 1.0, 120.0)])
+    found = Problem(case).fit(())
     assert found.values["setting of the contact."] == pytest.approx(4e-4, rel=0.02)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
+from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
 from coupled.gap.search.gain import likelier_by
@@ -91,8 +92,8 @@ def not_distinguished(
         here = [n for n in effects if shown & {*BY_NAME[n].shows_in}]
         outputs = outputs_of(rig, record, "airframe" in shown)
         case = Case(rig, "column", [o for o in outputs if o.stage in shown])
-        right = case.fit([BY_NAME[n] for n in here], start=start)
-        wrong = case.fit([BY_NAME[other if n == name else n] for n in here])
+        right = Problem(case).fit([BY_NAME[n] for n in here], start)
+        wrong = Problem(case).fit([BY_NAME[other if n == name else n] for n in here])
         if likelier_by(case.outputs, right, wrong) < RIVAL_GAIN:
             yield reading({other, *effects} - {name}, sure=sure)
 

@@ -17,7 +17,7 @@ at a bound.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -33,9 +33,11 @@ from coupled.gap.search.descent import WHOLE, Descent, End
 from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.intervals import half_width, least_of, open_above, worth_of
 from coupled.gap.search.slopes import Slope
-from coupled.gap.signals.output import Output, memory
+from coupled.gap.signals.output import Output, Part, memory
 from coupled.gap.thresholds import FIT_LEGS, WEIGHT_CHANGED
 from coupled.parallel import go_on
+from coupled.record.channels import ControlName
+from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
 Normal = tuple[float, float]  # mean and standard deviation
@@ -77,8 +79,9 @@ def fit_set(
     start: Mapping[str, float],
     parent: SetFit | None = None,
     descent: Descent = WHOLE,
+    part: Part = "all",
 ) -> SetFit:
-    """Return the effects fitted to the whole record, with the nuisance parameters free.
+    """Return the effects fitted to a part of the record, with the nuisance parameters free.
 
     A fit starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. Effects that share no output are fitted apart; of `parent` the groups that are the
@@ -94,7 +97,7 @@ def fit_set(
     for members in grouped(every):
         known = None if parent is None else parent.groups.get(tuple(members))
         if known is None:
-            known = _remembered(case, members, priors, start, descent, parent)
+            known = _remembered(case, members, priors, start, descent, parent, part)
         groups[tuple(members)] = known
         low, high, bound = low | known.low, high | known.high, bound + known.at_bound
         values, cost = values | known.values, cost + known.cost
@@ -102,6 +105,18 @@ def fit_set(
     if rig is None:
         rig, bound = case.nominal, tuple(values)
     return SetFit(tuple(effects), values, low, high, bound, rig, cost, groups=groups)
+
+
+def fit_alone(
+    rig: Rig,
+    control: ControlName,
+    outputs: Sequence[Output],
+    effects: Sequence[Effect],
+    start: Mapping[str, float] | None = None,
+    part: Part = "all",
+) -> SetFit:
+    """Return effects fitted to a part of some outputs, without nuisance parameters."""
+    return fit_set(Case(rig, control, outputs), effects, (), {}, start or {}, part=part)
 
 
 def grouped(effects: Sequence[Effect]) -> list[list[Effect]]:
@@ -126,18 +141,19 @@ def _remembered(
     start: Mapping[str, float],
     descent: Descent,
     parent: SetFit | None,
+    part: Part,
 ) -> Group:
     """Return a fit, as it is known; one that starts where another ended is that one."""
     ours, known = touched(case.outputs, members), descent.known
     if descent.most < WHOLE.most and parent is not None:
         descent = replace(descent, held=_held(case, ours, _free(members)[0], parent))
     if known is None:
-        return _fit(case, ours, members, priors, start, descent)
+        return _fit(case, ours, members, priors, start, descent, part)
     wide = any(output.stepped for output in ours) and descent.steps == "wide"
-    what = (tuple(members), wide, descent.most)
+    what = (tuple(members), wide, descent.most, part)
     key = (*what, tuple(map(tuple, _starts(members, start))))
     if key not in known:
-        known[key] = found = _fit(case, ours, members, priors, start, descent)
+        known[key] = found = _fit(case, ours, members, priors, start, descent, part)
         known[*what, (tuple(found.values.values()),)] = found
     held: Group = known[key]
     return held
@@ -173,6 +189,7 @@ def _fit(
     priors: Mapping[str, Normal],
     start: Mapping[str, float],
     descent: Descent = WHOLE,
+    part: Part = "all",
     legs: int = FIT_LEGS,
 ) -> Group:
     """Return a fit; by the loader's own steps it goes on until its weights are those of its end."""
@@ -182,14 +199,15 @@ def _fit(
         known = dict(zip(keys, _starts(effects, start)[0], strict=True))
         return Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
     scale = np.array([_scale(p) for p in frees])
+    frames = [int(np.count_nonzero(output.rows(part))) for output in ours]
 
     def plain(scaled: Floats, wide: bool = False, rough: bool = False) -> list[Floats]:
         go_on()
         values = dict(zip(keys, (scaled * scale).tolist(), strict=True))
         rig = possible(nominal, control, effects, values)
         if rig is None:
-            return [np.full(len(output.measured), _FAR) for output in ours]
-        return [output.residual(rig, "all", wide, rough) for output in ours]
+            return [np.full(count, _FAR) for count in frames]
+        return [output.residual(rig, part, wide, rough) for output in ours]
 
     firsts = [np.array(first) / scale for first in _starts(effects, start)]
     units = [_unit(left) for left in plain(firsts[0], wide=True)]
@@ -213,7 +231,7 @@ def _fit(
     def with_prior(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         return np.concatenate((residual(scaled, wide, rough), prior.rows(scaled)))
 
-    rows = np.repeat(weights, [len(output.measured) for output in ours])
+    rows = np.repeat(weights, frames)
     before, held = descent.slopes.get(tuple(keys)), descent.held
     slope = None if before is None else prior.in_slope(before, rows)
     if held is not None:
@@ -232,12 +250,15 @@ def _fit(
             edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
-    changed = _changed(units, best, ours, weights)
+    free = _Free(keys, frees, scale, ends, weights, frames)
+    changed = _changed(units, best, free)
     if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
         again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
-        return _fit(case, ours, effects, priors, again, replace(descent, slopes={}), legs - 1)
+        rest = replace(descent, slopes={})
+        return _fit(case, ours, effects, priors, again, rest, part, legs - 1)
     best = replace(best, slope=None if held is not None else _plain(best.slope, rows))
-    return _group(case, ours, _Free(keys, frees, scale, ends, weights), best, prior, cost)
+    number = [1000 * output.record + output.stretches[output.rows(part)] for output in ours]
+    return _group(case, np.concatenate(number), free, best, prior, cost)
 
 
 class Cost(Protocol):
@@ -251,7 +272,7 @@ class Cost(Protocol):
 class _Free:
     """The free parameters of a fit: their keys, and what scales them; `ends` are their bounds.
 
-    `weights` are those of the outputs' residuals.
+    `weights` are those of the outputs' residuals, and `frames` how many each has.
     """
 
     keys: list[str]
@@ -259,11 +280,18 @@ class _Free:
     scale: Floats
     ends: Floats
     weights: list[float]
+    frames: list[int]
+
+    def parts(self) -> Iterator[tuple[slice, float]]:
+        """Yield each output's rows of a fit, and their weight."""
+        edges = np.cumsum([0, *self.frames]).tolist()
+        for (first, last), weight in zip(pairwise(edges), self.weights, strict=True):
+            yield slice(first, last), weight
 
 
 def _group(
     case: Case,
-    ours: Sequence[Output],
+    stretches: NDArray[np.intp],
     free: _Free,
     best: End,
     prior: _Priors,
@@ -271,11 +299,11 @@ def _group(
 ) -> Group:
     """Return a fit that ended: its values with their intervals, and which are at a bound.
 
-    `cost` is that with one parameter elsewhere.
+    `stretches` number the rows' stretches, `cost` is that with one parameter elsewhere.
     """
     (low, high), scale = free.ends / free.scale, free.scale
-    number = [1000 * output.record + output.stretches for output in ours]
-    half = half_width(best, len(ours), np.concatenate(number), prior.precision) * scale
+    outputs = len(free.frames)
+    half = half_width(best, outputs, stretches, prior.precision) * scale
     # Where all that is filed is taken off, nothing is left of it: that is an answer.
     gone = np.isclose(best.x, low, atol=1e-4) & (free.ends[0] < [p.low for p in free.numbers])
     values = np.where(gone, free.ends[0], best.x * scale)
@@ -289,7 +317,7 @@ def _group(
     stuck |= ~np.isfinite(half) & ~np.array([p.may_end and p.inverse for p in free.numbers])
     lower, upper = values - half, values + half
     for k in (k for k, p in enumerate(free.numbers) if p.saturates):
-        span, unit = (float(low[k]), float(high[k])), worth_of(best, len(ours))
+        span, unit = (float(low[k]), float(high[k])), worth_of(best, outputs)
         open_one = open_above(partial(cost, k=k), float(best.x[k]), span, unit)
         if open_one is not None:
             values[k], lower[k], upper[k] = open_one[0] * scale[k], open_one[1] * scale[k], np.inf
@@ -300,7 +328,7 @@ def _group(
         dict(zip(free.keys, upper.tolist(), strict=True)),
         tuple(key for key, at in zip(free.keys, stuck, strict=True) if at),
         best.cost,
-        _information(best, ours, free.weights) / np.outer(scale, scale),
+        _information(best, free) / np.outer(scale, scale),
         prior.penalty(best.x),
         best.slope,
     )
@@ -311,13 +339,9 @@ def _unit(left: Floats) -> float:
     return max(float(np.mean(left**2)), 1.0) * memory(left)
 
 
-def _changed(
-    units: Sequence[float], end: End, ours: Sequence[Output], weights: Sequence[float]
-) -> float:
+def _changed(units: Sequence[float], end: End, free: _Free) -> float:
     """Return by what factor the outputs' units changed most in a weighted fit."""
-    edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
-    parts = zip(pairwise(edges), weights, strict=True)
-    ended = [_unit(end.fun[first:last] / weight) for (first, last), weight in parts]
+    ended = [_unit(end.fun[rows] / weight) for rows, weight in free.parts()]
     return max(max(a / b, b / a) for a, b in zip(units, ended, strict=True))
 
 
@@ -329,13 +353,12 @@ def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
     return Slope(slope.at, left / weights, jacobian / weights[:, None])
 
 
-def _information(end: End, ours: Sequence[Output], weights: Sequence[float]) -> Floats:
+def _information(end: End, free: _Free) -> Floats:
     """Return the information matrix of the log-likelihood at the end of a weighted fit."""
-    edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
     total = np.zeros((end.jac.shape[1], end.jac.shape[1]))
-    for (first, last), weight in zip(pairwise(edges), weights, strict=True):
-        jacobian = end.jac[first:last] / weight
-        total += jacobian.T @ jacobian / _unit(end.fun[first:last] / weight)
+    for rows, weight in free.parts():
+        jacobian = end.jac[rows] / weight
+        total += jacobian.T @ jacobian / _unit(end.fun[rows] / weight)
     return total
 
 

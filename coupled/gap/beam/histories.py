@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coupled.gap.beam.beam import search_sets
+from coupled.gap.beam.courses import in_time
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.courses import in_time
 from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import explained_below, stage_limits
 from coupled.gap.thresholds import LATER_LEFT, LATER_TRIED

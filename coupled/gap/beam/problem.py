@@ -16,7 +16,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.signals.output import Output, stage_gaps, stage_limits
+from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
@@ -77,8 +77,9 @@ class Problem:
         parent: SetFit | None = None,
         descent: Descent = WHOLE,
         near: SetFit | None = None,
+        part: Part = "all",
     ) -> SetFit:
-        """Return a set fitted together with the nuisance parameters to the whole record.
+        """Return a set fitted together with the nuisance parameters, to the whole record or a part.
 
         Groups of effects that `parent` has as well are taken over from it. `near` is a fit of the
         set that ended at the start.
@@ -87,7 +88,7 @@ class Problem:
         begun = self.case.with_contact(effects, free, start or {})
         slopes = {} if near is None else {tuple(g.values): g.slope for g in near.groups.values()}
         known = replace(descent, known=self._known, slopes=slopes)
-        return fit_set(self.case, effects, free, self.priors, begun, parent, known)
+        return fit_set(self.case, effects, free, self.priors, begun, parent, known, part)
 
     def rig_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> Rig | None:
         """Return the rig with a set of these values, None where the physics cannot give it."""

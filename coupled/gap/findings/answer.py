@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from coupled.gap.beam.courses import course_in
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect, Parameter, field_of
 from coupled.gap.effects.settings import contact, is_dry, settings
@@ -21,7 +22,6 @@ from coupled.gap.findings.result import (
 )
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
-from coupled.gap.search.courses import course_in
 from coupled.gap.search.found import Choice, Found
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader

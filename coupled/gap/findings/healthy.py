@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.display import unit_in
+from coupled.gap.beam.problem import Problem
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
 from coupled.gap.search.fit import Fit
@@ -110,10 +111,10 @@ def tolerances(case: Case, found: Fit) -> dict[str, float]:
     numbers = sorted({output.record for output in case.outputs})
     if len(numbers) > 1:
         parts = [[o for o in case.outputs if o.record == n] for n in numbers]
-        fits = [replace(case, outputs=p).fit(found.effects, start=found.values) for p in parts]
+        fits = [Problem(replace(case, outputs=p)).fit(found.effects, found.values) for p in parts]
     else:
         halves: tuple[Part, ...] = ("fitted", "held")
-        fits = [case.fit(found.effects, half, found.values) for half in halves]
+        fits = [Problem(case).fit(found.effects, found.values, part=half) for half in halves]
     wide = {}
     for effect in found.effects:
         for p in effect.free:

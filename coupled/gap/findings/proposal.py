@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
+from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.flown import fly_force
@@ -110,7 +111,7 @@ def _gain(
     if any(effect.stage == "airframe" for effect in pair[0] + pair[1]):
         outputs += airframe_outputs(test.rig, record)
     case = Case(test.rig, control, outputs)
-    right, wrong = (case.fit(effects, start=start) for effects in pair)
+    right, wrong = (Problem(case).fit(effects, start) for effects in pair)
     return likelier_by(outputs, right, wrong)
 
 

@@ -15,10 +15,9 @@ from coupled.gap.effects.library import LAG, STAMP
 from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
 from coupled.gap.search.course import Bounds
-from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.search.fit import Fit, fit, touched
+from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.timed import Timing, timed
-from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
+from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.record.channels import ControlName
 from coupled.rig.rig import Rig
@@ -144,7 +143,7 @@ class Case:
         limits = stage_limits(self.outputs)
         return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
 
-    def surely_open(self, settled: Rig | None = None) -> Case:
+    def surely_open(self, settled: Rig) -> Case:
         """Return the case in which a gap that no colour of noise explains is held to noise alone.
 
         What is not known of the colour of what drives a stage says whether it has a gap. Once it
@@ -152,8 +151,7 @@ class Case:
         """
         if not any(output.unsure for output in self.outputs):
             return self
-        rig = self.fit(()).rig if settled is None else settled
-        settled_gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        settled_gaps, limits = stage_gaps(self.outputs, settled), stage_limits(self.outputs)
         outputs = [
             replace(one, unsure=0.0) if settled_gaps[one.stage] > limits[one.stage] else one
             for one in self.outputs
@@ -223,26 +221,6 @@ class Case:
         every = (*effects, *self.nuisances(found.effects))
         rig = possible(self.nominal, self.control, every, {**self.neutral, **found.values})
         return self.nominal if rig is None else rig
-
-    def fit(
-        self,
-        effects: Sequence[Effect],
-        part: Part = "all",
-        start: Mapping[str, float] | None = None,
-        only: Effect | None = None,
-        descent: Descent = WHOLE,
-        near: Fit | None = None,
-    ) -> Fit:
-        """Return the effects fitted, with the settings free within their tolerance.
-
-        With `only`, just that one and what shares an output with it; the others stay. `near` is a
-        fit of this case that ended at the start.
-        """
-        free = self.nuisances(effects)
-        start = self.with_contact(effects, free, start or {})
-        given = (self.nominal, self.control, self.outputs, effects, free, part, start, only)
-        known = {} if near is None else near.slopes
-        return fit(*given, replace(descent, known=self._known, slopes=known))
 
     def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return fitted values without those of the contact, which a fit then seeks anew."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.case import Case
 from coupled.gap.search.course import Bounds, Course, course_of, course_of_events
@@ -52,7 +53,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
     events = effect.sampled is not None and effect.sampled.times is not None
     if not sized or events or case.timing(effect) is not None:
         return None
-    alone = case.fit((effect,))
+    alone = Problem(case).fit((effect,))
     parts = _parts(effect, case, alone)
     if len(parts) != 1:
         return None
@@ -64,7 +65,7 @@ def in_time(effect: Effect, case: Case) -> Case | None:
         return None
     anew = case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
     # By what it does at its true size: friction and play do not go straight with theirs.
-    ((_, ours),) = _parts(effect, case, anew.fit((effect,))).items()
+    ((_, ours),) = _parts(effect, case, Problem(anew).fit((effect,))).items()
     return case.timed(effect, timing_of(ours, rate_Hz), seen.onset_s)
 
 
