@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.beam.fit import Group, SetFit, fit_alone
+from coupled.gap.beam.fit import SetFit, fit_alone
 from coupled.gap.checks import check_record
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.freed import default_keys, freed
-from coupled.gap.nominalfit import Alike, ChannelFit, NominalFit, Number
+from coupled.gap.findings.inseparable import alike
+from coupled.gap.nominalfit import ChannelFit, NominalFit, Number
 from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
 from coupled.gap.search.fit import Fit, touched
@@ -30,19 +31,12 @@ from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.tried import as_judged
-from coupled.gap.thresholds import ALIKE, LEAST_SERVO_RATIO, SERVO_NEEDED, SHARES_IN
+from coupled.gap.thresholds import LEAST_SERVO_RATIO, SERVO_NEEDED
 from coupled.record.channels import ControlName
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 Floats = NDArray[np.float64]
-# Why two numbers may act alike, by the last parts of their keys.
-WHY = {
-    frozenset(("friction", "damping")): "all motion is at one speed",
-    frozenset(("friction", "offset")): "all motion is in one direction",
-    frozenset(("mass", "basic_gradient")): "all motion is at one frequency",
-    frozenset(("servo_frequency", "servo_damping_ratio")): "all motion is slow beside the servo",
-}
 
 
 def fit_nominal(
@@ -97,7 +91,7 @@ def fit_nominal(
         control,
         known,
         numbers,
-        tuple(one for group in whole.groups.values() for one in _alike(group)),
+        tuple(one for group in whole.groups.values() for one in alike(group)),
         tuple(_channel(output, rig, held.rig, files[output.record]) for output in used),
         doubts,
     )
@@ -229,40 +223,6 @@ def _known(rig: Rig, control: ControlName, numbers: Sequence[Number]) -> Rig:
     known = {**data.tolerance, **halves}
     kept = {key: half for key, half in known.items() if not key.startswith("flight.")}
     return rig.changed({**changes, f"controls.{control}.tolerance": kept})
-
-
-def _alike(group: Group) -> list[Alike]:
-    """Return the numbers of a group whose signatures nearly add up to nothing.
-
-    By the small eigenvalues of the signatures' cosines: where each number may be moved as far as
-    the others make good again.
-    """
-    information = group.information
-    size = np.sqrt(np.diag(information))
-    moved = size > 0.0
-    if moved.sum() < 2:
-        return []
-    keys = [name.rstrip(".") for name in group.values]  # of numbers without a name of their own
-    shown = [key for key, on in zip(keys, moved, strict=True) if on]
-    cosines = information[np.ix_(moved, moved)] / np.outer(size[moved], size[moved])
-    strengths, directions = np.linalg.eigh(cosines)
-    found = []
-    for strength, direction in zip(strengths, directions.T, strict=True):
-        if strength > ALIKE:
-            break
-        least = SHARES_IN * float(np.max(np.abs(direction)))
-        shares = [key for key, d in zip(shown, direction, strict=True) if abs(d) >= least]
-        found.append(Alike(tuple(shares), _why(shares)))
-    return found
-
-
-def _why(keys: Sequence[str]) -> str:
-    """Return why numbers act alike, where it is known."""
-    words = [key.partition(".")[2] for key in keys]
-    for pair, why in WHY.items():
-        if len(words) == 2 and all(any(w.startswith(name) for w in words) for name in pair):
-            return why
-    return ""
 
 
 def _channel(output: Output, before: Rig, after: Rig, file: str) -> ChannelFit:

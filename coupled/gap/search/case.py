@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
-from typing import Any
 
 import numpy as np
 
@@ -38,11 +37,8 @@ class Case:
     outputs: Sequence[Output]
     tell: Tell | None = None
     refloored: Callable[[Rig], Sequence[Output]] | None = None
-    # A model with an error of its own strains its settings: only a stage over its limit is guilty.
-    only_wide: bool = False
+    only_wide: bool = False  # the floors hold the error of a model of the healthy machine
     timings: Sequence[tuple[Effect, Timing, Bounds]] = ()
-    # Its fits: a case of other outputs, made by `replace`, begins with none.
-    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> dict[str, Effect]:
@@ -156,9 +152,7 @@ class Case:
             replace(one, unsure=0.0) if settled_gaps[one.stage] > limits[one.stage] else one
             for one in self.outputs
         ]
-        anew = replace(self, outputs=outputs)
-        anew._known.update(self._known)  # no fit asks for a limit
-        return anew
+        return replace(self, outputs=outputs)
 
     def heard_anew(self, rig: Rig) -> Case | None:
         """Return the case with the noise that a rig's residuals have; None where none is lower.

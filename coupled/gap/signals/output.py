@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -90,8 +90,8 @@ class Output:
     which they are those of every other stretch; `missed` are those that the host missed (`missed`).
     One is `stepped` whose prediction runs at the loader's own steps, finer than the frames, and
     that wider ones hardly change. `mismatch` is the gap beyond 1 that its settings' laws may leave.
-    `rough` predicts nearly as well with fewer replays, where slopes are asked for. `noises` are the
-    rms noises of what drives the stage, by the control's quantity. `unsure` is the part of the
+    `rough` predicts nearly as well with fewer replays, where slopes are asked for.
+    `unsure` is the part of the
     floor by which it may be too low, the colour of what drives the stage being what it may be.
     `shots` predicts by short replays, each begun as measured: what went before misleads none.
     One is `in_series` that is predicted by the loader and the linkage behind it, from the force.
@@ -114,7 +114,6 @@ class Output:
     stepped: bool = False
     mismatch: float = 0.0
     rough: Predict | None = field(default=None, repr=False, compare=False)
-    noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     unsure: float = 0.0
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)

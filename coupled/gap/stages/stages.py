@@ -341,7 +341,7 @@ class Reader(Reading):
         linkage = self._made("linkage", name, *made, driven_by, judged=self.judged)
         # A bend adds to δc; of set points the whole way is the servo's.
         handed_on = None if self.set_points else computed
-        return [replace(linkage, noises={"force": force.noise.rms}, handed_on=handed_on)]
+        return [replace(linkage, handed_on=handed_on)]
 
     def _compensation(self) -> list[Output]:
         """Return δ̂ against the host's arithmetic on what the record says that it read."""
