@@ -38,6 +38,7 @@ from coupled.gap.thresholds import (
     BEAM_DEPTH,
     BEAM_FIRST,
     BEAM_WIDTH,
+    BEGUN_BEHIND,
     GIVEN_UP,
     PRIOR_EFFECT,
     RIVAL_GAIN,
@@ -49,6 +50,7 @@ Floats = NDArray[np.float64]
 Names = frozenset[str]
 Start = dict[str, float]
 Try = tuple[tuple[Effect, ...], Start, SetFit]  # effects, where their fit starts, its parent
+Begun = tuple[float, SetFit, SetFit]  # log evidence of a begun fit, and its parent
 WIDE, OWN = Descent("wide"), Descent("own")
 FIRST, SHORT = Descent("wide", BEAM_FIRST), Descent("wide", SHOOTINGS)
 ABOVE = (1.05, 1.5)  # times the running friction, where the fit of a breakaway starts
@@ -203,6 +205,7 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
         new = set(beam.fits) - known
         if not new:
             break
+        _finish(beam)
         _shoot(beam)
         rounds.append({beam.fits[one].effects[-1].name: beam.log(one) - base for one in new})
         if beam.best == best:
@@ -223,6 +226,7 @@ def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
         best, fitted = beam.best, beam.fits[beam.best]
         fewer = [one for one in _without(fitted) if names_of(one[0]) not in beam.fits]
         _fit_sets(beam, [*fewer, *_laws(beam, fitted, library)])
+        _finish(beam)
         if beam.best == best:
             return
 
@@ -275,6 +279,7 @@ def _shoot(beam: Beam) -> None:
 
     starts = in_threads(shot, dry)
     _fit_sets(beam, [(f.effects, start, f) for f, start in zip(dry, starts, strict=True)])
+    _finish(beam)
 
 
 def _beside(
@@ -369,20 +374,20 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[SetFit]:
     if not unique:
         return []
 
-    def begin(one: Try) -> tuple[float, SetFit, SetFit]:
+    def begin(one: Try) -> Begun:
         effects, start, parent = one
         fit = problem.fit(effects, start, parent, FIRST)
         return evidence(problem, fit, beam.variance).log(beam.counts), fit, parent
 
     begun = sorted(in_threads(begin, list(unique.values())), key=lambda one: -one[0])
     most = max(begun[0][0], beam.log(beam.best))
-    going = [one for one in begun if one[0] > most - 4.0 * GIVEN_UP]
-    first: dict[Names, tuple[float, SetFit, SetFit]] = {}
+    going = [one for one in begun if one[0] > most - BEGUN_BEHIND]
+    first: dict[Names, Begun] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)
     _go_on(beam, list(first.values()))
 
-    def may_be_better(one: tuple[float, SetFit, SetFit]) -> bool:
+    def may_be_better(one: Begun) -> bool:
         names = names_of(one[1].effects)
         if one is first[names]:
             return False
@@ -397,19 +402,24 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[SetFit]:
     return [beam.fits[names] for names in first]
 
 
-def _go_on(beam: Beam, begun: Sequence[tuple[float, SetFit, SetFit]]) -> None:
-    """Fit begun sets to the end, add them, and fit the leading ones by the loader's own steps."""
+def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
+    """Fit begun sets to the end by wide steps of the loader, and add them."""
     problem = beam.problem
     if problem.case.tell is not None and begun:
         problem.case.tell(f"fitting {len(begun)} sets of effects", 0, 1)
 
-    def go_on(one: tuple[float, SetFit, SetFit]) -> SetFit:
+    def go_on(one: Begun) -> SetFit:
         _, fit, parent = one
         return problem.fit(fit.effects, fit.values, parent, WIDE, fit)
 
     for fit in in_threads(go_on, begun):
         beam.add(fit)
     beam.recount()
+
+
+def _finish(beam: Beam) -> None:
+    """Fit the leading sets by the loader's own steps."""
+    problem = beam.problem
     ranked = [names for names in beam.leading() if names and names not in beam.finished]
 
     def finish(names: Names) -> list[SetFit]:
