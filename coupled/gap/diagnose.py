@@ -15,8 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from coupled.gap.beam.histories import search as search_sets
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
@@ -28,6 +26,8 @@ from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.found import Choice
+from coupled.gap.search.histories import search as search_sets
+from coupled.gap.search.problem import Problem
 from coupled.parallel import threads
 from coupled.record.channels import ControlName
 from coupled.record.record import Record

@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.beam.fit import SetFit, fit_alone
 from coupled.gap.checks import check_record
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.effects.freed import default_keys, freed
 from coupled.gap.findings.inseparable import alike
 from coupled.gap.nominalfit import ChannelFit, NominalFit, Number
 from coupled.gap.prepare import readers_of
 from coupled.gap.search.case import Tell
-from coupled.gap.search.fit import Fit, touched
+from coupled.gap.search.fit import fit_alone
+from coupled.gap.search.found import Fit
 from coupled.gap.signals.drives import as_driven
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
@@ -171,7 +171,7 @@ def _each(
     effects: Sequence[Effect],
     whole: Fit,
     tell: Tell | None,
-) -> list[SetFit]:
+) -> list[Fit]:
     """Return a fit to each record alone; none where there is one record."""
     records = sorted({output.record for output in outputs})
     found = []

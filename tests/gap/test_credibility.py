@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from coupled.gap import diagnose as diagnosing
-from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
@@ -29,6 +28,7 @@ from coupled.gap.findings.credibility import (
 from coupled.gap.findings.regimes import Acts, Regime, _regime, _size
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import DRIFT_CHANCE, REMAINDER
 from coupled.record.record import Record

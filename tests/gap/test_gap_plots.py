@@ -17,8 +17,7 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink, Shrink
-from coupled.gap.search.fit import Fit
-from coupled.gap.search.found import Candidate, Choice, Found
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output, stage_gaps
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader

@@ -15,10 +15,10 @@ from coupled.blind.twin.kinds import Clean, Draw, Kind
 from coupled.blind.twin.outsiders import OUTSIDERS
 from coupled.blind.twin.setting import Installed, draw_setting, fly_clean
 from coupled.blind.twin.twin import Twin
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.findings.healthy import ModelError, tolerances
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output, Predict
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.record.record import Record, read_record

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.gap.beam.beam import search_sets
 from coupled.gap.diagnose import Diagnosis, diagnose
 from coupled.gap.effects.effect import Effect, Signature
 from coupled.gap.effects.entries import added
 from coupled.gap.prepare import prepare
+from coupled.gap.search.beam import search_sets
 from coupled.record.record import Record
 from coupled.rig.rigfile import rig_from_table
 from tests.support import records

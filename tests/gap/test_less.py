@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.record.record import Record

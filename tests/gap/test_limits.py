@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.search.case import Case
-from coupled.gap.search.limits import is_limit, limits
+from coupled.gap.search.screen import is_limit, limits
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.gap.thresholds import LIMIT_SHARES

@@ -10,9 +10,9 @@ import pytest
 from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
-from coupled.gap.beam.fit import fit_alone
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.noise.resting import Rest
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.signals import driven
 from coupled.gap.stages import ratchet
 from coupled.gap.stages.ratchet import unratcheted

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from coupled.gap.beam.beam import search_sets
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.prepare import prepare
+from coupled.gap.search.beam import search_sets
 from tests.support.gaps import made, nominal_rig
 from tests.support.singles import SINGLES
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupled.gap.beam.beam import search_sets
-from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points

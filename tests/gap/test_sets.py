@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from coupled.gap.beam.beam import search_sets
 from coupled.gap.effects.effect import Effect
 from coupled.gap.effects.library import BY_NAME, EFFECTS
+from coupled.gap.search.beam import search_sets
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice
 from coupled.gap.signals.output import Output

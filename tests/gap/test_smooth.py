@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.noise.noise import Noise
 from coupled.gap.noise.smooth import Smoother, smoothed
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points
 from coupled.record.record import Record

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from coupled.gap.beam.problem import Problem
 from coupled.gap.diagnose import diagnose
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats, Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.stages.surfaces import surface_points

@@ -11,10 +11,10 @@ import pytest
 
 from coupled.errors import InputError
 from coupled.flight.aircraft import make_aircraft
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import TRIM, airframe_outputs
 from coupled.gap.stages.openloop import Moved, about, command_of, fly_open_loop

@@ -12,11 +12,11 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.beam.problem import Problem
-from coupled.gap.beam.screen import Screen, Worth
 from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
+from coupled.gap.search.screen import Screen, Worth
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.records import NOISE

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from coupled.gap.beam.fit import fit_alone
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.fit import fit_alone
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader

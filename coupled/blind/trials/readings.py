@@ -11,10 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from coupled.blind.trials.measure import outputs_of
 from coupled.blind.trials.truth import Reading
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
-from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.evidence import likelier_by
+from coupled.gap.search.problem import Problem
 from coupled.gap.thresholds import RIVAL_GAIN
 from coupled.record.record import Record
 from coupled.rig.rig import Rig

@@ -6,7 +6,7 @@ stages then fly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import hypot
@@ -261,6 +261,38 @@ def possible(
         return apply(rig, control, effects, values)
     except InputError:
         return None
+
+
+def touched(outputs: Sequence[Output], effects: Iterable[Effect]) -> list[Output]:
+    """Return the outputs that these effects act on."""
+    stages = {stage for effect in effects for stage in effect.shows_in}
+    return [output for output in outputs if output.stage in stages]
+
+
+def contains(law: Effect, other: Effect) -> bool:
+    """Tell whether a law contains another."""
+    return other.name in law.contains
+
+
+def keys_of(effects: Iterable[Effect]) -> set[str]:
+    """Return the keys of a rig file that effects free."""
+    return {p.key for effect in effects for p in effect.parameters}
+
+
+def distinct(library: Sequence[Effect], nuisances: Iterable[Effect]) -> list[Effect]:
+    """Return the laws that are not another one beside its nuisance parameters.
+
+    Dry friction yields before it slips, and how far is a nuisance parameter where the rig file does
+    not give it: presliding friction is Coulomb friction then.
+    """
+    free = keys_of(nuisances)
+    return [
+        law
+        for law in library
+        if not any(
+            contains(law, other) and keys_of([law]) - keys_of([other]) <= free for other in library
+        )
+    ]
 
 
 def dotted(key: str, control: str) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from coupled.gap.beam.courses import course_in
 from coupled.gap.chain import stage_of
 from coupled.gap.effects.effect import Effect, Parameter, field_of
 from coupled.gap.effects.settings import contact, is_dry, settings
@@ -23,6 +22,7 @@ from coupled.gap.findings.result import (
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
 from coupled.gap.search.found import Choice, Found
+from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, STATED_MOST, SURE, UNDERSTATED

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.display import unit_in
-from coupled.gap.beam.problem import Problem
 from coupled.gap.noise.smooth import smoothed
 from coupled.gap.search.case import Case
-from coupled.gap.search.fit import Fit
+from coupled.gap.search.found import Fit
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Hides, Output, Part
 from coupled.gap.thresholds import HEALTHY_ALONE, HEALTHY_SIGMAS
 from coupled.rig.rig import Rig

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.gap.beam.fit import Group
+from coupled.gap.search.found import Group
 from coupled.gap.thresholds import ALIKE, SHARES_IN
 
 # Why two numbers may act alike, by the last parts of their keys.

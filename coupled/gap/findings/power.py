@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.effects.effect import Effect, Parameter, apply, possible, value_of
+from coupled.gap.effects.effect import Effect, Parameter, apply, possible, touched, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.effects.settings import contact, settings
-from coupled.gap.search.fit import touched
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import POWER_DECADES, POWER_HALVINGS, SETTING_NUDGE
 from coupled.record.channels import ControlName

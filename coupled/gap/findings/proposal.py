@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupled.errors import InputError
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect, value_of
 from coupled.gap.effects.library import EFFECTS
 from coupled.gap.findings.flown import fly_force
 from coupled.gap.search.case import Case
+from coupled.gap.search.evidence import likelier_by
 from coupled.gap.search.found import Choice
-from coupled.gap.search.gain import likelier_by
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output, white
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader

@@ -9,13 +9,12 @@ from math import hypot
 
 import numpy as np
 
-from coupled.gap.effects.effect import Effect, possible
+from coupled.gap.effects.effect import Effect, possible, touched
 from coupled.gap.effects.library import LAG, STAMP
 from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
-from coupled.gap.search.course import Bounds
-from coupled.gap.search.fit import Fit, touched
-from coupled.gap.search.timed import Timing, timed
+from coupled.gap.search.course import Bounds, Timing, timed
+from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.thresholds import HEARD_ANEW, SETTLE_FROM
 from coupled.record.channels import ControlName

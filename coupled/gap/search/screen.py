@@ -14,27 +14,29 @@ beside the best set.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from coupled.gap.beam.evidence import misfit
-from coupled.gap.beam.fit import SetFit
-from coupled.gap.beam.problem import Problem
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect
-from coupled.gap.search.fit import touched
-from coupled.gap.search.limits import is_limit, limits
+from coupled.gap.effects.effect import Effect, touched
+from coupled.gap.search.evidence import misfit
+from coupled.gap.search.found import Fit
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Floats
 from coupled.gap.thresholds import (
     BEAM_CANDIDATES,
     BEAM_FACTORS,
     BEAM_SIZES,
+    LIMIT_BISECTIONS,
+    LIMIT_SHARES,
     SCREEN_LESS,
     SCREEN_NEAR,
     SCREEN_SHOWN,
+    SERVO_SHARES,
 )
 from coupled.parallel import go_on, in_threads
 from coupled.rig.rig import Rig
@@ -79,7 +81,7 @@ class Screen:
 
     def best(
         self,
-        current: SetFit,
+        current: Fit,
         candidates: Sequence[Effect],
         worth: Worth,
         most: int = BEAM_CANDIDATES,
@@ -102,7 +104,7 @@ class Screen:
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
 
-    def _screened(self, current: SetFit, effect: Effect, counts: Floats) -> Screened:
+    def _screened(self, current: Fit, effect: Effect, counts: Floats) -> Screened:
         """Return a candidate with the start of each shape that leaves least."""
         now = _residual(self.problem, effect, current.rig)
         outputs = touched(self.problem.outputs, [effect])
@@ -128,7 +130,7 @@ class Screen:
                 starts[shape] = left, values
         return Screened(effect, [values for _, values in starts.values()], taken, gain)
 
-    def _signatures(self, current: SetFit, effect: Effect) -> list[_Signature]:
+    def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures beside the current effects."""
         now = _residual(self.problem, effect, current.rig)
         found = []
@@ -147,12 +149,12 @@ def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
     return np.concatenate([output.residual(rig, wide=True) for output in ours])
 
 
-def _with(problem: Problem, current: SetFit, effect: Effect, values: Values) -> Rig | None:
+def _with(problem: Problem, current: Fit, effect: Effect, values: Values) -> Rig | None:
     """Return the current rig with one more effect, None where the physics cannot give it."""
     return problem.rig_of((*current.effects, effect), {**current.values, **values})
 
 
-def _tries(problem: Problem, current: SetFit, effect: Effect) -> list[list[Values]]:
+def _tries(problem: Problem, current: Fit, effect: Effect) -> list[list[Values]]:
     """Return sets of an effect's parameters to try, by shapes of which each may give a start."""
     if is_limit(effect) and not STAGE_OF[effect.stage].flown:
         key = effect.value_key(effect.free[0])
@@ -179,7 +181,7 @@ def _tries(problem: Problem, current: SetFit, effect: Effect) -> list[list[Value
     ]
 
 
-def _sizes(problem: Problem, current: SetFit, effect: Effect, shape: int) -> list[Values]:
+def _sizes(problem: Problem, current: Fit, effect: Effect, shape: int) -> list[Values]:
     """Return sets of an effect's parameters to try; one where each has to be flown."""
     flown = STAGE_OF[effect.stage].flown
     found = []
@@ -208,3 +210,26 @@ def _less(problem: Problem, effect: Effect, first: Values) -> list[Values]:
                 values[effect.value_key(p)] = share * least
         found += [values] if values != first else []
     return found
+
+
+def is_limit(effect: Effect) -> bool:
+    """Tell whether an effect is a limit and nothing else."""
+    return len(effect.free) == 1 and effect.free[0].inverse
+
+
+def limits(effect: Effect, shows: Callable[[float], bool]) -> list[list[float]]:
+    """Return sets of limits to try, from the largest one that shows on, in the limit's own unit.
+
+    Of each set the best is a start. `shows` tells of a limit whether it changes what is predicted.
+    None where not even the lowest does.
+    """
+    number = effect.free[0]
+    low, high = math.log(number.low), math.log(number.high)
+    if not shows(number.low):
+        return []
+    for _ in range(LIMIT_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if shows(math.exp(middle)) else (low, middle)
+    sets = (LIMIT_SHARES, SERVO_SHARES) if effect.stage == "linkage" else (LIMIT_SHARES,)
+    most = math.exp(low)
+    return [[max(share * most, number.low) for share in shares] for shares in sets]

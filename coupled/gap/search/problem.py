@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.beam.fit import SetFit, fit_set
 from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
+from coupled.gap.search.fit import fit_set
+from coupled.gap.search.found import Fit
 from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
@@ -74,11 +75,11 @@ class Problem:
         self,
         effects: Sequence[Effect],
         start: Mapping[str, float] | None = None,
-        parent: SetFit | None = None,
+        parent: Fit | None = None,
         descent: Descent = WHOLE,
-        near: SetFit | None = None,
+        near: Fit | None = None,
         part: Part = "all",
-    ) -> SetFit:
+    ) -> Fit:
         """Return a set fitted together with the nuisance parameters, to the whole record or a part.
 
         Groups of effects that `parent` has as well are taken over from it. `near` is a fit of the
@@ -96,7 +97,7 @@ class Problem:
         known = {**self.case.neutral, **values}
         return possible(self.case.nominal, self.case.control, every, known)
 
-    def within_tolerance(self, found: SetFit) -> Rig:
+    def within_tolerance(self, found: Fit) -> Rig:
         """Return the rig of a fit without effects, its nuisance parameters within their 95 %."""
         values = dict(found.values)
         for key, prior in self.priors.items():

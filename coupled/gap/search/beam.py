@@ -4,7 +4,7 @@ A set of effects is fitted together with the nuisance parameters, always on the 
 has a log evidence (`evidence`). From each of the best sets the search goes to its neighbours:
 
     add       one effect more, of those whose signature takes most of the residual (`screen`)
-    replace   a law by one that contains it, or that it contains (`laws`)
+    replace   a law by one that contains it, or that it contains
     swap      an effect for another that shows in the same output
     drop      one effect less
 
@@ -22,15 +22,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.beam.evidence import Evidence, evidence, fewest_unexplained
-from coupled.gap.beam.fit import SetFit
-from coupled.gap.beam.laws import contains, distinct, keys_of
-from coupled.gap.beam.problem import Problem
-from coupled.gap.beam.screen import Screen, Screened, Worth
-from coupled.gap.effects.effect import Effect
+from coupled.gap.effects.effect import Effect, contains, distinct, keys_of
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import Descent
-from coupled.gap.search.found import Candidate, Choice, Found
+from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
+from coupled.gap.search.problem import Problem
+from coupled.gap.search.screen import Screen, Screened, Worth
 from coupled.gap.signals.output import explained_below, stage_gaps, stage_limits
 from coupled.gap.thresholds import (
     BEAM_BESIDE,
@@ -49,8 +47,8 @@ from coupled.parallel import in_threads
 Floats = NDArray[np.float64]
 Names = frozenset[str]
 Start = dict[str, float]
-Try = tuple[tuple[Effect, ...], Start, SetFit]  # effects, where their fit starts, its parent
-Begun = tuple[float, SetFit, SetFit]  # log evidence of a begun fit, and its parent
+Try = tuple[tuple[Effect, ...], Start, Fit]  # effects, where their fit starts, its parent
+Begun = tuple[float, Fit, Fit]  # log evidence of a begun fit, and its parent
 WIDE, OWN = Descent("wide"), Descent("own")
 FIRST, SHORT = Descent("wide", BEAM_FIRST), Descent("wide", SHOOTINGS)
 ABOVE = (1.05, 1.5)  # times the running friction, where the fit of a breakaway starts
@@ -86,10 +84,10 @@ class Beam:
     """
 
     problem: Problem
-    settled: SetFit
+    settled: Fit
     variance: Floats
     counts: Floats = field(default_factory=lambda: np.zeros(0))
-    fits: dict[Names, SetFit] = field(default_factory=dict)
+    fits: dict[Names, Fit] = field(default_factory=dict)
     known: dict[Names, Evidence] = field(default_factory=dict)
     finished: set[Names] = field(default_factory=set)
     best: Names = frozenset()
@@ -99,12 +97,12 @@ class Beam:
         """Screen candidates by signatures that are taken once."""
         self.screen = Screen(self.problem, self.variance)
 
-    def add(self, fitted: SetFit) -> None:
+    def add(self, fitted: Fit) -> None:
         """Add a fit; of two of one set the one stays that may be true, or else the more likely."""
         names = names_of(fitted.effects)
         new = evidence(self.problem, fitted, self.variance)
 
-        def rank(fit: SetFit, known: Evidence) -> tuple[bool, float]:
+        def rank(fit: Fit, known: Evidence) -> tuple[bool, float]:
             return may_be_true(self.problem, fit), known.log(self.counts)
 
         if names not in self.fits or rank(fitted, new) > rank(self.fits[names], self.known[names]):
@@ -156,7 +154,7 @@ def names_of(effects: Iterable[Effect]) -> Names:
     return frozenset(effect.name for effect in effects)
 
 
-def may_be_true(problem: Problem, fitted: SetFit) -> bool:
+def may_be_true(problem: Problem, fitted: Fit) -> bool:
     """Tell whether no effect is at a bound of a parameter, nor swings faster than frames show."""
     fastest = 0.5 * min(output.frame_rate_Hz for output in problem.outputs)
     for effect in fitted.effects:
@@ -170,7 +168,7 @@ def may_be_true(problem: Problem, fitted: SetFit) -> bool:
 
 
 def _searched(
-    problem: Problem, library: Sequence[Effect], known: Sequence[SetFit]
+    problem: Problem, library: Sequence[Effect], known: Sequence[Fit]
 ) -> tuple[Beam, tuple[dict[str, float], ...]]:
     """Return the sets of a library's effects about the best, begun with known fits.
 
@@ -231,7 +229,7 @@ def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
             return
 
 
-def _expand(beam: Beam, fitted: SetFit, library: Sequence[Effect], wide: set[str]) -> None:
+def _expand(beam: Beam, fitted: Fit, library: Sequence[Effect], wide: set[str]) -> None:
     """Fit the sets next to a fitted one.
 
     A law that contains another is fitted after it, from where that one ended, and a law of dry
@@ -272,7 +270,7 @@ def _shoot(beam: Beam) -> None:
         and beam.log(names) > most - GIVEN_UP
     ]
 
-    def shot(fitted: SetFit) -> Start:
+    def shot(fitted: Fit) -> Start:
         ours = {effect.value_key(p) for effect in fitted.effects for p in effect.free}
         begun = {key: value for key, value in fitted.values.items() if key in ours}
         return dict(short.fit(fitted.effects, begun, None, SHORT).values)
@@ -292,20 +290,20 @@ def _beside(
     ]
 
 
-def _tries(fitted: SetFit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
+def _tries(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try]:
     """Return the starts of a set with one effect more; `contact` is that of its dry friction."""
     effects = (*fitted.effects, one.effect)
     beside = contact if one.effect.dry else {}
     return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
 
 
-def _contact(beam: Beam, fitted: SetFit) -> Start:
+def _contact(beam: Beam, fitted: Fit) -> Start:
     """Return the contact of dry friction in a fit, as far as it is a nuisance parameter."""
     keys = {one.value_key(p) for one in beam.problem.case.contact for p in one.free}
     return {key: value for key, value in fitted.values.items() if key in keys}
 
 
-def _swaps(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
+def _swaps(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
     """Return the sets with another effect, that shows in the same output, in place of one."""
     tries: list[Try] = []
     for old in fitted.effects:
@@ -319,7 +317,7 @@ def _swaps(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
     return tries
 
 
-def _without(fitted: SetFit) -> list[Try]:
+def _without(fitted: Fit) -> list[Try]:
     """Return the sets with one effect less."""
     return [
         (tuple(e for e in fitted.effects if e is not old), dict(fitted.values), fitted)
@@ -327,13 +325,13 @@ def _without(fitted: SetFit) -> list[Try]:
     ]
 
 
-def _laws(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
+def _laws(beam: Beam, fitted: Fit, library: Sequence[Effect]) -> list[Try]:
     """Return the sets with a law in place of one that it contains, or that contains it."""
     pairs = [(old, law) for old in fitted.effects for law in library]
     return [one for old, law in pairs for one in _in_place(beam, fitted, old, law)]
 
 
-def _in_place(beam: Beam, fitted: SetFit, old: Effect, law: Effect) -> list[Try]:
+def _in_place(beam: Beam, fitted: Fit, old: Effect, law: Effect) -> list[Try]:
     """Return where fits of a law in place of a fitted one start.
 
     Their common numbers start as fitted. None where neither law contains the other.
@@ -360,7 +358,7 @@ def _in_place(beam: Beam, fitted: SetFit, old: Effect, law: Effect) -> list[Try]
     return [(effects, start, fitted), *([(effects, start | higher, fitted)] if higher else [])]
 
 
-def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[SetFit]:
+def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[Fit]:
     """Fit sets from their starts, a few steps first, and on where that may matter; add them.
 
     Return the best fit of each set. The second best start of a set goes on only where the best one
@@ -408,7 +406,7 @@ def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
     if problem.case.tell is not None and begun:
         problem.case.tell(f"fitting {len(begun)} sets of effects", 0, 1)
 
-    def go_on(one: Begun) -> SetFit:
+    def go_on(one: Begun) -> Fit:
         _, fit, parent = one
         return problem.fit(fit.effects, fit.values, parent, WIDE, fit)
 
@@ -422,7 +420,7 @@ def _finish(beam: Beam) -> None:
     problem = beam.problem
     ranked = [names for names in beam.leading() if names and names not in beam.finished]
 
-    def finish(names: Names) -> list[SetFit]:
+    def finish(names: Names) -> list[Fit]:
         fitted = beam.fits[names]
         done = problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
         anew = problem.case.but_for_contact(done.values)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coupled.gap.beam.evidence import Evidence, evidence, fewest_unexplained, log_prior, misfit
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.evidence import Evidence, evidence, fewest_unexplained, log_prior, misfit
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import BELOW_NOISE, PRIOR_SPAN
 from coupled.rig.rig import Rig

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from coupled.gap.beam.beam import search_sets
 from coupled.gap.diagnose import Diagnosis, diagnose
+from coupled.gap.search.beam import search_sets
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 
