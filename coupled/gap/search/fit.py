@@ -58,7 +58,8 @@ def fit_set(
 
     A fit starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. Effects that share no output are fitted apart; of `parent` the groups that are the
-    same are taken over. A rig that the physics cannot give has all its parameters at a bound.
+    same, and start where they ended, are taken over. A rig that the physics cannot give has all its
+    parameters at a bound.
     `priors` are (mean, standard deviation) by "effect.parameter", in the parameters' own units.
     """
     every = [*effects, *nuisances]
@@ -69,7 +70,7 @@ def fit_set(
     cost, groups = 0.0, dict[tuple[Effect, ...], Group]()
     for members in grouped(every):
         known = None if parent is None else parent.groups.get(tuple(members))
-        if known is None:
+        if known is None or any(start.get(key, at) != at for key, at in known.values.items()):
             known = _remembered(case, members, priors, start, descent, parent, part)
         groups[tuple(members)] = known
         low, high, bound = low | known.low, high | known.high, bound + known.at_bound

@@ -82,8 +82,8 @@ class Problem:
     ) -> Fit:
         """Return a set fitted together with the nuisance parameters, to the whole record or a part.
 
-        Groups of effects that `parent` has as well are taken over from it. `near` is a fit of the
-        set that ended at the start.
+        Groups of effects that `parent` has as well, at the same values, are taken over. `near` is a
+        fit of the set that ended at the start.
         """
         free = self.beside(effects)
         begun = self.case.with_contact(effects, free, start or {})
