@@ -20,6 +20,7 @@ from coupled.gap.findings.answer import effects_of, incredible, settings_of, ver
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.healthy import Baseline
+from coupled.gap.findings.inseparable import inseparable
 from coupled.gap.findings.judge import Judge
 from coupled.gap.findings.shrink import floors_of, shrink
 from coupled.gap.prepare import Prepared, prepare
@@ -102,4 +103,5 @@ def findings(prepared: Prepared, case: Case, choice: Choice) -> Diagnosis:
         trim=prepared.trim,
         filtered={name: one for reader in readers for name, one in reader.filtered().items()},
         left_out=prepared.left_out,
+        inseparable=inseparable(choice.fit),
     )

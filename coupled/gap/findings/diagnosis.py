@@ -11,6 +11,7 @@ from coupled.arguments import public
 from coupled.gap.findings.flown import Again, ChannelAgain, closed_loop, nearer
 from coupled.gap.findings.healthy import Baseline
 from coupled.gap.findings.inflight import EffectInFlight, in_flight, in_words
+from coupled.gap.findings.inseparable import Alike
 from coupled.gap.findings.power import EffectPower, power
 from coupled.gap.findings.proposal import ProposedTest, in_one_line, next_tests
 from coupled.gap.findings.result import FORMAT, Findings
@@ -45,6 +46,8 @@ class Diagnosis(Findings):
     filtered: Mapping[str, str] = field(default_factory=dict)
     # What of live records is not judged, or not as it was recorded; a sentence each.
     left_out: tuple[str, ...] = ()
+    # Numbers of the effects found that the records determine only together.
+    inseparable: tuple[Alike, ...] = ()
     # What of the trim was taken from the records or their manifests, in words; empty for nothing.
     trim: str = ""
 
@@ -106,6 +109,7 @@ class Diagnosis(Findings):
         missed = self.baseline is not None and self.baseline.missed
         floor = MISFIT if missed else NOISE
         said = summary(self, self.shrink, flight, filtered, self.next_test, floor)
+        said += "".join(f" Not distinguished: {one.words}." for one in self.inseparable)
         held = "" if self.baseline is None else self.baseline.words
         return " ".join(words for words in (self.trim, held, said, *self.left_out) if words)
 
@@ -124,6 +128,8 @@ class Diagnosis(Findings):
             "settings": {one.name: one.factor for one in self.settings if one.yields is None},
         }
         found |= {one.name: one.yields for one in self.settings if one.yields is not None}
+        if self.inseparable:
+            found["inseparable"] = [one.as_dict() for one in self.inseparable]
         if self.filtered:
             found["filtered"] = dict(self.filtered)
         if self.left_out:

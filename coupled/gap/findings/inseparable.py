@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from coupled.gap.search.found import Group
+from coupled.gap.search.found import Fit, Group
 from coupled.gap.thresholds import ALIKE, SHARES_IN
 
 # Why two numbers may act alike, by the last parts of their keys.
@@ -62,6 +62,13 @@ def alike(group: Group) -> list[Alike]:
         shares = [key for key, d in zip(shown, direction, strict=True) if abs(d) >= least]
         found.append(Alike(tuple(shares), _why(shares)))
     return found
+
+
+def inseparable(found: Fit) -> tuple[Alike, ...]:
+    """Return the numbers of a fit's effects that records determine only together."""
+    ours = {effect.value_key(p) for effect in found.effects for p in effect.free}
+    each = (one for group in found.groups.values() for one in alike(group))
+    return tuple(one for one in each if ours.issuperset(one.keys))
 
 
 def _why(keys: Sequence[str]) -> str:
