@@ -123,11 +123,13 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
 def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
     """Return the log-likelihood by which the `right` fit of whole records beats the `wrong` one.
 
-    Effective samples are counted by the autocorrelation time of what the right one leaves.
+    Effective samples are counted by the autocorrelation time of what the right one leaves. Noise
+    counts as known where a residual is below its floor.
     """
     gain = 0.0
     for output in outputs:
         lefts = output.residual(right.rig), output.residual(wrong.rig)
-        better, worse = misfit(np.array([float(np.mean(left**2)) for left in lefts]))
-        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * float(worse - better)
+        squares = [float(np.mean(left**2)) for left in lefts]
+        better, worse = (math.log(q) if q > 1.0 else q - 1.0 for q in squares)
+        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * (worse - better)
     return gain
