@@ -12,10 +12,9 @@ that is credible holds half of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
-from coupled.gap.effects.effect import Effect
 from coupled.gap.findings.answer import effects_of, incredible, settings_of, verdict_of
 from coupled.gap.findings.budget import stage_budget
 from coupled.gap.findings.diagnosis import Diagnosis
@@ -27,7 +26,7 @@ from coupled.gap.prepare import Prepared, prepare
 from coupled.gap.search.case import Case, Tell
 from coupled.gap.search.descent import Descent
 from coupled.gap.search.found import Choice
-from coupled.gap.search.histories import search as search_sets
+from coupled.gap.search.histories import search
 from coupled.gap.search.problem import Problem
 from coupled.parallel import threads
 from coupled.record.channels import ControlName
@@ -35,8 +34,6 @@ from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 __all__ = ["Diagnosis", "diagnose"]
-
-Search = Callable[[Case, Sequence[Effect]], tuple[Case, Choice]]
 
 
 def diagnose(
@@ -46,14 +43,13 @@ def diagnose(
     tell: Tell | None = None,
     healthy: Mapping[str, Record] | None = None,
     workers: int = 0,
-    search: Search = search_sets,
 ) -> Diagnosis:
     """Return the diagnosis of records of one rig, by their files' names.
 
     `tell` is called with what is being done, and how much of how much is done. With records of the
     machine when it was well (`healthy`), the difference from those is judged (`healthy`). So many
-    threads work as `workers`, 0 being one a core; the answer is that of one. `search` finds the
-    effects. Raises InputError where a record cannot be of this rig, or lets no stage be judged.
+    threads work as `workers`, 0 being one a core; the answer is that of one. Raises
+    InputError where a record cannot be of this rig, or lets no stage be judged.
     """
     with threads(workers):
         baseline = None

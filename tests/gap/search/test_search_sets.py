@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from coupled.gap.diagnose import Diagnosis, diagnose
-from coupled.gap.search.beam import search_sets
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
 
@@ -19,7 +18,7 @@ def answer(
     """Return the diagnosis of a bench's record with effects."""
     nominal = rig or nominal_rig(False)
     record = made(folder, nominal, values, seed)
-    return diagnose(nominal, {"r": record}, search=search_sets)
+    return diagnose(nominal, {"r": record})
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
