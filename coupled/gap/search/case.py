@@ -11,7 +11,7 @@ import numpy as np
 
 from coupled.gap.effects.effect import Effect, possible, touched
 from coupled.gap.effects.library import LAG, STAMP
-from coupled.gap.effects.settings import contact, is_dry, lag_within_a_step, settings
+from coupled.gap.effects.settings import contact, lag_within_a_step, settings
 from coupled.gap.search.contact import contact_start
 from coupled.gap.search.course import Bounds, Timing, timed
 from coupled.gap.search.found import Fit
@@ -198,21 +198,11 @@ class Case:
         )
         return next(((timing, seen) for timing, seen, timed in each if timed & keys), None)
 
-    def nuisances(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the settings whose number none of these effects frees.
-
-        Where friction is filed, or among the effects, how far its contact yields is one.
-        """
-        freed = {p.key for effect in effects for p in effect.parameters}
-        free = list(self.settings.values())
-        if any(effect.dry for effect in effects) or is_dry(self.nominal, self.control):
-            free += [one for one in self.contact if self._unsettled & {*one.shows_in}]
-        return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
-
     def with_only(self, found: Fit, effects: Sequence[Effect]) -> Rig:
-        """Return the rig with some of the effects that a fit found, and its settings."""
-        every = (*effects, *self.nuisances(found.effects))
-        rig = possible(self.nominal, self.control, every, {**self.neutral, **found.values})
+        """Return the rig with some of the effects that a fit found, and its nuisance parameters."""
+        known = (*self.settings.values(), *self.contact)
+        free = [one for one in known if one.value_key(one.free[0]) in found.values]
+        rig = possible(self.nominal, self.control, (*effects, *free), found.values)
         return self.nominal if rig is None else rig
 
     def but_for_contact(self, values: Mapping[str, float]) -> dict[str, float]:
