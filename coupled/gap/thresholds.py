@@ -288,8 +288,6 @@ BEAM_FIRST = 4  # chosen: evaluations of each start, after which they are compar
 FIT_LEGS, WEIGHT_CHANGED = 3, 2.0  # chosen: legs of a fit, while its weights change by so much
 BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # chosen: times where a parameter starts, for signatures
 BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # chosen: the same for how far a factor is from 1
-BELOW_NOISE = 0.3  # chosen: what a residual below its floor counts; with 1, a second effect that is
-# not there is named beside 2 of the first 70 records of seed 2039, and with 0, 3 are read plainer
 PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 56, about equally likely
 PRIOR_NUMBER = 1.0  # chosen: −ln of the prior of a law by each parameter beyond the first
 PRIOR_SPAN = 9.2  # ln 10⁴: over four decades a size is equally likely in each

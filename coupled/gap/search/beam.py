@@ -131,13 +131,13 @@ class Beam:
         self.best = self.ranked()[0]
 
     def worth(self, names: Names) -> Worth:
-        """Return the predicted gain with which one effect more may beat the best set.
+        """Return the predicted gain with which one effect more may beat the best set, or none.
 
         It then brings what the effect's own prior costs, if the nuisance parameters' priors, which
         it may relieve, do not.
         """
         relief = sum(group.penalty for group in self.fits[names].groups.values())
-        behind = self.log(self.best) - self.log(names)
+        behind = self.log(self.best) - self.log(names) if names else 0.0
         return Worth(PRIOR_EFFECT + behind - relief, self.counts)
 
     def open_outputs(self, names: Names) -> set[str]:
@@ -189,14 +189,15 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
     tried always: they have no size that could be too small.
     """
-    front, rounds = beam.leading(), list[dict[str, float]]()
-    if not beam.best:
-        root = beam.fits[beam.best]
+    front, best, rounds = beam.leading(), beam.best, list[dict[str, float]]()
+    if not best:
+        root = beam.fits[best]
         _fit_sets(beam, [((e,), dict(root.values), root) for e in library if not e.free])
+        front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
-        if beam.best and not beam.open_outputs(beam.best):
+        if not front or (best and not beam.open_outputs(best)):
             break
-        base, known, best = beam.log(front[0]), set(beam.fits), beam.best
+        base, known = beam.log(front[0]), set(beam.fits)
         for names in front:
             if wide := beam.open_outputs(names):
                 _expand(beam, beam.fits[names], library, wide)
@@ -208,9 +209,8 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
         rounds.append({beam.fits[one].effects[-1].name: beam.log(one) - base for one in new})
         if beam.best == best:
             break
+        best = beam.best
         front = [names for names in beam.leading() if names and names not in front]
-        if not front:
-            break
     _look_around(beam, library)
     return tuple(rounds)
 

@@ -7,8 +7,7 @@ For a set E of effects with parameters θ, nuisance parameters φ, and outputs o
     L_o  = −N_o/(2·τ_o)·m(q_o)        log-likelihood with N_o/τ_o effective samples
     q_o  = mean(r_o²)/v_o             r_o: residual over the noise floor, at the fitted parameters
     m(q) = ln q where q > 1           the residual's own variance is estimated: noise or misfit
-           B·(q − 1) elsewhere        the floor is an upper estimate of the noise: by less than
-                                      it, a residual is little better
+           q − 1 elsewhere            no residual is smaller than the noise that is known
     v_o  = 1 + (ε·(g_o − 1))²         the physics' own error: ε of the residual without effects, g_o
     ln P(E) = −Σ_effects (A + B·(parameters − 1))
     p(φ)    the Gaussian priors of the nuisance parameters, relative to their maximum
@@ -40,15 +39,14 @@ from coupled.gap.effects.effect import Effect, Parameter
 from coupled.gap.search.found import Fit, Group
 from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output, memory
-from coupled.gap.thresholds import BELOW_NOISE, PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
+from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
 
 Floats = NDArray[np.float64]
 
 
 def misfit(square: Floats) -> Floats:
     """Return −2 log-likelihood a sample of residuals with these mean squares, less that of 1."""
-    below = BELOW_NOISE * (square - 1.0)
-    return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), below)
+    return np.where(square > 1.0, np.log(np.maximum(square, 1.0)), square - 1.0)
 
 
 @dataclass(frozen=True)
@@ -123,13 +121,11 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
 def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
     """Return the log-likelihood by which the `right` fit of whole records beats the `wrong` one.
 
-    Effective samples are counted by the autocorrelation time of what the right one leaves. Noise
-    counts as known where a residual is below its floor.
+    Effective samples are counted by the autocorrelation time of what the right one leaves.
     """
     gain = 0.0
     for output in outputs:
         lefts = output.residual(right.rig), output.residual(wrong.rig)
-        squares = [float(np.mean(left**2)) for left in lefts]
-        better, worse = (math.log(q) if q > 1.0 else q - 1.0 for q in squares)
-        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * (worse - better)
+        better, worse = misfit(np.array([float(np.mean(left**2)) for left in lefts]))
+        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * float(worse - better)
     return gain
