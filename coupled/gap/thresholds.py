@@ -153,7 +153,7 @@ WIDE_STEPS_Hz = 960.0  # of a search's steps; by 480 Hz 2 of 17 blind records (s
 WIDE_NEAR = 0.25  # floors; 26 blind records (seed 101) stand under 0.16, an oscillator's above 0.35
 WIDE_DIFFERENCE = 0.5  # chosen: share of the residual by which a difference then moves it
 RACE_EVALUATIONS = 6  # chosen: of each other, after which they are compared,
-RACE_FLIGHTS, SHOOTINGS = 3, 10  # chosen: where each is a flight, nearly linear; by short replays
+SHOOTINGS = 10  # chosen: evaluations of a fit to short replays
 NOISE_LEFT = 1.1  # chosen: rms in floors, under which no other start is tried
 RACE_BEHIND = 4.0  # chosen: times the best one's sum of squares, from which one is given up
 DIFFERENCE_STEPS = (1e-4, 0.1)  # chosen: bounds of a difference's step, of its scale
@@ -194,12 +194,8 @@ STOP_PASSED = 0.02  # chosen: of the motion's range, by which the nominal rig pa
 RIPPLE_LEAST = 1.5  # chosen: periods within the deflections met, fewer of which are a spring's law
 RIPPLE_PERIODS, RIPPLES_TRIED = 60.0, 4  # chosen: the most of them, and how many are tried
 
-# Fits of candidates that are finished (`candidates`).
-SHAPES = (0.25, 1.0, 4.0)  # chosen: and times the usual speed over which it fades
-
-# Choosing (`choose`).
-LEAST_GAIN = 8.0  # chosen: log-likelihood by which an effect must beat the rig without it
-RIVAL_GAIN = 4.0  # chosen: by which the best must beat another to be the only answer
+# Alternatives, and the physics' own error (`beam`, `problem`).
+RIVAL_GAIN = 4.0  # chosen: log evidence by which the best must beat another to be the only answer
 MISMATCH = 0.03  # chosen: of a gap, that the physics of a right effect may leave
 
 # Probabilities (`diagnose`).
