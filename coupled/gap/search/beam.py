@@ -62,7 +62,7 @@ def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
     """
     problem = Problem(case)
     root = problem.fit(())
-    problem = problem.surely_open(problem.within_tolerance(root))
+    problem = problem.surely_open(problem.within_tolerance(root).rig)
     beam, rounds = _searched(problem, library, [root])
     case, anew = problem.case, problem.case.heard_anew(beam.fits[beam.best].rig)
     if anew is not None and beam.best:
@@ -174,8 +174,7 @@ def _searched(
 
     The first of these is without effects. Returned, too, is what each depth gained (`_grow`).
     """
-    root, case = known[0], problem.case
-    settled = replace(root, rig=problem.within_tolerance(root))
+    settled, case = problem.within_tolerance(known[0]), problem.case
     beam = Beam(problem, settled, problem.variances(settled.rig))
     for fitted in known:
         beam.add(fitted)
@@ -233,9 +232,10 @@ def _expand(beam: Beam, fitted: Fit, library: Sequence[Effect], wide: set[str]) 
     """Fit the sets next to a fitted one.
 
     A law that contains another is fitted after it, from where that one ended, and a law of dry
-    friction with the contact of one that was fitted before.
+    friction with the contact of one that was fitted before. Effects are screened by what is left
+    with nuisance parameters within their tolerance: beyond it, these may have taken an effect up.
     """
-    is_best = names_of(fitted.effects) == beam.best
+    is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
     many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
     beside, worth = _beside(fitted.effects, library, wide), beam.worth(names_of(fitted.effects))
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)

@@ -97,14 +97,15 @@ class Problem:
         known = {**self.case.neutral, **values}
         return possible(self.case.nominal, self.case.control, every, known)
 
-    def within_tolerance(self, found: Fit) -> Rig:
-        """Return the rig of a fit without effects, its nuisance parameters within their 95 %."""
+    def within_tolerance(self, found: Fit) -> Fit:
+        """Return a fit with its nuisance parameters within their 95 %."""
         values = dict(found.values)
         for key, prior in self.priors.items():
             if key in values:
                 half = NORMAL_95 * prior.sigma
                 values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
-        return self.rig_of((), values) or self.case.nominal
+        rig = self.rig_of(found.effects, values)
+        return found if rig is None else replace(found, values=values, rig=rig)
 
     def surely_open(self, settled: Rig) -> Problem:
         """Return the problem in which a gap that this rig leaves is held to noise alone."""
