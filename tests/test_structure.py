@@ -65,7 +65,6 @@ ORDER += [
     "gap/effects",
     "gap/stages",
     "gap/search",
-    "gap/beam",
     "gap/findings",
     "gap",
     "blind/twin",

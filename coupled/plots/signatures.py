@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
-from coupled.gap.effects.effect import Effect, Signature
+from coupled.gap.effects.effect import Effect, Signature, touched
 from coupled.gap.effects.library import WHOLE_s
 from coupled.gap.findings.summary import change, plain
-from coupled.gap.search.fit import touched
 from coupled.gap.signals.output import Floats, Output
 from coupled.plots import gapview as look
 from coupled.plots.gapview import View, channel_label, style_of, unit_shown

@@ -28,6 +28,7 @@ from coupled.gap.findings.credibility import (
 from coupled.gap.findings.regimes import Acts, Regime, _regime, _size
 from coupled.gap.findings.result import EffectResult, StageResult
 from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import DRIFT_CHANCE, REMAINDER
 from coupled.record.record import Record
@@ -203,10 +204,10 @@ def test_a_hysteresis_of_the_pressure_is_no_lag(
     record = Record(
         ("time_s", "dynamic_pressure_Pa"), np.column_stack((np.arange(frames) / rate_Hz, pressure))
     )
-    found = credibility(lag, case, case.fit((lag,)), [record], 0.0)
+    found = credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0)
     assert found.value > 0.99 if lag_s else found.value < 0.1
     monkeypatch.setattr(credible, "part_of_a_curve", lambda *_: 0.4)
-    assert credibility(lag, case, case.fit((lag,)), [record], 0.0).curve == 0.4
+    assert credibility(lag, case, Problem(case).fit((lag,)), [record], 0.0).curve == 0.4
 
 
 @pytest.mark.parametrize(("remains", "value"), [(0.0, 1.0), (0.9, 0.1)])

@@ -17,10 +17,7 @@ from coupled.gap.effects.library import BY_NAME, EFFECTS
 from coupled.gap.findings.diagnosis import Diagnosis
 from coupled.gap.findings.result import EffectResult, ParameterEstimate, StageResult
 from coupled.gap.findings.shrink import ChannelShrink, Shrink
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.fit import Fit
-from coupled.gap.search.gain import Candidate
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Candidate, Choice, Fit, Found
 from coupled.gap.signals.output import Output, stage_gaps
 from coupled.gap.stages.airframe import airframe_outputs
 from coupled.gap.stages.stages import Reader

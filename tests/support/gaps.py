@@ -12,14 +12,26 @@ from coupled.flight.loop import fly
 from coupled.flight.manoeuvre import Manoeuvre, PressureProfile
 from coupled.flight.pilot import ForceTable
 from coupled.flight.runfile import read_run
-from coupled.gap.effects.effect import apply
+from coupled.gap.effects.effect import Effect, apply
 from coupled.gap.effects.library import BY_NAME
+from coupled.gap.search.case import Case
+from coupled.gap.search.problem import Problem
+from coupled.gap.search.screen import Screen, Worth
 from coupled.record.record import Record
 from coupled.rig.rig import Rig
 from tests.support.records import NOISE
 from tests.support.rigs import BENCH, bench
 
 LONG_s = 40.0
+
+
+def starts_of(case: Case, effect: Effect) -> list[dict[str, float]]:
+    """Return where the fits of an effect start beside the nuisance parameters alone."""
+    problem = Problem(case)
+    root, every = problem.fit(()), np.full(len(case.outputs), 1e6)
+    screen = Screen(problem, problem.variances(root.rig))
+    found = screen.best(root, [effect], Worth(0.0, every))
+    return [start for one in found for start in one.starts]
 
 
 def pushes(seed: int, amplitude_N: float = 45.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -21,14 +21,12 @@ from coupled.gap.findings.result import (
 )
 from coupled.gap.noise.lines import other_side
 from coupled.gap.search.case import Case
-from coupled.gap.search.choose import Choice
-from coupled.gap.search.courses import course_in
-from coupled.gap.search.rivals import Found
+from coupled.gap.search.found import Choice, Found
+from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
 from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, STATED_MOST, SURE, UNDERSTATED
 from coupled.record.channels import ControlName, unit_of
-from coupled.record.record import Record
 from coupled.rig.rig import Rig
 
 
@@ -183,8 +181,8 @@ def _sample_error(effect: Effect, readers: Sequence[Reader]) -> float:
 
     It is zero unless the parameter describes a random quantity.
     """
-    one: Callable[[Record, float], float] | None = effect.sample_error
-    if one is None:
+    if effect.sampled is None:
         return 0.0
-    each = [one(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
+    error = effect.sampled.error
+    each = [error(reader.record, 1.0 / reader.rig.frame_rate) for reader in readers]
     return float(np.sqrt(np.sum(np.square(each)))) / len(each)

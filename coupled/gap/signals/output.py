@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -93,7 +93,6 @@ class Output:
     stepped    the prediction runs at the loader's own steps, which wider steps approximate well
     mismatch   gap beyond 1 that errors of the nuisance parameters' laws may cause
     rough      an approximate prediction with fewer replays, for derivatives
-    noises     rms noises of the stage's inputs, by the control's quantity
     unsure     relative amount by which the floor may be too low, from the colour of input noise
     in_series  predicted from the force by loader and linkage in series
     shots      prediction by multiple shooting: short replays, restarted as measured
@@ -115,7 +114,6 @@ class Output:
     stepped: bool = False
     mismatch: float = 0.0
     rough: Predict | None = field(default=None, repr=False, compare=False)
-    noises: Mapping[str, float] = field(default_factory=dict, repr=False, compare=False)
     unsure: float = 0.0
     in_series: bool = False
     shots: Predict | None = field(default=None, repr=False, compare=False)
@@ -264,8 +262,10 @@ def spread(
     square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
     frames = max(1, round(STRETCH_s * rate_Hz))
     starts = np.arange(0, len(carried[0]), frames)
-    local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts)
-    crowd = float(np.mean(local) ** 2 / np.mean(local**2)) if total > 0.0 else 1.0
+    lengths = np.diff([*starts, len(carried[0])])
+    local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts) / lengths
+    mean, square_mean = np.average([local, local**2], axis=1, weights=lengths)
+    crowd = float(mean**2 / square_mean) if total > 0.0 else 1.0
     return float(np.sqrt(0.5 * square / total**2 / (crowd * len(carried[0]))))
 
 

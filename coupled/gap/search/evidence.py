@@ -35,10 +35,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.beam.fit import Group, SetFit
-from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.effect import Effect, Parameter
-from coupled.gap.signals.output import memory
+from coupled.gap.search.found import Fit, Group
+from coupled.gap.search.problem import Problem
+from coupled.gap.signals.output import Output, memory
 from coupled.gap.thresholds import PRIOR_EFFECT, PRIOR_NUMBER, PRIOR_SPAN
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,7 @@ def fewest_unexplained(known: Sequence[Evidence]) -> Floats:
     return np.asarray(counts[np.argmin(squares, axis=0), np.arange(squares.shape[1])])
 
 
-def evidence(problem: Problem, fitted: SetFit, variance: Floats) -> Evidence:
+def evidence(problem: Problem, fitted: Fit, variance: Floats) -> Evidence:
     """Return the evidence of the set of a fit; `variance` is v_o, shape (outputs,)."""
     lefts = [output.residual(fitted.rig) for output in problem.outputs]
     squares = np.array([float(np.mean(left**2)) for left in lefts]) / variance
@@ -116,3 +116,16 @@ def _width(problem: Problem, p: Parameter, group: Group, key: str) -> float:
     error = 0.5 * (group.high[key] - group.low[key]) / 1.96
     size = min(max(size, error), flat) if math.isfinite(error) else flat
     return size * PRIOR_SPAN / math.sqrt(2.0 * math.pi)
+
+
+def likelier_by(outputs: Sequence[Output], right: Fit, wrong: Fit) -> float:
+    """Return the log-likelihood by which the `right` fit of whole records beats the `wrong` one.
+
+    Effective samples are counted by the autocorrelation time of what the right one leaves.
+    """
+    gain = 0.0
+    for output in outputs:
+        lefts = output.residual(right.rig), output.residual(wrong.rig)
+        better, worse = misfit(np.array([float(np.mean(left**2)) for left in lefts]))
+        gain += 0.5 * len(lefts[0]) / memory(lefts[0]) * float(worse - better)
+    return gain

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from coupled.gap.beam.beam import search_sets
 from coupled.gap.diagnose import Diagnosis, diagnose
 from coupled.rig.rig import Rig
 from tests.support.gaps import made, nominal_rig
@@ -19,7 +18,7 @@ def answer(
     """Return the diagnosis of a bench's record with effects."""
     nominal = rig or nominal_rig(False)
     record = made(folder, nominal, values, seed)
-    return diagnose(nominal, {"r": record}, search=search_sets)
+    return diagnose(nominal, {"r": record})
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
@@ -55,6 +54,13 @@ def test_a_known_effect_is_found_at_its_size(
 def test_two_effects_of_two_stages_are_found_together(tmp_path: Path) -> None:
     both = {"bend": {"bend_{d}_per_N": 1.6e-4}, "inertia": {"factor": 1.4}}
     found = answer(tmp_path, both, 5)
+    assert {effect.name for effect in found.effects} == set(both)
+
+
+def test_beside_an_effect_without_a_number_another_stage_is_explained_too(tmp_path: Path) -> None:
+    servo = nominal_rig(False).changed({"controls.column.loader.servo_frequency_Hz": 12.0})
+    both = {"no_servo": {}, "inertia": {"factor": 1.4}}
+    found = answer(tmp_path, both, 6, servo)
     assert {effect.name for effect in found.effects} == set(both)
 
 

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coupled.gap.beam.fit import SetFit, fit_set
 from coupled.gap.effects.effect import Effect, possible
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.signals.output import Output
+from coupled.gap.search.fit import fit_set
+from coupled.gap.search.found import Fit
+from coupled.gap.signals.output import Output, Part, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
@@ -74,20 +75,21 @@ class Problem:
         self,
         effects: Sequence[Effect],
         start: Mapping[str, float] | None = None,
-        parent: SetFit | None = None,
+        parent: Fit | None = None,
         descent: Descent = WHOLE,
-        near: SetFit | None = None,
-    ) -> SetFit:
-        """Return a set fitted together with the nuisance parameters to the whole record.
+        near: Fit | None = None,
+        part: Part = "all",
+    ) -> Fit:
+        """Return a set fitted together with the nuisance parameters, to the whole record or a part.
 
-        Groups of effects that `parent` has as well are taken over from it. `near` is a fit of the
-        set that ended at the start.
+        Groups of effects that `parent` has as well, at the same values, are taken over. `near` is a
+        fit of the set that ended at the start.
         """
         free = self.beside(effects)
         begun = self.case.with_contact(effects, free, start or {})
         slopes = {} if near is None else {tuple(g.values): g.slope for g in near.groups.values()}
         known = replace(descent, known=self._known, slopes=slopes)
-        return fit_set(self.case, effects, free, self.priors, begun, parent, known)
+        return fit_set(self.case, effects, free, self.priors, begun, parent, known, part)
 
     def rig_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> Rig | None:
         """Return the rig with a set of these values, None where the physics cannot give it."""
@@ -95,14 +97,26 @@ class Problem:
         known = {**self.case.neutral, **values}
         return possible(self.case.nominal, self.case.control, every, known)
 
-    def within_tolerance(self, found: SetFit) -> Rig:
-        """Return the rig of a fit without effects, its nuisance parameters within their 95 %."""
+    def within_tolerance(self, found: Fit) -> Fit:
+        """Return a fit with its nuisance parameters within their 95 %."""
         values = dict(found.values)
         for key, prior in self.priors.items():
             if key in values:
                 half = NORMAL_95 * prior.sigma
                 values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
-        return self.rig_of((), values) or self.case.nominal
+        rig = self.rig_of(found.effects, values)
+        return found if rig is None else replace(found, values=values, rig=rig)
+
+    def surely_open(self, settled: Rig) -> Problem:
+        """Return the problem in which a gap that this rig leaves is held to noise alone."""
+        anew = Problem(self.case.surely_open(settled))
+        anew._known.update(self._known)  # no fit asks for a limit
+        return anew
+
+    def over_limit(self, rig: Rig) -> set[str]:
+        """Return the outputs of which a rig leaves more than noise may, by the noise known."""
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        return {at for at, gap in gaps.items() if gap > limits[at]}
 
     @cached_property
     def by_shots(self) -> Problem | None:
