@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,6 +240,8 @@ def _expand(beam: Beam, fitted: Fit, library: Sequence[Effect], wide: set[str]) 
     many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
     beside, worth = _beside(fitted.effects, library, wide), beam.worth(names_of(fitted.effects))
     screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
+    if not screened and is_best and (pair := beam.screen.pair(fitted, beside, worth)):
+        _fit_sets(beam, _both(fitted, *pair))
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     dry = next((one for one in plain if one.effect.dry), None)
@@ -295,6 +298,15 @@ def _tries(fitted: Fit, one: Screened, contact: Mapping[str, float]) -> list[Try
     effects = (*fitted.effects, one.effect)
     beside = contact if one.effect.dry else {}
     return [(effects, {**beside, **fitted.values, **start}, fitted) for start in one.starts]
+
+
+def _both(fitted: Fit, one: Screened, other: Screened) -> list[Try]:
+    """Return the starts of a set with two effects more; none where these share a number."""
+    if keys_of([one.effect]) & keys_of([other.effect]):
+        return []
+    effects = (*fitted.effects, one.effect, other.effect)
+    pairs = product(one.starts, other.starts)
+    return [(effects, {**fitted.values, **first, **second}, fitted) for first, second in pairs]
 
 
 def _contact(beam: Beam, fitted: Fit) -> Start:

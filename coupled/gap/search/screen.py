@@ -7,7 +7,9 @@ starts.
 
 The power that a signature takes of the residual is the score test's statistic, and gives the gain
 in log-likelihood that the effect is predicted to make (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948).
-An effect whose predicted gain is less than what its prior costs is not fitted. The signatures
+An effect whose predicted gain is less than what its prior costs is not fitted. Two effects may pay
+together where neither does alone, since what each leaves is slow and counts few samples: where none
+pays, the best pair is screened by the projection on both signatures. The signatures
 beside one set of effects are nearly those beside another: they are taken once, and again only
 beside the best set.
 """
@@ -20,19 +22,22 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupled.gap.chain import BY_NAME as STAGE_OF
 from coupled.gap.effects.effect import Effect, touched
 from coupled.gap.search.evidence import misfit
 from coupled.gap.search.found import Fit
 from coupled.gap.search.problem import Problem
-from coupled.gap.signals.output import Floats
+from coupled.gap.signals.output import Floats, memory
 from coupled.gap.thresholds import (
+    ALIKE,
     BEAM_CANDIDATES,
     BEAM_FACTORS,
     BEAM_SIZES,
     LIMIT_BISECTIONS,
     LIMIT_SHARES,
+    PRIOR_EFFECT,
     SCREEN_LESS,
     SCREEN_NEAR,
     SCREEN_SHOWN,
@@ -47,13 +52,15 @@ Values = dict[str, float]
 class Screened(NamedTuple):
     """A candidate, where its fits start, and what its signature takes of the residual.
 
-    `taken` is the power, noise floors², `gain` the predicted log-likelihood gain.
+    `taken` is the power, noise floors², `gain` the predicted log-likelihood gain, `direction` the
+    signature that takes most, of unit length.
     """
 
     effect: Effect
     starts: list[Values]
     taken: float
     gain: float
+    direction: Floats
 
 
 class Worth(NamedTuple):
@@ -104,31 +111,72 @@ class Screen:
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
 
+    def pair(
+        self, current: Fit, candidates: Sequence[Effect], worth: Worth
+    ) -> tuple[Screened, Screened] | None:
+        """Return the two candidates of one output that take most of its residual together.
+
+        None where two effects are not worth it. Samples are counted by what both leave. The
+        signatures of the candidates are those that `best` has taken.
+        """
+        groups: dict[tuple[int, ...], list[Effect]] = {}
+        for effect in candidates:
+            groups.setdefault(tuple(self._ours(effect)), []).append(effect)
+        found: tuple[float, tuple[Screened, Screened]] | None = None
+        for ours, effects in groups.items():
+            each = [self._screened(current, effect, worth.counts) for effect in effects]
+            each = [one for one in each if one.starts]
+            if len(each) < 2:
+                continue
+            now = _residual(self.problem, effects[0], current.rig)
+            shapes = np.array([one.direction for one in each])
+            i, j = _best_two(shapes, now)
+            both = shapes[[i, j]].T
+            left = now - both @ np.linalg.lstsq(both, now, rcond=None)[0]
+            squares = [self._squares(ours, one) for one in (now, left)]
+            parts = np.split(left, self._edges(ours)[1:])
+            counts = np.array([len(part) / memory(part) for part in parts])
+            gain = 0.5 * float(counts @ (misfit(squares[0]) - misfit(squares[1])))
+            if gain > worth.least + PRIOR_EFFECT and (found is None or gain > found[0]):
+                found = gain, (each[i], each[j])
+        return None if found is None else found[1]
+
+    def _ours(self, effect: Effect) -> list[int]:
+        """Return the numbers of the outputs in which an effect shows."""
+        return [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
+
+    def _edges(self, ours: Sequence[int]) -> NDArray[np.int64]:
+        """Return where each of some outputs begins in their joint residual."""
+        return np.cumsum([0, *(len(self.problem.outputs[k].measured) for k in ours[:-1])])
+
+    def _squares(self, ours: Sequence[int], left: Floats) -> Floats:
+        """Return the mean squares of some outputs' residuals, over their variance."""
+        frames = np.array([len(self.problem.outputs[k].measured) for k in ours])
+        squares = np.add.reduceat(left**2, self._edges(ours)) / frames
+        return np.asarray(squares / self.variance[list(ours)])
+
     def _screened(self, current: Fit, effect: Effect, counts: Floats) -> Screened:
         """Return a candidate with the start of each shape that leaves least."""
-        now = _residual(self.problem, effect, current.rig)
-        outputs = touched(self.problem.outputs, [effect])
-        ours = [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
-        edges = np.cumsum([0, *(len(one.measured) for one in outputs[:-1])])
+        now, ours = _residual(self.problem, effect, current.rig), self._ours(effect)
 
         def unlikely(left: Floats) -> float:
-            frames = np.array([len(one.measured) for one in outputs])
-            squares = np.add.reduceat(left**2, edges) / frames / self.variance[ours]
-            return 0.5 * float(counts[ours] @ misfit(squares))
+            return 0.5 * float(counts[ours] @ misfit(self._squares(ours, left)))
 
         taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
+        direction = np.zeros(len(now))
         for values, shape, change in self.known[effect.name]:
             size = float(change @ change)
             # A limit that is never met leaves the residual as it is, and a fit where it was.
             if size <= SCREEN_SHOWN * len(now):
                 continue
             share = float(now @ change) / size
-            taken = max(taken, share**2 * size)
+            if share**2 * size >= taken:
+                taken, direction = share**2 * size, change / math.sqrt(size)
             gain = max(gain, unlikely(now) - unlikely(now - share * change))
             left = float((now + change) @ (now + change))
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, values
-        return Screened(effect, [values for _, values in starts.values()], taken, gain)
+        return Screened(effect, [values for _, values in starts.values()], taken, gain, direction)
 
     def _signatures(self, current: Fit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures beside the current effects."""
@@ -142,6 +190,17 @@ class Screen:
                     change = _residual(self.problem, effect, rig) - now
                     found.append(_Signature(values, shape, change))
         return found
+
+
+def _best_two(shapes: Floats, now: Floats) -> tuple[int, int]:
+    """Return which two of some unit vectors take most of a residual together."""
+    alike = np.clip(shapes @ shapes.T, -1.0, 1.0)
+    np.fill_diagonal(alike, 1.0)
+    own, apart = shapes @ now, np.maximum(1.0 - alike**2, 1e-300)
+    power = own[:, None] ** 2 + own**2 - 2.0 * alike * np.outer(own, own)
+    power = np.where(np.abs(alike) < 1.0 - ALIKE, power / apart, 0.0)
+    i, j = np.unravel_index(int(np.argmax(power)), power.shape)
+    return int(i), int(j)
 
 
 def _residual(problem: Problem, effect: Effect, rig: Rig) -> Floats:
