@@ -25,7 +25,15 @@ from coupled.gap.search.found import Choice, Found
 from coupled.gap.search.histories import course_in
 from coupled.gap.signals.output import Output
 from coupled.gap.stages.stages import Reader
-from coupled.gap.thresholds import CERTAIN, DOUBT, MOST, STATED_MOST, SURE, UNDERSTATED
+from coupled.gap.thresholds import (
+    CERTAIN,
+    DOUBT,
+    MOST,
+    STATED_MOST,
+    SURE,
+    UNDERSTATED,
+    UNDETERMINED_MOST,
+)
 from coupled.record.channels import ControlName, unit_of
 from coupled.rig.rig import Rig
 
@@ -123,7 +131,8 @@ def effects_of(
     """Return the effects found, the largest log-likelihood gain first.
 
     The probability of an effect falls with its credibility. It is at most `STATED_MOST`, the share
-    of correct effects among the most probable ones.
+    of correct effects among the most probable ones, and at most `UNDETERMINED_MOST` if the interval
+    of its size contains the neutral value.
     """
     remains = {stage.name: stage.remainder for stage in stages}
     records = [reader.record for reader in readers]
@@ -135,11 +144,22 @@ def effects_of(
         sure = DOUBT + (SURE - DOUBT) * known.value
         scatter = _sample_error(effect, readers)
         numbers = tuple(_estimate(choice, effect, p, case, scatter) for p in effect.free)
-        probability = min(step.probability * sure, STATED_MOST)
+        most = STATED_MOST if has_size(effect, case, numbers) else UNDETERMINED_MOST
+        probability = min(step.probability * sure, most)
         course = course_in(effect, case, choice.fit, records)
         return EffectResult(effect.name, effect.stage, probability, numbers, known, course)
 
     return tuple(result(step) for step in sorted(choice.steps, key=lambda s: -s.gain))
+
+
+def has_size(effect: Effect, case: Case, numbers: Sequence[ParameterEstimate]) -> bool:
+    """Tell whether a size of an effect differs from its neutral value; a limit always does."""
+    sizes = [(p, one) for p, one in zip(effect.free, numbers, strict=True) if p.scanned]
+    for p, one in sizes:
+        none, low, high = p.neutral(case.nominal, case.control), one.low, one.high
+        if p.inverse or not (low is None or low <= none) or not (high is None or none <= high):
+            return True
+    return not sizes
 
 
 def _estimate(

@@ -82,7 +82,11 @@ class Case:
     @cached_property
     def settings(self) -> dict[str, Effect]:
         """The settings that the outputs depend on, by name: nuisances of every fit."""
-        return {name: one for name, one in self.known.items() if self._unsettled & {*one.shows_in}}
+        return {name: one for name, one in self.known.items() if self.is_open(one)}
+
+    def is_open(self, effect: Effect) -> bool:
+        """Tell whether the rig as filed leaves a gap in an output in which an effect shows."""
+        return bool(self._unsettled & {*effect.shows_in})
 
     @cached_property
     def contact(self) -> tuple[Effect, ...]:

@@ -64,12 +64,18 @@ class Problem:
         return found
 
     def beside(self, effects: Sequence[Effect]) -> list[Effect]:
-        """Return the nuisance parameters of a set: those whose number no effect of it frees."""
+        """Return the nuisance parameters of a set: those whose number no effect of it frees.
+
+        How the filed friction yields is one where the rig as filed leaves a gap.
+        """
         freed = {p.key for effect in effects for p in effect.parameters}
         free = list(self.nuisances)
         if any(e.dry for e in effects) or is_dry(self.case.nominal, self.case.control):
-            free += self.case.contact
+            free += [one for one in self.case.contact if self._may_yield(one, effects)]
         return [one for one in free if freed.isdisjoint(p.key for p in one.free)]
+
+    def _may_yield(self, contact: Effect, effects: Sequence[Effect]) -> bool:
+        return any(e.dry for e in effects) or self.case.is_open(contact)
 
     def fit(
         self,
