@@ -76,7 +76,7 @@ def test_every_stage_and_name_is_listed_once() -> None:
 
 
 def test_no_other_module_spells_an_effect() -> None:
-    """Names that are fields of a rig as well, such as `bend`, cannot be distinguished from those."""
+    """Names that are fields of a rig as well, such as `bend`, are left out."""
     fields = {p.key.split(".")[-1] for e in EFFECTS for p in e.parameters}
     fields |= {*Control.model_fields}
     own = {name for name in BY_NAME if not any(field.startswith(name) for field in fields)}

@@ -81,8 +81,10 @@ LOADER: tuple[Effect, ...] = (
         "loader",
         (
             added("ripple_N", "loader.ripple_N", 0, 60, 1.0),
-            value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2),
-            value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0),
+            replace(
+                value("period_{d}", "loader.ripple_period_{d}", 2e-4, 0.5, 1e-2), scanned=False
+            ),
+            replace(value("phase_rad", "loader.ripple_phase_rad", -7, 7, 1.0), scanned=False),
         ),
         Signature("computed", "missing"),
         seen=ripples,
