@@ -44,7 +44,9 @@ def test_spare_columns_go_before_a_table_becomes_a_list(width: int, left_out: li
 
 
 def test_without_spare_columns_to_leave_out_it_is_a_list() -> None:
-    assert "filed: 1234.5678" in printed(30, ("95 % interval", "prob."))
+    text = printed(30, ("95 % interval", "prob."))
+    assert "filed: 1234.5678" in text
+    assert "prob.: 1234.5678" in text
 
 
 def test_wide_shows_every_column() -> None:

@@ -59,7 +59,7 @@ class Turbulence(Section):
 
 
 def check_wind(wind: Wind, file: object) -> None:
-    """Refuse a wind whose times do not rise, or whose speeds cannot be flown."""
+    """Refuse a wind whose times do not rise, or whose speeds are invalid."""
     if any(b <= a for a, b in pairwise(wind.time)):
         raise InputError(file, "wind.time_s", "must rise from value to value")
     speeds = {"along_m_per_s": wind.along, "up_m_per_s": wind.up}
@@ -87,8 +87,8 @@ class MovingAir(Wrapper):
     def __init__(self, wind: Wind, frame_s: float) -> None:
         self._wind, self._frame_s = wind, frame_s
 
-    def meet(self, aircraft: Aircraft) -> Hook | None:
-        """Let the air move, frame by frame from the start."""
+    def attach(self, aircraft: Aircraft) -> Hook | None:
+        """Return a hook that moves the air, frame by frame from the start."""
         wind, frame_s, frame = self._wind, self._frame_s, 0
         north, down = (aircraft.lever(name).set for name in _WINDS)
         rising = [0.0] * len(wind.time) if wind.up is None else wind.up

@@ -78,7 +78,7 @@ def test_noise_does_not_pass_for_a_second_gradient() -> None:
         ({"v1": -readings(*grid()).v1}, "v1_V: falls as the deflection grows"),
         ({"v3": -readings(*grid()).v3}, "v3_V: falls as the force grows"),
         ({"v3": np.zeros(25)}, "every v3 is the same"),
-        ({"v1": S1 * (grid()[0] + K * grid()[1])}, "K comes out negative"),
+        ({"v1": S1 * (grid()[0] + K * grid()[1])}, "K is negative"),
         ({"force": grid()[1] * np.where(np.arange(25) < 20, 1.0, -1.0)}, "row 22: force and defl"),
         ({"deflection": 1000.0 * grid()[0]}, "row 2: deflection: is .* another unit"),
     ],

@@ -156,5 +156,5 @@ def test_a_diagnosis_against_healthy_records_names_the_stage_that_changed() -> N
 def test_a_verdict_needs_healthy_records_that_would_show_a_change() -> None:
     alone = diagnose(screw_rig(), {"r": screw(70)}, healthy={"w": WELL[0]}, search=without_effects)
     assert alone.verdict == "ambiguous"
-    assert "cannot be said" in alone.summary
+    assert "cannot be decided" in alone.summary
     assert alone.as_dict()["healthy"]["shown"] == {"loader": None}

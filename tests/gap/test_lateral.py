@@ -111,5 +111,5 @@ def test_pedals_held_by_their_breakout_show_nothing_of_their_loader() -> None:
     loader = found.stage("loader")
     assert not loader.judged
     assert loader.why == "pedals_computed_m shows little but noise"
-    assert "a push that moves pedals_computed_m" in found.next_test
+    assert "a force that moves pedals_computed_m" in found.next_test
     assert found.stage("airframe").judged

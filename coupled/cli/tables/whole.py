@@ -44,13 +44,19 @@ def print_whole(console: Console, table: Table, spare: Sequence[str] = ()) -> No
 
 
 def _narrow(table: Table, width: int, spare: Sequence[str]) -> list[str]:
-    """Take spare columns off a table until it fits a width; return their heads."""
-    left_out = list[str]()
+    """Take spare columns off a table until it fits a width; return their heads.
+
+    None where it does not fit without them either: a list has room for all.
+    """
+    left_out, every = list[str](), table.columns
     for head in reversed(spare):
         if _needs(table) <= width:
             break
         table.columns = [column for column in table.columns if column.header != head]
         left_out.insert(0, head)
+    if _needs(table) > width:
+        table.columns = every
+        return []
     return left_out
 
 
