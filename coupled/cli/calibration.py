@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -179,9 +178,7 @@ def _plan(
     targets: tuple[Path | None, str],
     units: System,
 ) -> None:
-    from coupled.calibration.crossed import crossed_forces, crossed_precision
-    from coupled.calibration.form import form
-    from coupled.calibration.plan import deflection_needs, fewest, precision, stations
+    from coupled.calibration.planned import plan_readings
     from coupled.cli.tables.calibration import print_plan
 
     (file, rig, control), (write, json_file) = of_rig, targets
@@ -191,43 +188,19 @@ def _plan(
             raise InputError(write, "--write", "a form for readings ends in .csv")
         check_target(write, [file])
     check_json(json_file, [file, *([write] if write else [])])
-    sizes = [(few, many) for few in range(2, 7) for many in range(2, 7)]
-    grids = {}
     with progress() as advance:
-        for done, (few, many) in enumerate(sizes):
-            advance(f"{few} gradients by {many} deflections", done, len(sizes))
-            grid = stations(rig, control, few, many, strongest)
-            grids[few, many] = precision(rig, control, grid, tools, looks)
-        advance("the fewest readings that reach it", 0, 0)
-        chosen = fewest(rig, control, tools, share, strongest, looks)
-        design = [s for s, count in chosen for _ in range(count)]
-        reached = precision(rig, control, design, tools, looks)
-        needs = deflection_needs(rig, control, design, tools, looks)
-        held = crossed_forces(rig, control, len(design), crossed)
-        terms = crossed_precision(rig, control, design, crossed, tools, looks) if held else {}
-    table: dict[str, object] = {
-        "half_width": reached.half_width,
-        "bend": reached.bend,
-        "deflection": asdict(needs),
-        "readings": [{**s.__dict__, "count": count} for s, count in chosen],
-        "grids": [
-            {"gradients": few, "deflections": many, "half_width": grid.half_width}
-            for (few, many), grid in grids.items()
-        ],
-    }
-    if held:
-        table["bend_by_others_half_width"] = terms
+        found = plan_readings(rig, control, tools, share, strongest, looks, crossed, advance)
     with Outputs() as outputs:
         if write is not None:
-            write_text(outputs.at(write), form(chosen, control, looks, held, units))
-        keep_json(table, json_file, outputs)
+            write_text(outputs.at(write), found.form(units))
+        keep_json(found.as_dict(), json_file, outputs)
     if json_file != "-":
-        print_plan(out, control, grids, chosen, reached, needs, units)
-        for name, half in terms.items():
+        print_plan(out, found, units)
+        for name, half in found.others.items():
             force, bend = (in_system(u, units) for u in ("N", f"{unit_of(control)}/N"))
             held_at = f"±{force.factor * crossed:.4g} {force.unit}"
             reached_to = f"±{bend.written(half, 2)} {bend.unit}"
             say(f"with {held_at} on the {name}: K by {name} to {reached_to}")
         if write is not None:
             say(f"form: {write}")
-    print_json(table, json_file)
+    print_json(found.as_dict(), json_file)
