@@ -74,7 +74,7 @@ def check(
             from coupled.reports.check import check_report as reported
 
             note = " ".join(dict.fromkeys(filter(None, notes)))
-            write_report(report, outputs, inputs, lambda made: reported(checked, made), note)
+            write_report(report, outputs, inputs, lambda made: reported(checked, made, units), note)
     if json_file != "-":
         print_verdicts(out, checked.verdicts, units)
         if junit is not None:

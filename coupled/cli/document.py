@@ -103,7 +103,7 @@ def document(
     table = found.as_dict()
     with progress("drawing the pages"), Outputs() as outputs:
         written = draw_pages(
-            found.controls, found.fits, found.issue, outputs.folder(folder), outputs.at(pdf)
+            found.controls, found.fits, found.issue, outputs.folder(folder), outputs.at(pdf), units
         )
         if write is not None:
             write_text(outputs.at(write), text)
@@ -115,7 +115,7 @@ def document(
                 report,
                 outputs,
                 inputs,
-                lambda made: force_report(found.controls, found.fits, found.issue, made),
+                lambda made: force_report(found.controls, found.fits, found.issue, made, units),
             )
     if json_file != "-":
         _print(found.controls, every, data.flight is not None, units)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import polars as pl
@@ -18,8 +18,9 @@ from coupled.plots.histories import plain
 from coupled.plots.layout import Layout
 from coupled.plots.sweepview import Shown, is_logarithmic, mark_ended, place_of, titled
 
+Dashes = Literal["-", "--", ":", "-."]
 _MOST_LINES = 8
-_STYLES = ("-", "--", ":", "-.")
+_STYLES: tuple[Dashes, ...] = ("-", "--", ":", "-.")
 _USUAL = Layout()
 _MARKS = "os^Dv<>p"
 
@@ -63,9 +64,8 @@ def draw_grid(
         if as_lines:
             for i, configuration in enumerate(configurations):
                 rows = found.filter(pl.col("configuration") == configuration)
-                axes, style = row[0 if layout.overlay else i], "-"
-                if layout.overlay:
-                    style = _STYLES[i % len(_STYLES)]
+                axes = row[0 if layout.overlay else i]
+                style = _STYLES[i % len(_STYLES)] if layout.overlay else "-"
                 _draw_lines(axes, rows, along, other, shown, style)
             row[0].set_ylabel(shown.label)
         else:

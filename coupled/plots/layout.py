@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -84,7 +85,7 @@ def for_print(figure: Figure, layout: Layout) -> Figure:
     scale = min(1.0, math.sqrt(width * height / 40.0))  # of 8 by 5 inches
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
-        text.set_fontsize(min(_LARGEST_pt, max(_SMALLEST_pt, scale * text.get_fontsize())))
+        text.set_fontsize(min(_LARGEST_pt, max(_SMALLEST_pt, scale * float(text.get_fontsize()))))
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             size = min(_LARGEST_pt, max(_SMALLEST_pt, 10.0 * scale))
@@ -97,7 +98,7 @@ def for_print(figure: Figure, layout: Layout) -> Figure:
     for axes in figure.axes:
         _break_labels(axes, width, height)
     engine = figure.get_layout_engine()
-    if engine is not None:
+    if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(w_pad=_PAD_in, h_pad=_PAD_in)
     title = figure.get_suptitle()
     if title:
@@ -117,7 +118,7 @@ def _break_labels(axes: Axes, width_in: float, height_in: float) -> None:
     up = (height_in - 0.6) / rows - 0.3
     for text, room in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
         words = [text.get_text().replace("\n", " ")] if text.get_text() else []
-        text.set_text(_within(words, max(room, 0.4), text.get_fontsize()))
+        text.set_text(_within(words, max(room, 0.4), float(text.get_fontsize())))
         text.set_linespacing(1.0)
 
 

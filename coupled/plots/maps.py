@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
-from coupled.display import Shown, System, in_system
+from coupled.display import System, in_system, pressure_shown
 from coupled.plots.pages import BLUE, GRAY, GREEN, ORANGE, panels, scale, with_legend
 from coupled.record.channels import ControlName
 from coupled.units import POUND_N, KNOT_m_per_s
@@ -81,8 +81,8 @@ def _without_loss(maps: Mapping[ControlName, Sequence[LossMap]]) -> list[str]:
                 found.setdefault(f"{why} on the {control}", []).append(loss_map.configuration)
     alike: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for place, configurations in found.items():
-        why, _, control = place.partition(" on the ")
-        alike.setdefault((why, tuple(configurations)), []).append(control)
+        why, _, name = place.partition(" on the ")
+        alike.setdefault((why, tuple(configurations)), []).append(name)
     return [
         f"{why} on {_in_a_row(controls)}, {_in_a_row(configurations)}."
         for (why, configurations), controls in alike.items()
@@ -97,7 +97,7 @@ def _draw_row(
     figure: Figure, ours: Sequence[tuple[Axes, LossMap]], flown: Floats, system: System
 ) -> None:
     """Draw the maps of a control, in the same colours."""
-    pressure = _pressure(system)
+    pressure = pressure_shown(system)
     factor, unit = scale(ours[0][1].control, system)
     least, most = _range(ours, flown)
     for axes, loss_map in ours:
@@ -164,11 +164,6 @@ def _grey(maps: Mapping[ControlName, Sequence[LossMap]]) -> str:
     return f"grey: {' and '.join(where)}" if where else ""
 
 
-def _pressure(system: System) -> Shown:
-    """Return what q̄ is drawn in."""
-    return Shown("kPa", 1e-3) if system == "si" else in_system("Pa", system)
-
-
 def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
     """Draw the hull of what was flown, where it is more than a line."""
     points = np.stack((factors[0] * flown[0], factors[1] * flown[1]), axis=1)
@@ -183,7 +178,7 @@ def _outline(axes: Axes, flown: Floats, factors: tuple[float, float]) -> None:
 def draw_feel(name: str, feel: Feel, system: System = "si") -> Figure:
     """Draw the column's force per g and per knot against q̄."""
     figure, grid = panels(1, 2, 3.6)
-    pressure, force = _pressure(system), in_system("N", system)
+    pressure, force = pressure_shown(system), in_system("N", system)
     rows = (
         (f"force per g, {force.unit}", feel.per_g_N),
         (f"pull per knot slower, {force.unit}", feel.per_knot_N),

@@ -16,6 +16,7 @@ from coupled.authority.compare import Flight, compare, fly_and_judge, judge
 from coupled.authority.figures import rows
 from coupled.authority.maps import LossMap
 from coupled.errors import InputError
+from coupled.flight.manoeuvre import Configuration
 from coupled.flight.runfile import read_run
 from coupled.plots.campaign import draw_sweep
 from coupled.plots.flights import draw_comparison
@@ -26,7 +27,12 @@ from coupled.record.record import Record
 from tests.support.commands import coupled
 
 BEND, SPEED = "rig.controls.column.loader.bend_m_per_N", "rig.flight.calibrated_airspeed_m_per_s"
-CONFIGURATIONS = ("rigid", "uncompensated", "deflection only", "compensated")
+CONFIGURATIONS: tuple[Configuration, ...] = (
+    "rigid",
+    "uncompensated",
+    "deflection only",
+    "compensated",
+)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +63,9 @@ def test_a_file_has_the_size_asked_for(flights: list[Flight], tmp_path: Path) ->
     assert (wide / 300 * 2.54, high / 300 * 2.54) == pytest.approx((8.5, 6.0), abs=0.02)
     save(figure, tmp_path / "f.svg")
     assert 'width="240.9' in (tmp_path / "f.svg").read_text()  # points
-    sizes = [label.get_fontsize() for axes in figure.axes for label in axes.get_xticklabels()]
+    sizes = [
+        float(label.get_fontsize()) for axes in figure.axes for label in axes.get_xticklabels()
+    ]
     assert 6.0 <= min(sizes) <= max(sizes) <= 7.5
 
 
