@@ -19,6 +19,7 @@ from coupled.cli.rigs import (
     StrongestOption,
     instruments,
     rig_and_control,
+    say_guesses,
 )
 from coupled.cli.terminal import check_json, keep_json, out, print_json, say, say_note
 from coupled.display import System, in_system
@@ -133,6 +134,7 @@ def _calibrate(
 
     (file, data, name), (write, figure, report, json_file) = rig, targets
     date, hardware = noted
+    note = say_guesses(data, (name,))
     with progress(f"fitting the {name}'s readings"):
         found = fit(read_readings(path, name), data.controls[name], name, tools, path)
     text = ""
@@ -148,7 +150,7 @@ def _calibrate(
             from coupled.plots.readings import draw_readings
             from coupled.plots.saving import save
 
-            save(draw_readings(found, shown(path.name), units), outputs.at(figure))
+            save(draw_readings(found, shown(path.name), units), outputs.at(figure), note)
         keep_json(found.as_dict(), json_file, outputs)
         if report is not None:
             from coupled.reports.calibration import calibration_report
@@ -156,7 +158,11 @@ def _calibrate(
             names = (data.name, shown(path.name), date)
             inputs = [path, file]
             write_report(
-                report, outputs, inputs, lambda made: calibration_report(found, *names, made, units)
+                report,
+                outputs,
+                inputs,
+                lambda made: calibration_report(found, *names, made, units),
+                note,
             )
     if json_file != "-":
         print_calibration(out, found, units)
