@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from coupled.cli.app import JsonOption, RunArgument, UnitsOption, app
+from coupled.cli.app import (
+    JsonOption,
+    OverlayOption,
+    PanelsOption,
+    RunArgument,
+    SizeOption,
+    UnitsOption,
+    app,
+)
 from coupled.cli.process import INTERRUPTED
 from coupled.cli.progress import progress
 from coupled.cli.reporting import ReportOption, check_report, say_report, write_report
@@ -28,7 +36,8 @@ if TYPE_CHECKING:
 
 @app.command(
     epilog="[dim]Examples: coupled compare · coupled compare pull-up-737 --figure out/737.png"
-    " · coupled compare my-run.toml --json - · coupled compare --report out/report.html[/]"
+    " · coupled compare my-run.toml --json - · coupled compare --report out/report.html"
+    " · coupled compare --panels surface,force --size 8.5x6cm --figure out/paper.pdf[/]"
 )
 def compare(
     run: RunArgument = DEFAULT_RUN,
@@ -39,6 +48,9 @@ def compare(
     no_figure: Annotated[bool, typer.Option("--no-figure", help="Draw nothing.")] = False,
     report: ReportOption = None,
     units: UnitsOption = "si",
+    panels: PanelsOption = "",
+    overlay: OverlayOption = False,
+    size: SizeOption = "",
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -50,10 +62,14 @@ def compare(
     path = figure or Path("out") / f"{cases[0].name}.png"
     inputs = [file for case in cases for file in input_files(case)]
     if not no_figure:
-        from coupled.plots.saving import check_format
+        from coupled.plots.flights import draw_comparison, panels_of
+        from coupled.plots.layout import layout_of
+        from coupled.plots.saving import check_format, save
 
         check_format(path)
         check_target(path, inputs)
+        layout = layout_of(panels, overlay, size)
+        layout.chosen(panels_of(cases[0]))
     own = inputs if no_figure else [*inputs, path]
     check_json(json_file, [*own, *check_report(report, own)])
     say_stale(cases[0].rig)
@@ -64,10 +80,7 @@ def compare(
     table = flights.as_dict()
     with timed("draw and write"), Outputs() as outputs:
         if not no_figure:
-            from coupled.plots.flights import draw_comparison
-            from coupled.plots.saving import save
-
-            save(draw_comparison(flights, units), outputs.at(path))
+            save(draw_comparison(flights, units, layout), outputs.at(path))
         keep_json(table, json_file, outputs)
         if report is not None:
             from coupled.reports.comparison import comparison_report
