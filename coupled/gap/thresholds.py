@@ -322,8 +322,10 @@ LEAST_HOLD = 2.0  # chosen: stretches that hold a half's action, under which its
 # The search over sets of effects (`beam`).
 BEAM_WIDTH, BEAM_DEPTH = 6, 4  # sets that are followed, and effects of a set
 GIVEN_UP = 30.0  # log evidence behind the best, from which a start or a set is given up
+BEGUN_BEHIND = 120.0  # chosen: the same of a fit that has only begun
 BEAM_CANDIDATES, BEAM_BESIDE = 8, 4  # chosen: fitted beside the best set, and beside any other
 BEAM_FIRST = 4  # chosen: evaluations of each start, after which they are compared
+FIT_LEGS, WEIGHT_CHANGED = 3, 2.0  # chosen: legs of a fit, while its weights change by so much
 BEAM_SIZES = (0.03, 0.3, 1.0, 5.0)  # chosen: times where a parameter starts, for signatures
 BEAM_FACTORS = (-2.0, 0.5, 1.0, 5.0)  # chosen: the same for how far a factor is from 1
 PRIOR_EFFECT = 4.0  # −ln of an effect's prior probability: one of some 56, about equally likely

@@ -73,7 +73,8 @@ def test_the_spread_of_noise_is_what_many_records_show() -> None:
     ]
     told = np.mean([spread([carried() for _ in range(4)], own) for _ in range(20)])
     assert told == pytest.approx(np.std(rms) / np.mean(rms), rel=0.15)
-    assert spread([np.zeros(1200)], own) == pytest.approx(np.sqrt(0.5 / 1200))
+    for frames in (1200, 1230):  # the last stretch of the other is a short one
+        assert spread([np.zeros(frames)], own) == pytest.approx(np.sqrt(0.5 / frames))
 
 
 def test_noise_that_has_few_values_may_leave_more_than_its_floor() -> None:

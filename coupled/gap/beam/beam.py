@@ -26,7 +26,7 @@ from coupled.gap.beam.evidence import Evidence, evidence, fewest_unexplained
 from coupled.gap.beam.fit import SetFit
 from coupled.gap.beam.laws import contains, distinct, keys_of
 from coupled.gap.beam.problem import Problem
-from coupled.gap.beam.screen import Screen, Screened
+from coupled.gap.beam.screen import Screen, Screened, Worth
 from coupled.gap.effects.effect import Effect
 from coupled.gap.search.case import Case
 from coupled.gap.search.choose import Choice
@@ -40,7 +40,9 @@ from coupled.gap.thresholds import (
     BEAM_DEPTH,
     BEAM_FIRST,
     BEAM_WIDTH,
+    BEGUN_BEHIND,
     GIVEN_UP,
+    PRIOR_EFFECT,
     RIVAL_GAIN,
     SHOOTINGS,
 )
@@ -50,6 +52,7 @@ Floats = NDArray[np.float64]
 Names = frozenset[str]
 Start = dict[str, float]
 Try = tuple[tuple[Effect, ...], Start, SetFit]  # effects, where their fit starts, its parent
+Begun = tuple[float, SetFit, SetFit]  # log evidence of a begun fit, and its parent
 WIDE, OWN = Descent("wide"), Descent("own")
 FIRST, SHORT = Descent("wide", BEAM_FIRST), Descent("wide", SHOOTINGS)
 ABOVE = (1.05, 1.5)  # times the running friction, where the fit of a breakaway starts
@@ -61,10 +64,19 @@ def search_sets(case: Case, library: Sequence[Effect]) -> tuple[Case, Choice]:
     Noise is estimated with the rig file's parameters, where a gap may pass for coloured noise. It
     is estimated once more with the best set, and the search repeated where it is lower.
     """
-    case = case.surely_open()
-    found = _searched(case, library)
-    anew = case.heard_anew(found.fit.rig) if found.steps else None
-    return (case, found) if anew is None else (anew, _searched(anew, library))
+    problem = Problem(case)
+    root = problem.fit(())
+    problem = problem.surely_open(problem.within_tolerance(root).rig)
+    beam, rounds = _searched(problem, library, [root])
+    case, anew = problem.case, problem.case.heard_anew(beam.fits[beam.best].rig)
+    if anew is not None and beam.best:
+        leading = [frozenset[str](), *(names for names in beam.leading() if names)]
+        problem = Problem(anew)
+        ends = [beam.fits[names] for names in leading]
+        known = [problem.fit(one.effects, one.values, None, OWN) for one in ends]
+        case, (beam, more) = anew, _searched(problem, library, known)
+        rounds = (*rounds, *more)
+    return case, _choice(beam, rounds)
 
 
 @dataclass
@@ -87,14 +99,17 @@ class Beam:
 
     def __post_init__(self) -> None:
         """Screen candidates by signatures that are taken once."""
-        self.screen = Screen(self.problem)
+        self.screen = Screen(self.problem, self.variance)
 
     def add(self, fitted: SetFit) -> None:
-        """Add a fit; of two of one set the more likely stays."""
+        """Add a fit; of two of one set the one stays that may be true, or else the more likely."""
         names = names_of(fitted.effects)
         new = evidence(self.problem, fitted, self.variance)
-        old = self.known.get(names)
-        if old is None or new.log(self.counts) > old.log(self.counts):
+
+        def rank(fit: SetFit, known: Evidence) -> tuple[bool, float]:
+            return may_be_true(self.problem, fit), known.log(self.counts)
+
+        if names not in self.fits or rank(fitted, new) > rank(self.fits[names], self.known[names]):
             self.fits[names], self.known[names] = fitted, new
 
     def log(self, names: Names) -> float:
@@ -119,10 +134,20 @@ class Beam:
         self.counts = fewest_unexplained([self.known[names] for names in self.valid()])
         self.best = self.ranked()[0]
 
+    def worth(self, names: Names) -> Worth:
+        """Return the predicted gain with which one effect more may beat the best set, or none.
+
+        It then brings what the effect's own prior costs, if the nuisance parameters' priors, which
+        it may relieve, do not.
+        """
+        relief = sum(group.penalty for group in self.fits[names].groups.values())
+        behind = self.log(self.best) - self.log(names) if names else 0.0
+        return Worth(PRIOR_EFFECT + behind - relief, self.counts)
+
     def open_outputs(self, names: Names) -> set[str]:
         """Return the outputs that a set leaves wider than noise and the physics' own error."""
         case = self.problem.case
-        first, limits = stage_gaps(case.outputs, self.settled.rig), stage_limits(case.outputs)
+        first, limits = case.gaps(self.settled.rig), stage_limits(case.outputs)
         rig = self.fits[names].rig if names else self.settled.rig
         left = case.gaps(rig) if names == self.best else stage_gaps(case.outputs, rig)
         return {at for at, gap in left.items() if gap > explained_below(first[at], limits[at])}
@@ -146,28 +171,35 @@ def may_be_true(problem: Problem, fitted: SetFit) -> bool:
     return True
 
 
-def _searched(case: Case, library: Sequence[Effect]) -> Choice:
-    """Return the set of effects of a library that explains a case best."""
-    problem = Problem(case)
-    root = problem.fit(())
-    settled = replace(root, rig=problem.within_tolerance(root))
+def _searched(
+    problem: Problem, library: Sequence[Effect], known: Sequence[SetFit]
+) -> tuple[Beam, tuple[dict[str, float], ...]]:
+    """Return the sets of a library's effects about the best, begun with known fits.
+
+    The first of these is without effects. Returned, too, is what each depth gained (`_grow`).
+    """
+    settled, case = problem.within_tolerance(known[0]), problem.case
     beam = Beam(problem, settled, problem.variances(settled.rig))
-    beam.add(root)
+    for fitted in known:
+        beam.add(fitted)
     beam.recount()
-    rounds = _grow(beam, distinct(library, case.contact) if case.contact else list(library))
-    return _choice(beam, rounds)
+    return beam, _grow(beam, distinct(library, case.contact) if case.contact else list(library))
 
 
 def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]:
-    """Fit the neighbours of the best sets, depth by depth.
+    """Fit the neighbours of the best sets, depth by depth, until one explains every stage.
 
     Return the log evidence that each depth's sets gain, by the effect added. Discrete effects are
     tried always: they have no size that could be too small.
     """
-    front: list[Names] = [frozenset()]
-    rounds = list[dict[str, float]]()
-    _fit_sets(beam, [((e,), {}, beam.fits[front[0]]) for e in library if not e.free])
+    front, best, rounds = beam.leading(), beam.best, list[dict[str, float]]()
+    if not best:
+        root = beam.fits[best]
+        _fit_sets(beam, [((e,), dict(root.values), root) for e in library if not e.free])
+        front = list(dict.fromkeys([best, beam.best]))
     for _ in range(BEAM_DEPTH):
+        if not front or (best and not beam.open_outputs(best)):
+            break
         base, known = beam.log(front[0]), set(beam.fits)
         for names in front:
             if wide := beam.open_outputs(names):
@@ -175,21 +207,27 @@ def _grow(beam: Beam, library: Sequence[Effect]) -> tuple[dict[str, float], ...]
         new = set(beam.fits) - known
         if not new:
             break
+        _finish(beam)
         _shoot(beam)
         rounds.append({beam.fits[one].effects[-1].name: beam.log(one) - base for one in new})
-        if beam.best and not beam.open_outputs(beam.best):
+        if beam.best == best:
             break
+        best = beam.best
         front = [names for names in beam.leading() if names and names not in front]
     _look_around(beam, library)
     return tuple(rounds)
 
 
 def _look_around(beam: Beam, library: Sequence[Effect]) -> None:
-    """Fit what the best set is without each effect, and with each law next to one of its own."""
+    """Fit what the best set is without each effect, and with each law next to one of its own.
+
+    A law that the best one contains is fitted from this one's nuisance parameters as well.
+    """
     while beam.best:
         best, fitted = beam.best, beam.fits[beam.best]
-        tries = [*_without(fitted), *_laws(beam, fitted, library)]
-        _fit_sets(beam, [one for one in tries if names_of(one[0]) not in beam.fits])
+        fewer = [one for one in _without(fitted) if names_of(one[0]) not in beam.fits]
+        _fit_sets(beam, [*fewer, *_laws(beam, fitted, library)])
+        _finish(beam)
         if beam.best == best:
             return
 
@@ -198,11 +236,13 @@ def _expand(beam: Beam, fitted: SetFit, library: Sequence[Effect], wide: set[str
     """Fit the sets next to a fitted one.
 
     A law that contains another is fitted after it, from where that one ended, and a law of dry
-    friction with the contact of one that was fitted before.
+    friction with the contact of one that was fitted before. Effects are screened by what is left
+    with nuisance parameters within their tolerance: beyond it, these may have taken an effect up.
     """
-    is_best = names_of(fitted.effects) == beam.best
+    is_best, fitted = names_of(fitted.effects) == beam.best, beam.problem.within_tolerance(fitted)
     many = BEAM_CANDIDATES if is_best else BEAM_BESIDE
-    screened = beam.screen.best(fitted, _beside(fitted.effects, library, wide), many, anew=is_best)
+    beside, worth = _beside(fitted.effects, library, wide), beam.worth(names_of(fitted.effects))
+    screened = beam.screen.best(fitted, beside, worth, many, anew=is_best)
     effects = [one.effect for one in screened]
     plain = [one for one in screened if not any(contains(one.effect, e) for e in effects)]
     dry = next((one for one in plain if one.effect.dry), None)
@@ -223,7 +263,7 @@ def _expand(beam: Beam, fitted: SetFit, library: Sequence[Effect], wide: set[str
 def _shoot(beam: Beam) -> None:
     """Fit the sets with dry friction from where fits to short replays end, if the best is open."""
     short, best = beam.problem.by_shots, beam.fits[beam.best]
-    if short is None or "loader" not in beam.problem.case.over_limit(best.rig):
+    if short is None or "loader" not in beam.problem.over_limit(best.rig):
         return
     most = beam.log(beam.best)
     dry = [
@@ -241,6 +281,7 @@ def _shoot(beam: Beam) -> None:
 
     starts = in_threads(shot, dry)
     _fit_sets(beam, [(f.effects, start, f) for f, start in zip(dry, starts, strict=True)])
+    _finish(beam)
 
 
 def _beside(
@@ -275,7 +316,7 @@ def _swaps(beam: Beam, fitted: SetFit, library: Sequence[Effect]) -> list[Try]:
         same = [e for e in _beside(rest, library, {*old.shows_in}) if e is not old]
         if rig is not None:
             base = replace(fitted, effects=rest, rig=rig)
-            found = beam.screen.best(base, same, BEAM_BESIDE)
+            found = beam.screen.best(base, same, beam.worth(beam.best), BEAM_BESIDE)
             tries += [t for one in found for t in _tries(base, one, beam.contact)[:1]]
     return tries
 
@@ -303,9 +344,11 @@ def _in_place(beam: Beam, fitted: SetFit, old: Effect, law: Effect) -> list[Try]
     wider = contains(law, old)
     if not (wider or contains(old, law)) or keys_of(rest) & keys_of([law]):
         return []
-    case, start = beam.problem.case, dict(fitted.values)
-    higher = Start()
-    for p in law.free:
+    case, known = beam.problem.case, beam.fits.get(names_of((*rest, law)))
+    ours = {law.value_key(p) for p in law.free}
+    found = {} if known is None else {k: v for k, v in known.values.items() if k in ours}
+    start, higher = {**found, **fitted.values}, Start()
+    for p in law.free if not found else ():
         same = next((q for q in old.free if q.key == p.key and q.mode == p.mode), None)
         level = next((q for q in old.free if q.key == p.above), None)
         if same is not None:
@@ -333,50 +376,60 @@ def _fit_sets(beam: Beam, tries: Sequence[Try]) -> list[SetFit]:
     if not unique:
         return []
 
-    def begin(one: Try) -> tuple[float, SetFit, SetFit]:
+    def begin(one: Try) -> Begun:
         effects, start, parent = one
         fit = problem.fit(effects, start, parent, FIRST)
         return evidence(problem, fit, beam.variance).log(beam.counts), fit, parent
 
     begun = sorted(in_threads(begin, list(unique.values())), key=lambda one: -one[0])
     most = max(begun[0][0], beam.log(beam.best))
-    going = [one for one in begun if one[0] > most - 4.0 * GIVEN_UP]
-    first: dict[Names, tuple[float, SetFit, SetFit]] = {}
+    going = [one for one in begun if one[0] > most - BEGUN_BEHIND]
+    first: dict[Names, Begun] = {}
     for one in going:
         first.setdefault(names_of(one[1].effects), one)
     _go_on(beam, list(first.values()))
 
-    def may_be_better(one: tuple[float, SetFit, SetFit]) -> bool:
+    def may_be_better(one: Begun) -> bool:
         names = names_of(one[1].effects)
-        if one is first[names] or one[0] < first[names][0] - GIVEN_UP:
+        if one is first[names]:
+            return False
+        if not may_be_true(problem, beam.fits[names]):
+            return True
+        if one[0] < first[names][0] - GIVEN_UP:
             return False
         shown = {stage for effect in one[1].effects[-1:] for stage in effect.shows_in}
-        return bool(problem.case.over_limit(beam.fits[names].rig) & shown)
+        return bool(problem.over_limit(beam.fits[names].rig) & shown)
 
     _go_on(beam, [one for one in going if may_be_better(one)])
     return [beam.fits[names] for names in first]
 
 
-def _go_on(beam: Beam, begun: Sequence[tuple[float, SetFit, SetFit]]) -> None:
-    """Fit begun sets to the end, add them, and fit the leading ones by the loader's own steps."""
+def _go_on(beam: Beam, begun: Sequence[Begun]) -> None:
+    """Fit begun sets to the end by wide steps of the loader, and add them."""
     problem = beam.problem
     if problem.case.tell is not None and begun:
         problem.case.tell(f"fitting {len(begun)} sets of effects", 0, 1)
 
-    def go_on(one: tuple[float, SetFit, SetFit]) -> SetFit:
+    def go_on(one: Begun) -> SetFit:
         _, fit, parent = one
         return problem.fit(fit.effects, fit.values, parent, WIDE, fit)
 
     for fit in in_threads(go_on, begun):
         beam.add(fit)
     beam.recount()
+
+
+def _finish(beam: Beam) -> None:
+    """Fit the leading sets by the loader's own steps."""
+    problem = beam.problem
     ranked = [names for names in beam.leading() if names and names not in beam.finished]
 
     def finish(names: Names) -> list[SetFit]:
         fitted = beam.fits[names]
         done = problem.fit(fitted.effects, fitted.values, None, OWN, fitted)
         anew = problem.case.but_for_contact(done.values)
-        if anew == dict(done.values) or "loader" not in problem.case.over_limit(done.rig):
+        known = names != beam.best or anew == dict(done.values)
+        if known or "loader" not in problem.over_limit(done.rig):
             return [done]
         return [done, problem.fit(fitted.effects, anew)]
 

@@ -34,6 +34,7 @@ from coupled.gap.search.fit import Fit, touched
 from coupled.gap.search.intervals import half_width, least_of, open_above, worth_of
 from coupled.gap.search.slopes import Slope
 from coupled.gap.signals.output import Output, memory
+from coupled.gap.thresholds import FIT_LEGS, WEIGHT_CHANGED
 from coupled.parallel import go_on
 
 Floats = NDArray[np.float64]
@@ -47,8 +48,8 @@ class Group:
 
     `cost` is half the weighted sum of squares in noise floors, without the priors. `information` is
     that of the log-likelihood, in the parameters' own units, without the priors. `penalty` is the
-    log density of the nuisance parameters below its maximum. `slope` starts another fit, with the
-    outputs' weights.
+    log density of the nuisance parameters below its maximum. `slope` is that of the outputs that
+    it touches, in noise floors.
     """
 
     values: dict[str, float]
@@ -81,7 +82,8 @@ def fit_set(
 
     A fit starts from each parameter's own starts, or from `start` where it has a value, and keeps
     the best. Effects that share no output are fitted apart; of `parent` the groups that are the
-    same are taken over. A rig that the physics cannot give has all its parameters at a bound.
+    same, and start where they ended, are taken over. A rig that the physics cannot give has all its
+    parameters at a bound.
     `priors` are (mean, standard deviation) by "effect.parameter", in the parameters' own units.
     """
     every = [*effects, *nuisances]
@@ -92,8 +94,8 @@ def fit_set(
     cost, groups = 0.0, dict[tuple[Effect, ...], Group]()
     for members in grouped(every):
         known = None if parent is None else parent.groups.get(tuple(members))
-        if known is None:
-            known = _remembered(case, members, priors, start, descent)
+        if known is None or any(start.get(key, at) != at for key, at in known.values.items()):
+            known = _remembered(case, members, priors, start, descent, parent)
         groups[tuple(members)] = known
         low, high, bound = low | known.low, high | known.high, bound + known.at_bound
         values, cost = values | known.values, cost + known.cost
@@ -124,9 +126,12 @@ def _remembered(
     priors: Mapping[str, Normal],
     start: Mapping[str, float],
     descent: Descent,
+    parent: SetFit | None,
 ) -> Group:
     """Return a fit, as it is known; one that starts where another ended is that one."""
     ours, known = touched(case.outputs, members), descent.known
+    if descent.most < WHOLE.most and parent is not None:
+        descent = replace(descent, held=_held(case, ours, _free(members)[0], parent))
     if known is None:
         return _fit(case, ours, members, priors, start, descent)
     wide = any(output.stepped for output in ours) and descent.steps == "wide"
@@ -139,6 +144,29 @@ def _remembered(
     return held
 
 
+def _held(case: Case, ours: Sequence[Output], keys: Sequence[str], parent: SetFit) -> Floats | None:
+    """Return the slopes that a parent's fit ended with, NaN for parameters that it lacks.
+
+    Its shape is (frames, parameters). None where it has none of them.
+    """
+    edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
+    rows = {id(one): slice(*ends) for one, ends in zip(ours, pairwise(edges), strict=True)}
+    found = np.full((edges[-1], len(keys)), np.nan)
+    for members, group in parent.groups.items():
+        theirs = [k for k, key in enumerate(group.values) if key in keys]
+        if group.slope is None or not theirs:
+            continue
+        mine = [keys.index([*group.values][k]) for k in theirs]
+        found[:, mine] = 0.0
+        first = 0
+        for output in touched(case.outputs, members):
+            last = first + len(output.measured)
+            if id(output) in rows:
+                found[rows[id(output)], mine] = group.slope.jacobian[first:last, theirs]
+            first = last
+    return None if np.isnan(found).all() else found
+
+
 def _fit(
     case: Case,
     ours: Sequence[Output],
@@ -146,14 +174,15 @@ def _fit(
     priors: Mapping[str, Normal],
     start: Mapping[str, float],
     descent: Descent = WHOLE,
+    legs: int = FIT_LEGS,
 ) -> Group:
+    """Return a fit; by the loader's own steps it goes on until its weights are those of its end."""
     nominal, control = case.nominal, case.control
     keys, frees = _free(effects)
     if not ours:
         known = dict(zip(keys, _starts(effects, start)[0], strict=True))
         return Group(known, {}, {}, (), 0.0, np.zeros((len(keys), len(keys))))
     scale = np.array([_scale(p) for p in frees])
-    frames = sum(len(output.measured) for output in ours)
 
     def plain(scaled: Floats, wide: bool = False, rough: bool = False) -> list[Floats]:
         go_on()
@@ -181,13 +210,16 @@ def _fit(
     prior = _Priors.of([priors.get(key) for key in keys], scale, unit)
     # How the contact of dry friction yields is free beside any friction that is filed.
     rubs = any(one.dry for one in effects) or any(p.key in CONTACT for p in frees)
-    search = replace(descent, rubs=rubs)
 
     def with_prior(scaled: Floats, wide: bool = False, rough: bool = False) -> Floats:
         return np.concatenate((residual(scaled, wide, rough), prior.rows(scaled)))
 
-    before = descent.slopes.get(tuple(keys)) if len(ours) == 1 else None
-    slope = prior.in_slope(before, frames)
+    rows = np.repeat(weights, [len(output.measured) for output in ours])
+    before, held = descent.slopes.get(tuple(keys)), descent.held
+    slope = None if before is None else prior.in_slope(before, rows)
+    if held is not None:
+        held = np.vstack((rows[:, None] * held, prior.slopes))
+    search = replace(descent, rubs=rubs, held=held)
     best = prior.without(search.end(with_prior, firsts, (low, high), stepped, slope=slope))
 
     def cost(at: float, k: int) -> float:
@@ -201,6 +233,11 @@ def _fit(
             edge = _with(best.x, k, least_of(partial(cost, k=k), span, most))
             found = search.end(with_prior, [edge], (low, high), stepped)
             best = min(best, prior.without(found), key=lambda one: one.cost)
+    changed = _changed(units, best, ours, weights)
+    if legs > 1 and descent.steps != "wide" and changed > WEIGHT_CHANGED:
+        again = dict(zip(keys, (best.x * scale).tolist(), strict=True))
+        return _fit(case, ours, effects, priors, again, replace(descent, slopes={}), legs - 1)
+    best = replace(best, slope=None if held is not None else _plain(best.slope, rows))
     return _group(case, ours, _Free(keys, frees, scale, ends, weights), best, prior, cost)
 
 
@@ -275,6 +312,24 @@ def _unit(left: Floats) -> float:
     return max(float(np.mean(left**2)), 1.0) * memory(left)
 
 
+def _changed(
+    units: Sequence[float], end: End, ours: Sequence[Output], weights: Sequence[float]
+) -> float:
+    """Return by what factor the outputs' units changed most in a weighted fit."""
+    edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
+    parts = zip(pairwise(edges), weights, strict=True)
+    ended = [_unit(end.fun[first:last] / weight) for (first, last), weight in parts]
+    return max(max(a / b, b / a) for a, b in zip(units, ended, strict=True))
+
+
+def _plain(slope: Slope | None, weights: Floats) -> Slope | None:
+    """Return a weighted fit's slopes without the weights of the rows, and without priors' rows."""
+    if slope is None:
+        return None
+    left, jacobian = slope.left[: len(weights)], slope.jacobian[: len(weights)]
+    return Slope(slope.at, left / weights, jacobian / weights[:, None])
+
+
 def _information(end: End, ours: Sequence[Output], weights: Sequence[float]) -> Floats:
     """Return the information matrix of the log-likelihood at the end of a weighted fit."""
     edges = np.cumsum([0, *(len(output.measured) for output in ours)]).tolist()
@@ -322,14 +377,17 @@ class _Priors:
         """Return by how much the log density of the priors is below its maximum."""
         return 0.5 * float(np.sum(((scaled[self.at] - self.mean) / self.sigma) ** 2))
 
-    def in_slope(self, slope: Slope | None, frames: int) -> Slope | None:
-        """Return another fit's slopes with the rows of these priors."""
-        if slope is None:
-            return None
-        jacobian = np.zeros((len(self.at), self.numbers))
-        jacobian[np.arange(len(self.at)), self.at] = np.sqrt(self.unit) / self.sigma
-        left = np.concatenate((slope.left[:frames], self.rows(slope.at)))
-        return Slope(slope.at, left, np.vstack((slope.jacobian[:frames], jacobian)))
+    @property
+    def slopes(self) -> Floats:
+        """The rows' slopes, shape (rows, numbers)."""
+        found = np.zeros((len(self.at), self.numbers))
+        found[np.arange(len(self.at)), self.at] = np.sqrt(self.unit) / self.sigma
+        return found
+
+    def in_slope(self, slope: Slope, weights: Floats) -> Slope:
+        """Return another fit's slopes, its rows weighted, with the rows of these priors."""
+        left = np.concatenate((weights * slope.left, self.rows(slope.at)))
+        return Slope(slope.at, left, np.vstack((weights[:, None] * slope.jacobian, self.slopes)))
 
     def without(self, end: End) -> End:
         """Return the end of a fit without the priors' rows."""

@@ -16,7 +16,7 @@ from coupled.gap.effects.library import BY_NAME
 from coupled.gap.effects.settings import is_dry
 from coupled.gap.search.case import Case
 from coupled.gap.search.descent import WHOLE, Descent
-from coupled.gap.signals.output import Output
+from coupled.gap.signals.output import Output, stage_gaps, stage_limits
 from coupled.gap.thresholds import MISMATCH
 from coupled.rig.rig import Rig
 
@@ -80,8 +80,8 @@ class Problem:
     ) -> SetFit:
         """Return a set fitted together with the nuisance parameters to the whole record.
 
-        Groups of effects that `parent` has as well are taken over from it. `near` is a fit of the
-        set that ended at the start.
+        Groups of effects that `parent` has as well, at the same values, are taken over. `near` is a
+        fit of the set that ended at the start.
         """
         free = self.beside(effects)
         begun = self.case.with_contact(effects, free, start or {})
@@ -95,14 +95,26 @@ class Problem:
         known = {**self.case.neutral, **values}
         return possible(self.case.nominal, self.case.control, every, known)
 
-    def within_tolerance(self, found: SetFit) -> Rig:
-        """Return the rig of a fit without effects, its nuisance parameters within their 95 %."""
+    def within_tolerance(self, found: SetFit) -> SetFit:
+        """Return a fit with its nuisance parameters within their 95 %."""
         values = dict(found.values)
         for key, prior in self.priors.items():
             if key in values:
                 half = NORMAL_95 * prior.sigma
                 values[key] = min(max(values[key], prior.mean - half), prior.mean + half)
-        return self.rig_of((), values) or self.case.nominal
+        rig = self.rig_of(found.effects, values)
+        return found if rig is None else replace(found, values=values, rig=rig)
+
+    def surely_open(self, settled: Rig) -> Problem:
+        """Return the problem in which a gap that this rig leaves is held to noise alone."""
+        anew = Problem(self.case.surely_open(settled))
+        anew._known.update(self._known)  # no fit asks for a limit
+        return anew
+
+    def over_limit(self, rig: Rig) -> set[str]:
+        """Return the outputs of which a rig leaves more than noise may, by the noise known."""
+        gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
+        return {at for at, gap in gaps.items() if gap > limits[at]}
 
     @cached_property
     def by_shots(self) -> Problem | None:

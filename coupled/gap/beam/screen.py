@@ -5,10 +5,11 @@ sizes over three decades, since friction, play and rate limits do nothing at one
 at another; the projection itself is free of scale. The size that leaves least is where a fit
 starts.
 
-The share of the residual's power that a signature takes is the score test's statistic, so it is the
-gain in log-likelihood that a small size of the effect is predicted to make (Rao, Math. Proc. Camb.
-Phil. Soc. 44, 1948). The signatures beside one set of effects are nearly those beside another: they
-are taken once, and again only beside the best set.
+The power that a signature takes of the residual is the score test's statistic, and gives the gain
+in log-likelihood that the effect is predicted to make (Rao, Math. Proc. Camb. Phil. Soc. 44, 1948).
+An effect whose predicted gain is less than what its prior costs is not fitted. The signatures
+beside one set of effects are nearly those beside another: they are taken once, and again only
+beside the best set.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coupled.gap.beam.evidence import misfit
 from coupled.gap.beam.fit import SetFit
 from coupled.gap.beam.problem import Problem
 from coupled.gap.chain import BY_NAME as STAGE_OF
@@ -41,11 +43,22 @@ Values = dict[str, float]
 
 
 class Screened(NamedTuple):
-    """A candidate, where its fits start, and the power that its signature takes, noise floors²."""
+    """A candidate, where its fits start, and what its signature takes of the residual.
+
+    `taken` is the power, noise floors², `gain` the predicted log-likelihood gain.
+    """
 
     effect: Effect
     starts: list[Values]
     taken: float
+    gain: float
+
+
+class Worth(NamedTuple):
+    """The `least` predicted gain for which an effect is fitted, and the outputs' samples."""
+
+    least: float
+    counts: Floats
 
 
 class _Signature(NamedTuple):
@@ -61,44 +74,59 @@ class Screen:
     """Screens candidates beside sets of effects, and keeps their signatures."""
 
     problem: Problem
+    variance: Floats
     known: dict[str, list[_Signature]] = field(default_factory=dict)
 
     def best(
         self,
         current: SetFit,
         candidates: Sequence[Effect],
+        worth: Worth,
         most: int = BEAM_CANDIDATES,
         anew: bool = False,
     ) -> list[Screened]:
         """Return the candidates whose signatures take most of the residual, the best first.
 
-        Those that take far less than the best are left out. Signatures are taken beside the current
-        effects where they are not known, or are asked for `anew`.
+        Those that take far less than the best are left out, and those that are not `worth` it.
+        Signatures are taken beside the current effects where they are not known, or are asked for
+        `anew`.
         """
         wanted = [e for e in candidates if anew or e.name not in self.known]
         for effect, made in zip(
             wanted, in_threads(lambda e: self._signatures(current, e), wanted), strict=True
         ):
             self.known[effect.name] = made
-        found = [self._screened(current, effect) for effect in candidates]
-        found = sorted((one for one in found if one.starts), key=lambda one: -one.taken)
+        found = [self._screened(current, effect, worth.counts) for effect in candidates]
+        found = [one for one in found if one.starts and one.gain > worth.least]
+        found.sort(key=lambda one: -one.taken)
         least = SCREEN_NEAR * found[0].taken if found else 0.0
         return [one for one in found[:most] if one.taken >= least]
 
-    def _screened(self, current: SetFit, effect: Effect) -> Screened:
+    def _screened(self, current: SetFit, effect: Effect, counts: Floats) -> Screened:
         """Return a candidate with the start of each shape that leaves least."""
         now = _residual(self.problem, effect, current.rig)
-        taken, starts = 0.0, dict[int, tuple[float, Values]]()
+        outputs = touched(self.problem.outputs, [effect])
+        ours = [k for k, one in enumerate(self.problem.outputs) if one.stage in effect.shows_in]
+        edges = np.cumsum([0, *(len(one.measured) for one in outputs[:-1])])
+
+        def unlikely(left: Floats) -> float:
+            frames = np.array([len(one.measured) for one in outputs])
+            squares = np.add.reduceat(left**2, edges) / frames / self.variance[ours]
+            return 0.5 * float(counts[ours] @ misfit(squares))
+
+        taken, gain, starts = 0.0, 0.0, dict[int, tuple[float, Values]]()
         for values, shape, change in self.known[effect.name]:
             size = float(change @ change)
             # A limit that is never met leaves the residual as it is, and a fit where it was.
             if size <= SCREEN_SHOWN * len(now):
                 continue
-            taken = max(taken, float(now @ change) ** 2 / size)
+            share = float(now @ change) / size
+            taken = max(taken, share**2 * size)
+            gain = max(gain, unlikely(now) - unlikely(now - share * change))
             left = float((now + change) @ (now + change))
             if shape not in starts or left < starts[shape][0]:
                 starts[shape] = left, values
-        return Screened(effect, [values for _, values in starts.values()], taken)
+        return Screened(effect, [values for _, values in starts.values()], taken, gain)
 
     def _signatures(self, current: SetFit, effect: Effect) -> list[_Signature]:
         """Return an effect's signatures beside the current effects."""

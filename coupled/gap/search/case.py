@@ -146,7 +146,7 @@ class Case:
         limits = stage_limits(self.outputs)
         return {at for at, gap in self.gaps(rig).items() if gap > limits[at]}
 
-    def surely_open(self) -> Case:
+    def surely_open(self, settled: Rig | None = None) -> Case:
         """Return the case in which a gap that no colour of noise explains is held to noise alone.
 
         What is not known of the colour of what drives a stage says whether it has a gap. Once it
@@ -154,9 +154,10 @@ class Case:
         """
         if not any(output.unsure for output in self.outputs):
             return self
-        settled, limits = stage_gaps(self.outputs, self.fit(()).rig), stage_limits(self.outputs)
+        rig = self.fit(()).rig if settled is None else settled
+        settled_gaps, limits = stage_gaps(self.outputs, rig), stage_limits(self.outputs)
         outputs = [
-            replace(one, unsure=0.0) if settled[one.stage] > limits[one.stage] else one
+            replace(one, unsure=0.0) if settled_gaps[one.stage] > limits[one.stage] else one
             for one in self.outputs
         ]
         anew = replace(self, outputs=outputs)

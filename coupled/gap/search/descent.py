@@ -63,6 +63,7 @@ class Descent:
     `known` remembers what was fitted to the same outputs, so that none is fitted twice; `slopes`
     are those of a fit to them that ended at the start, by the keys of its numbers. Of dry friction,
     which `rubs`, the last steps along a valley gain what no record tells, and a fit ends sooner.
+    Slopes of `held` are taken over (`Slopes`): where the first of many starts is looked for.
     """
 
     steps: Literal["wide", "own", "both"] = "both"
@@ -72,6 +73,7 @@ class Descent:
         default_factory=dict, repr=False, compare=False
     )
     rubs: bool = False
+    held: Floats | None = field(default=None, repr=False, compare=False)
 
     def end(
         self,
@@ -91,7 +93,7 @@ class Descent:
         best: End | None = None
         if self.steps != "own" or not stepped:
             share = WIDE_DIFFERENCE if stepped else 0.0
-            search = _Search(near, sloping, ends, rows, share, not stepped, self.rubs)
+            search = _Search(near, sloping, ends, rows, share, not stepped, self.rubs, self.held)
             best = self._raced(search, firsts, slope)
         if self.steps != "wide" and stepped:
             first, known = (firsts[0], slope) if best is None else (best.x, best.slope)
@@ -137,6 +139,7 @@ class _Search:
     share: float = 0.0
     smooth: bool = False
     rubs: bool = False
+    held: Floats | None = None
 
     def down(self, first: Floats, most: int, slope: Slope | None = None) -> End:
         """Return where they lead from a start, by so many evaluations at most.
@@ -144,7 +147,8 @@ class _Search:
         Slopes that were corrected by much, or corrected and led nowhere, are taken anew at the end,
         and may lead on.
         """
-        slopes = Slopes(self.sloping, self.ends, self.rows, self.share, slope, self.smooth)
+        given = (self.rows, self.share, slope, self.smooth, self.held)
+        slopes = Slopes(self.sloping, self.ends, *given)
         x0 = np.clip(first, self.ends[0] + 1e-9, self.ends[1] - 1e-9)
         frames = int(np.count_nonzero(self.rows)) if isinstance(self.rows, np.ndarray) else 0
 

@@ -53,7 +53,7 @@ class Slopes:
     those says nothing of where the fit should go, nor of how well it knows. Far from the end the
     jumps are larger: a difference is over no less than a `share` of the residual. One that has
     none is `smooth`. `last` is what was known last, from another fit of the same numbers to the
-    same frames too.
+    same frames too. Columns of `held` that are no NaN are taken over, shape (frames, numbers).
     """
 
     def __init__(
@@ -64,9 +64,10 @@ class Slopes:
         share: float = 0.0,
         last: Slope | None = None,
         smooth: bool = False,
+        held: Floats | None = None,
     ) -> None:
         self._residual, self._rows, self._share = residual, rows, share
-        self._smooth = smooth
+        self._smooth, self._held = smooth, held
         self._low, self._high = ends
         self._step = np.full(len(self._low), 0.01)
         self.last = last
@@ -109,6 +110,8 @@ class Slopes:
         wanted = max(DIFFERENCE, self._share * _rms(here[self._rows]))
 
         def column(i: int) -> Floats:
+            if self._held is not None and not np.isnan(self._held[0, i]):
+                return self._held[:, i]
             value = x[i]
             room = max(self._high[i] - value, value - self._low[i])
             step = min(self._step[i], 0.5 * room)

@@ -264,8 +264,10 @@ def spread(
     square = float(np.mean(power**2 / crowded + 2.0 * power * alone + alone**2))
     frames = max(1, round(STRETCH_s * rate_Hz))
     starts = np.arange(0, len(carried[0]), frames)
-    local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts)
-    crowd = float(np.mean(local) ** 2 / np.mean(local**2)) if total > 0.0 else 1.0
+    lengths = np.diff([*starts, len(carried[0])])
+    local = np.add.reduceat(np.mean(np.square(carried), axis=0) + own**2, starts) / lengths
+    mean, square_mean = np.average([local, local**2], axis=1, weights=lengths)
+    crowd = float(mean**2 / square_mean) if total > 0.0 else 1.0
     return float(np.sqrt(0.5 * square / total**2 / (crowd * len(carried[0]))))
 
 

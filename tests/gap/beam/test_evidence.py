@@ -12,6 +12,7 @@ from coupled.gap.beam.evidence import Evidence, evidence, fewest_unexplained, lo
 from coupled.gap.beam.problem import Problem
 from coupled.gap.effects.library import BY_NAME
 from coupled.gap.search.case import Case
+from coupled.gap.search.descent import Descent
 from coupled.gap.signals.output import Output
 from coupled.gap.thresholds import PRIOR_SPAN
 from coupled.rig.rig import Rig
@@ -76,3 +77,11 @@ def test_samples_are_counted_by_the_set_that_leaves_least_of_each_output() -> No
     first = Evidence(np.array([4.0, 1.0]), np.array([10.0, 500.0]), 0.0)
     second = Evidence(np.array([1.0, 9.0]), np.array([400.0, 20.0]), 0.0)
     assert fewest_unexplained([first, second]) == pytest.approx([400.0, 500.0])
+
+
+def test_a_fit_of_the_same_set_begins_where_it_is_told() -> None:
+    """Not where its parent ended, which may be a local minimum that short replays lead out of."""
+    one = problem(2e-4)
+    parent = one.fit((BEND,))
+    begun = one.fit((BEND,), {**parent.values, KEY: 5e-4}, parent, Descent("wide", 1))
+    assert begun.values[KEY] == pytest.approx(5e-4)

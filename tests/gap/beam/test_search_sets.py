@@ -58,6 +58,13 @@ def test_two_effects_of_two_stages_are_found_together(tmp_path: Path) -> None:
     assert {effect.name for effect in found.effects} == set(both)
 
 
+def test_beside_an_effect_without_a_number_another_stage_is_explained_too(tmp_path: Path) -> None:
+    servo = nominal_rig(False).changed({"controls.column.loader.servo_frequency_Hz": 12.0})
+    both = {"no_servo": {}, "inertia": {"factor": 1.4}}
+    found = answer(tmp_path, both, 6, servo)
+    assert {effect.name for effect in found.effects} == set(both)
+
+
 def test_a_number_within_its_tolerance_is_no_effect_and_one_beyond_it_is(tmp_path: Path) -> None:
     assert answer(tmp_path, {"inertia": {"factor": 1.01}}, 7).verdict == "no_gap"
     beyond = answer(tmp_path, {"inertia": {"factor": 1.15}}, 7)
