@@ -24,7 +24,7 @@ from coupled.cli.reporting import ReportOption, check_report, say_report, write_
 from coupled.cli.rigs import say_doubts, say_stale
 from coupled.cli.tables.whole import print_whole
 from coupled.cli.terminal import check_json, err, give_json, keep_json, out, print_json, say
-from coupled.errors import InputError, shown
+from coupled.errors import InputError, nearest, shown
 from coupled.files import check_target
 from coupled.outputs import Outputs
 from coupled.resources import DEFAULT_RUN, shipped_rigs, shipped_runs, shipped_sweeps
@@ -32,6 +32,7 @@ from coupled.timing import timed
 
 if TYPE_CHECKING:
     from coupled.authority.compare import Flight
+    from coupled.flight.manoeuvre import Manoeuvre
 
 
 @app.command(
@@ -51,6 +52,7 @@ def compare(
     panels: PanelsOption = "",
     overlay: OverlayOption = False,
     size: SizeOption = "",
+    case: Annotated[str, typer.Option(help="Case to fly, by its label; else all.")] = "",
 ) -> None:
     """Fly a run rigid, uncompensated, with each correction, and with both."""
     from coupled.authority.compare import compare as compare_flights
@@ -59,6 +61,8 @@ def compare(
     from coupled.flight.runfile import read_run
 
     cases = read_run(run)
+    if case:
+        cases = [_labelled(case, cases, run)]
     path = figure or Path("out") / f"{cases[0].name}.png"
     inputs = [file for case in cases for file in input_files(case)]
     if not no_figure:
@@ -113,16 +117,13 @@ def fly(
 ) -> None:
     """Fly one run and write its record, and a manifest beside it."""
     from coupled.authority.compare import AS_THE_RIG, fly_and_judge
-    from coupled.errors import nearest
     from coupled.flight.manifest import input_files
     from coupled.flight.manoeuvre import EVERY_CONFIGURATION
     from coupled.flight.runfile import read_run
     from coupled.record.record import check_suffix, manifest_path, write_record
 
-    cases = {each.label: each for each in read_run(run)}
-    if case and case not in cases:
-        raise InputError(run, "--case", f"no case {case!r}; {nearest(case, cases)}")
-    manoeuvre = cases[case] if case else next(iter(cases.values()))
+    cases = read_run(run)
+    manoeuvre = _labelled(case, cases, run) if case else cases[0]
     for known in EVERY_CONFIGURATION:
         if configuration == known:
             manoeuvre = manoeuvre.configured(known)
@@ -155,6 +156,14 @@ def fly(
     if flight.ended_early:
         err.print(f"[yellow]ended early:[/] {flight.ended_early}; the record so far is kept")
     _end([flight])
+
+
+def _labelled(label: str, cases: Sequence[Manoeuvre], run: str) -> Manoeuvre:
+    """Return the case of a run with a label. Raises InputError where it has none."""
+    by_label = {each.label: each for each in cases}
+    if label not in by_label:
+        raise InputError(run, "--case", f"no case {label!r}; {nearest(label, by_label)}")
+    return by_label[label]
 
 
 @app.command(epilog="[dim]Example: coupled plot out/t37.csv --figure out/t37.pdf[/]")

@@ -138,7 +138,9 @@ def test_a_setting_is_no_effect_until_it_is_off_by_more(
         settings = {setting.name: setting.factor for setting in found.settings}
         assert settings["damping"] == pytest.approx(factor, abs=0.003)
         assert f"because of mass {100 * (settings['mass'] - 1):+.1f} %" in said
-        assert f"damping {100 * (settings['damping'] - 1):+.1f} %, each within its tolerance" in said
+        assert (
+            f"damping {100 * (settings['damping'] - 1):+.1f} %, each within its tolerance" in said
+        )
 
 
 def test_an_effect_without_a_number_is_always_tried(

@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 def print_stages(console: Console, stages: Sequence[StageResult]) -> None:
     """Print the stages of a diagnosis: residual over floor, and what is left of it."""
     table = Table("stage", box=None)
-    for head in ("residual over floor", "with the effects", ""):
+    for head in ("residual over floor", "with the effects"):
         table.add_column(head, justify="right")
+    table.add_column("")  # remarks, of several lines where channels lack
     for stage in stages:
         if stage.gap is None:
             lacks = "lacks " + ", ".join(stage.missing)
