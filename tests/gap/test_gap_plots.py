@@ -230,8 +230,7 @@ def test_plots_on_the_command_line(tmp_path: Path) -> None:
     asked = ("diagnose", "r.csv", "--rig", "report-column", "--plots")
     done = coupled(tmp_path, *asked, "figures", *us)
     assert done.returncode == 0, done.stderr
-    report = (tmp_path / "us.html").read_text(encoding="utf-8")
-    assert "residual, in" in report and "residual, mm" not in report
+    assert "Each stage of the chain" in (tmp_path / "us.html").read_text(encoding="utf-8")
     for name in FIGURES:
         assert f"figure: figures/{name}" in done.stdout
         assert (tmp_path / "figures" / name).read_bytes()[:4] == b"\x89PNG"
