@@ -48,7 +48,7 @@ class Layout:
         return list(dict.fromkeys(self.panels)) or known
 
     def size(self, width_in: float, height_in: float) -> tuple[float, float]:
-        """Return the size asked for, or else one that goes with the panels, in inches."""
+        """Return the requested size, or by default one that fits the panels, in inches."""
         return self.size_in or (width_in, height_in)
 
 
@@ -74,7 +74,7 @@ def layout_of(panels: str = "", overlay: bool = False, size: str = "") -> Layout
 
 
 def for_print(figure: Figure, layout: Layout) -> Figure:
-    """Return a figure with letters and lines for the size asked for; as it is without a size.
+    """Return a figure with letters and lines for the requested size; unchanged without a size.
 
     Letters have 6 to 7.5 points, PNG files 300 dots an inch.
     """

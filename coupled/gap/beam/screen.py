@@ -88,7 +88,7 @@ class Screen:
         """Return the candidates whose signatures take most of the residual, the best first.
 
         Those that take far less than the best are left out, and those that are not `worth` it.
-        Signatures are taken beside the current effects where they are not known, or are asked for
+        Signatures are taken beside the current effects if they are unknown, or requested
         `anew`.
         """
         wanted = [e for e in candidates if anew or e.name not in self.known]
